@@ -1,0 +1,1 @@
+"""Torque control of rotary series elastic actuators: model, identification, diagnosis, nodes."""

@@ -1,0 +1,40 @@
+"""The root of every error that the package raises on purpose.
+
+A message says what, value, unit, limit and where. The command line prints it as one line and exits
+with status 2; a node turns it into a log line and a diagnostic.
+"""
+
+
+class RseaError(Exception):
+    """Root of all errors of this package."""
+
+
+class BagError(RseaError, ValueError):
+    """A bag that cannot be read or written as asked."""
+
+
+class ChannelError(RseaError, KeyError):
+    """A channel that a record does not have, or that cannot be used."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+class RigError(RseaError, ValueError):
+    """A rig file with a missing, unknown or impossible value."""
+
+
+class ParameterError(RseaError, ValueError):
+    """A parameter outside its range or of the wrong type."""
+
+
+class ImportMapError(RseaError, ValueError):
+    """An import map that does not fit its data file."""
+
+
+class IdentificationError(RseaError, ValueError):
+    """Data from which the parameters asked for cannot be had."""
+
+
+class DeviceError(RseaError, OSError):
+    """A device that does not answer, or answers with a fault."""

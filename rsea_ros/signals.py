@@ -1,0 +1,114 @@
+"""Record: the time series of one run, in SI units, frozen. The only data type between the layers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from rsea_ros.errors import ChannelError
+
+FloatArray = npt.NDArray[np.float64]
+
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "command": "N m",
+        "motor_torque": "N m",
+        "position": "rad",
+        "velocity": "rad/s",
+        "ft": "N m",
+        "reference": "rad",
+    }
+)
+"""Channel names and their units.
+
+command       motor torque asked for, at the gear output; the stamp is when it takes effect
+motor_torque  motor torque from measured current, at the gear output
+position      gear output relative to the housing
+velocity      its rate
+ft            torque of the F/T sensor about the actuator axis, positive when the spring pushes
+              the distal side forward
+reference     position asked for by a controller that ran during the record
+"""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Values of one quantity at their own stamps.
+
+    t: seconds since the record's epoch, shape (n,), as recorded (a fault may put them out of order).
+    y: values in the unit of UNITS, shape (n,), as recorded (may hold NaN).
+    """
+
+    t: FloatArray
+    y: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.t.shape != self.y.shape or self.t.ndim != 1:
+            raise ChannelError(f"stamps of shape {self.t.shape} for values of shape {self.y.shape}, expected equal (n,)")
+        for array in (self.t, self.y):
+            array.setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def rate(self) -> float:
+        """Median sample rate, Hz."""
+        return float(1.0 / np.median(np.diff(self.t)))
+
+    def between(self, start: float, stop: float) -> Channel:
+        """Return the samples with start <= t < stop (s)."""
+        keep = (self.t >= start) & (self.t < stop)
+        return Channel(self.t[keep], self.y[keep])
+
+
+@dataclass(frozen=True)
+class Record:
+    """One run: channels by name (see UNITS), and where they came from.
+
+    epoch_ns: the stamp that is t = 0, nanoseconds since the epoch of the recording clock.
+    source: path or topic prefix, for messages to people.
+    """
+
+    channels: Mapping[str, Channel]
+    source: str = ""
+    epoch_ns: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        unknown = set(self.channels) - set(UNITS)
+        if unknown:
+            raise ChannelError(f"{self.source}: unknown channel {sorted(unknown)[0]!r}, expected one of {', '.join(UNITS)}")
+        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.channels
+
+    def __getitem__(self, name: str) -> Channel:
+        try:
+            return self.channels[name]
+        except KeyError:
+            have = ", ".join(self.channels) or "none"
+            raise ChannelError(f"{self.source}: no channel {name!r}, expected it beside: {have}") from None
+
+    @property
+    def start(self) -> float:
+        """First stamp of any channel, s."""
+        return min(float(c.t[0]) for c in self.channels.values())
+
+    @property
+    def stop(self) -> float:
+        """Last stamp of any channel, s."""
+        return max(float(c.t[-1]) for c in self.channels.values())
+
+    def between(self, start: float, stop: float) -> Record:
+        """Return the record restricted to start <= t < stop (s); stamps keep their origin."""
+        return replace(self, channels={k: c.between(start, stop) for k, c in self.channels.items()})
+
+    def with_channels(self, **channels: Channel) -> Record:
+        """Return the record with some channels added or replaced."""
+        return replace(self, channels={**self.channels, **channels})
