@@ -1,0 +1,112 @@
+"""The command line: finds the module of a verb, runs it, and turns its errors into one line and a status."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol, cast
+
+from rsea_ros.errors import RseaError
+
+SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
+
+
+class Verb(Protocol):
+    """What a module in this directory has."""
+
+    HELP: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the verb's arguments, with units."""
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do it and return the exit status."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `rsea VERB …` and return its exit status: 0, 1 a finding asked for by status, 2 bad input."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    prefix = "rsea"
+    try:
+        if not arguments or arguments[0] in ("-h", "--help"):
+            print(overview())
+            return SUCCESS
+        name = arguments[0]
+        if name not in verbs():
+            return _fail(prefix, f"no verb {name!r}, expected one of: {', '.join(verbs())}")
+        prefix = f"rsea {name}"
+        status = _run(name, arguments[1:])
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        _silence_stdout()
+        return READER_GONE
+    except RseaError as error:
+        return _fail(prefix, str(error))
+    except OSError as error:
+        return _fail(prefix, _describe(error))
+    except KeyboardInterrupt:
+        return _fail(prefix, "interrupted", INTERRUPTED)
+
+
+def verbs() -> dict[str, Path]:
+    """Return the file of every verb by name: the modules beside this one (`import_.py` is `import`)."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return {f.stem.rstrip("_"): f for f in files if not f.stem.startswith("_") and f.stem != "main"}
+
+
+def overview() -> str:
+    """Return the help text with one line a verb, without importing any of them."""
+    rows = [f"  {name:<10} {summary(path)}" for name, path in verbs().items()]
+    closing = "rsea VERB --help tells a verb's arguments and units."
+    return "\n".join(["usage: rsea VERB …", "", *rows, "", closing])
+
+
+def summary(path: Path) -> str:
+    """Return the HELP string of a verb's file, read from its syntax tree."""
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        match node:
+            case ast.Assign(targets=[ast.Name(id="HELP")], value=ast.expr() as text):
+                return str(ast.literal_eval(text))
+            case ast.AnnAssign(target=ast.Name(id="HELP"), value=ast.expr() as text):
+                return str(ast.literal_eval(text))
+    return ""
+
+
+def _run(name: str, arguments: Sequence[str]) -> int:
+    """Import the verb, parse its arguments and run it.
+
+    A verb that hands arguments on to another program sets the default `pass_on`: it gets the unknown
+    ones there.
+    """
+    verb = cast(Verb, importlib.import_module(f"rsea_ros.cli.{verbs()[name].stem}"))
+    parser = argparse.ArgumentParser(prog=f"rsea {name}", description=verb.HELP)
+    verb.add_arguments(parser)
+    args, rest = parser.parse_known_args(arguments)
+    if "pass_on" in args:
+        args.pass_on = rest
+    elif rest:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    return verb.run(args)
+
+
+def _describe(error: OSError) -> str:
+    """Return one line that names the file, where the error knows it."""
+    reason = error.strerror or str(error)
+    return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
+
+
+def _fail(prefix: str, message: str, status: int = BAD_INPUT) -> int:
+    """Write one line to stderr and return the status."""
+    print(f"{prefix}: {' '.join(message.split())}", file=sys.stderr)
+    return status
+
+
+def _silence_stdout() -> None:
+    """Point stdout at nothing, so that the interpreter's last flush says nothing about the closed pipe."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

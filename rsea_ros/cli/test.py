@@ -1,0 +1,32 @@
+"""rsea test: the whole suite of the repository."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from rsea_ros.errors import RseaError
+
+HELP = "run the tests; further arguments go to pytest (paths are relative to the repository)"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Take no arguments of its own: all go to pytest."""
+    parser.set_defaults(pass_on=[])
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run pytest on the tree with two workers and return its exit status."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / "test" / "conftest.py").is_file():
+        raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
+    workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
+    pytest = subprocess.Popen([sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on], cwd=root)
+    while True:
+        try:
+            return pytest.wait()
+        except KeyboardInterrupt:  # the terminal interrupts pytest too; it closes with its own summary
+            continue
