@@ -1,0 +1,68 @@
+"""Which topics, joint and wrench axis a record is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rsea_ros.errors import ParameterError
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+
+AXES = tuple(f"{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
+ROLES = ("torque_command", "joint_states", "ft", "desired_position")
+
+FIELDS: Mapping[str, Mapping[str, str]] = {
+    "torque_command": {"command": "effort"},
+    "joint_states": {"position": "position", "velocity": "velocity", "motor_torque": "effort"},
+    "ft": {"ft": "wrench"},
+    "desired_position": {"reference": "position"},
+}
+"""By role: the channels of the record, and the field of the message that each comes from."""
+
+TYPES: Mapping[str, str] = {role: WRENCH if role == "ft" else JOINT_STATE for role in ROLES}
+
+
+@dataclass(frozen=True)
+class TopicMap:
+    """Names of the topics of one bench; the defaults are the contract's.
+
+    A name that starts with a slash stands as it is, any other lies in the namespace.
+    desired_position is a JointState whose position is the reference of the controller that ran during
+    the record. It is named like its sibling `desired_torque`, after what it asks for: `reference` says
+    neither of what nor in which unit, and in ROS names a reference frame as often as a set point.
+
+    joint: which joint, where the messages hold several.
+    axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
+    """
+
+    namespace: str = "/rsea"
+    torque_command: str = "torque_command"
+    joint_states: str = "joint_states"
+    ft: str = "ft"
+    desired_position: str = "desired_position"
+    joint: str | None = None
+    axis: str = "torque.z"
+
+    def __post_init__(self) -> None:
+        if self.axis.removeprefix("-") not in AXES:
+            raise ParameterError(
+                f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"
+            )
+
+    def topic(self, role: str) -> str:
+        """Return the absolute topic of a role of ROLES."""
+        name: str = getattr(self, role)
+        return name if name.startswith("/") else f"/{self.namespace.strip('/')}/{name}".replace("//", "/")
+
+    def renamed(self, assignments: Sequence[str]) -> TopicMap:
+        """Return the map with `role=topic` assignments applied, as the command line gives them."""
+        names: dict[str, str] = {}
+        for assignment in assignments:
+            role, equals, topic = assignment.partition("=")
+            if role not in ROLES or not equals or not topic:
+                expected = f"ROLE=TOPIC with ROLE one of {', '.join(ROLES)}"
+                raise ParameterError(f"topic {assignment!r}: expected {expected}")
+            names[role] = topic
+        return replace(self, **names)
