@@ -1,0 +1,132 @@
+"""MCAP files written in chunks that are safe as soon as they are flushed.
+
+Format: https://mcap.dev/spec. The writer of rosbags keeps a chunk in memory until it holds 1 MiB, which is
+ten seconds of an actuator's topics: too much to lose with a recorder that is killed.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+from msg_adapters.definitions import definition
+from msg_adapters.mcap_file import (
+    CHANNEL,
+    CHUNK,
+    CHUNK_HEAD,
+    DATA_END,
+    FOOTER,
+    MAGIC,
+    MESSAGE,
+    RECORD,
+    SCHEMA,
+)
+
+HEADER, MESSAGE_INDEX, CHUNK_INDEX, STATISTICS = 0x01, 0x07, 0x08, 0x0B
+CHUNK_SIZE = 1 << 20
+MESSAGE_RECORD = struct.Struct("<BQHIQQ")
+
+
+class McapStorage:
+    """One MCAP file being written (see Storage)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = path.open("xb", buffering=0)
+        self._end = 0
+        self._chunk = bytearray()
+        self._index: dict[int, list[tuple[int, int]]] = {}
+        self._types: dict[str, int] = {}
+        self._schemas = b""
+        self._channels = b""
+        self._chunks: list[bytes] = []
+        self._counts: dict[int, int] = {}
+        self._times: list[int] = []
+        self._put(MAGIC + _record(HEADER, _text("ros2"), _text("rsea_ros")))
+
+    def add(self, topic: str, msgtype: str) -> int:
+        """Declare a topic; return its key."""
+        if msgtype not in self._types:
+            schema = self._types[msgtype] = len(self._types) + 1
+            text = definition(msgtype).text
+            parts = (struct.pack("<H", schema), _text(msgtype), _text("ros2msg" if text else ""), _text(text))
+            self._schemas += (record := _record(SCHEMA, *parts))
+            self._chunk += record
+        key = len(self._counts) + 1
+        self._counts[key] = 0
+        qos = _text("offered_qos_profiles") + _text("[]")
+        head = struct.pack("<HH", key, self._types[msgtype])
+        record = _record(CHANNEL, head, _text(topic), _text("cdr"), _sized(qos))
+        self._channels += record
+        self._chunk += record
+        return key
+
+    def write(self, key: int, log_time: int, raw: bytes) -> None:
+        """Append a serialised message."""
+        self._index.setdefault(key, []).append((log_time, len(self._chunk)))
+        self._chunk += MESSAGE_RECORD.pack(MESSAGE, 22 + len(raw), key, 0, log_time, log_time) + raw
+        if len(self._chunk) >= CHUNK_SIZE:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the chunk. Interrupted before its end, it is written again at the same place."""
+        if not self._chunk:
+            return
+        times = [time for entries in self._index.values() for time, _ in entries] or [0]
+        head = CHUNK_HEAD.pack(min(times), max(times), len(self._chunk), zlib.crc32(self._chunk))
+        length = struct.pack("<Q", len(self._chunk))
+        chunk = _record(CHUNK, head, _text(""), length, self._chunk)
+        indices, offsets = b"", b""
+        for key, entries in self._index.items():
+            offsets += struct.pack("<HQ", key, self._end + len(chunk) + len(indices))
+            packed = b"".join(struct.pack("<QQ", *entry) for entry in entries)
+            indices += _record(MESSAGE_INDEX, struct.pack("<H", key), _sized(packed))
+        place = struct.pack("<QQQQ", min(times), max(times), self._end, len(chunk))
+        sizes = (struct.pack("<Q", len(indices)), _text(""), length, length)
+        self._put(chunk + indices)
+        self._chunks.append(_record(CHUNK_INDEX, place, _sized(offsets), *sizes))
+        for key, entries in self._index.items():
+            self._counts[key] += len(entries)
+        self._times += [min(times), max(times)] if self._index else []
+        self._chunk, self._index = bytearray(), {}
+
+    def close(self) -> None:
+        """Write the rest and the summary."""
+        self.flush()
+        data_end = _record(DATA_END, bytes(4))
+        summary = self._schemas + self._channels + b"".join(self._chunks) + self._statistics()
+        footer = _record(FOOTER, struct.pack("<QQI", self._end + len(data_end), 0, 0))
+        self._put(data_end + summary + footer + MAGIC)
+        self._file.close()
+
+    def abort(self) -> None:
+        """Let go of the file; what was flushed stays."""
+        self._file.close()
+
+    def _statistics(self) -> bytes:
+        times = self._times or [0]
+        numbers = (sum(self._counts.values()), len(self._types), len(self._counts), 0, 0, len(self._chunks))
+        counts = b"".join(struct.pack("<HQ", key, count) for key, count in self._counts.items())
+        return _record(STATISTICS, struct.pack("<QHIIIIQQ", *numbers, min(times), max(times)), _sized(counts))
+
+    def _put(self, data: bytes) -> None:
+        """Write at the end. The end moves only when all is written, so that a second try mends the first."""
+        self._file.seek(self._end)
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._file.write(rest) :]
+        self._end += len(data)
+
+
+def _record(opcode: int, *parts: bytes | bytearray) -> bytes:
+    content = b"".join(parts)
+    return RECORD.pack(opcode, len(content)) + content
+
+
+def _sized(data: bytes) -> bytes:
+    return struct.pack("<I", len(data)) + data
+
+
+def _text(text: str) -> bytes:
+    return _sized(text.encode())

@@ -1,0 +1,67 @@
+"""rosbag2 sqlite3 files (schema version 4), committed at each flush."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+from msg_adapters.definitions import definition
+
+TABLES = """
+CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
+CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);
+CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+    serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL,
+    type_description_hash TEXT NOT NULL);
+CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT NOT NULL, encoding TEXT NOT NULL,
+    encoded_message_definition TEXT NOT NULL, type_description_hash TEXT NOT NULL);
+CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+    data BLOB NOT NULL);
+CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+INSERT INTO schema VALUES (4, 'rsea_ros');
+"""
+TOPIC = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
+DEFINITION = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
+MESSAGE = "INSERT INTO messages VALUES (NULL, ?, ?, ?)"
+
+
+class SqliteStorage:
+    """One sqlite3 file being written (see Storage)."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._types: set[str] = set()
+        self._rows: list[tuple[int, int, bytes]] = []
+        path.touch(exist_ok=False)
+        self._database = sqlite3.connect(path, check_same_thread=False)
+        self._database.executescript(TABLES)
+
+    def add(self, topic: str, msgtype: str) -> int:
+        """Declare a topic; return its key."""
+        text, digest = definition(msgtype)
+        if msgtype not in self._types:
+            self._types.add(msgtype)
+            self._database.execute(DEFINITION, (msgtype, text, digest))
+        return int(self._database.execute(TOPIC, (topic, msgtype, digest)).lastrowid or 0)
+
+    def write(self, key: int, log_time: int, raw: bytes) -> None:
+        """Append a serialised message."""
+        self._rows.append((key, log_time, raw))
+
+    def flush(self) -> None:
+        """Commit the messages. Raises OSError when the disk is full."""
+        try:
+            self._database.executemany(MESSAGE, self._rows)
+            self._database.commit()
+        except sqlite3.OperationalError as error:
+            raise OSError(f"{error}") from error
+        self._rows.clear()
+
+    def close(self) -> None:
+        """Commit the rest."""
+        self.flush()
+        self._database.close()
+
+    def abort(self) -> None:
+        """Let go of the file; what was flushed stays."""
+        self._database.close()

@@ -1,0 +1,27 @@
+"""What the two file formats have in common for a writer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+
+class Storage(Protocol):
+    """One file of a bag being written; times are log times in ns. Raises OSError when the disk is full."""
+
+    path: Path
+
+    def add(self, topic: str, msgtype: str) -> int:
+        """Declare a topic; return its key."""
+
+    def write(self, key: int, log_time: int, raw: bytes) -> None:
+        """Append a serialised message."""
+
+    def flush(self) -> None:
+        """Hand what was written to the system: from here on it survives the end of this process."""
+
+    def close(self) -> None:
+        """Write the rest and the index."""
+
+    def abort(self) -> None:
+        """Let go of the file; what was flushed stays."""
