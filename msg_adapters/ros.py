@@ -1,0 +1,154 @@
+"""Message types of ROS for the nodes, made from plain numbers and taken apart again. Needs ROS.
+
+Stamps are integers, ns since the epoch; values are SI. A field that a message does not hold is NaN.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import WrenchStamped
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from msg_adapters.topics import AXES
+from rsea_ros.errors import ParameterError
+
+__all__ = ["Bool", "Clock", "DiagnosticArray", "JointState", "Time", "Trigger", "WrenchStamped"]
+
+OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
+SECOND = 1_000_000_000
+
+
+def time_of(stamp_ns: int) -> Time:
+    """Return a stamp as a message."""
+    return Time(sec=stamp_ns // SECOND, nanosec=stamp_ns % SECOND)
+
+
+def stamp_of(time: Time) -> int:
+    """Return a stamp message in ns."""
+    return int(time.sec) * SECOND + int(time.nanosec)
+
+
+def torque_command_message(stamp_ns: int, effort: float, joint: str = "joint") -> JointState:
+    """Return a torque (N m) that takes effect at the stamp."""
+    return efforts_message(stamp_ns, {joint: effort})
+
+
+def efforts_message(stamp_ns: int, efforts: Mapping[str, float]) -> JointState:
+    """Return torques (N m) by name, as `torque_estimate` carries them."""
+    message = JointState(name=list(efforts), effort=[float(effort) for effort in efforts.values()])
+    message.header.stamp = time_of(stamp_ns)
+    return message
+
+
+def joint_state_message(
+    stamp_ns: int, position: float, velocity: float, effort: float, joint: str = "joint"
+) -> JointState:
+    """Return a state: rad, rad/s, N m."""
+    message = JointState(name=[joint], position=[float(position)])
+    message.velocity = [float(velocity)]
+    message.effort = [float(effort)]
+    message.header.stamp = time_of(stamp_ns)
+    return message
+
+
+def wrench_message(
+    stamp_ns: int, values: float | Sequence[float], axis: str = "torque.z", frame: str = "ft_sensor"
+) -> WrenchStamped:
+    """Return a wrench of force N and torque N m: all six values in the order of AXES, or that of one axis."""
+    if isinstance(values, Sequence):
+        wrench = [float(value) for value in values]
+    else:
+        sign, index = _axis(axis)
+        wrench = [0.0] * len(AXES)
+        wrench[index] = sign * float(values)
+    message = WrenchStamped()
+    message.header.stamp = time_of(stamp_ns)
+    message.header.frame_id = frame
+    force, torque = message.wrench.force, message.wrench.torque
+    force.x, force.y, force.z, torque.x, torque.y, torque.z = wrench
+    return message
+
+
+def bool_message(value: bool) -> Bool:
+    """Return a flag."""
+    return Bool(data=value)
+
+
+def clock_message(stamp_ns: int) -> Clock:
+    """Return the time of a replay."""
+    return Clock(clock=time_of(stamp_ns))
+
+
+def diagnostics_message(
+    stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object]
+) -> DiagnosticArray:
+    """Return the health of one node; level is OK, WARN, ERROR or STALE."""
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    message = DiagnosticArray(
+        status=[DiagnosticStatus(level=level, name=name, message=summary, values=pairs)]
+    )
+    message.header.stamp = time_of(stamp_ns)
+    return message
+
+
+def effort_of(message: JointState, joint: str | None = None) -> tuple[int, float]:
+    """Return the stamp (ns) and the torque (N m) of a command or a desired torque."""
+    return stamp_of(message.header.stamp), _value(message.effort, _index(message, joint))
+
+
+def joint_state_of(message: JointState, joint: str | None = None) -> tuple[int, float, float, float]:
+    """Return the stamp (ns), position (rad), velocity (rad/s) and torque (N m) of one joint."""
+    index = _index(message, joint)
+    values = (_value(field, index) for field in (message.position, message.velocity, message.effort))
+    return stamp_of(message.header.stamp), *values
+
+
+def wrench_of(message: WrenchStamped, axis: str = "torque.z") -> tuple[int, float]:
+    """Return the stamp (ns) and the component of the wrench about the actuator axis (N m)."""
+    sign, index = _axis(axis)
+    force, torque = message.wrench.force, message.wrench.torque
+    values = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
+    return stamp_of(message.header.stamp), sign * float(values[index])
+
+
+def message_type(name: str) -> Any:
+    """Return the class of a type such as 'sensor_msgs/msg/JointState'.
+
+    Raises ParameterError for one that is not installed.
+    """
+    package, _, kind = name.partition("/msg/")
+    try:
+        return getattr(importlib.import_module(f"{package}.msg"), kind)
+    except (ImportError, AttributeError):
+        raise ParameterError(
+            f"message type {name!r} is not installed, expected a package {package!r}"
+        ) from None
+
+
+def _axis(axis: str) -> tuple[float, int]:
+    return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
+
+
+def _index(message: JointState, joint: str | None) -> int:
+    """Return where a joint stands. Raises ParameterError for one that is not there, or not the only one."""
+    names = list(message.name)
+    if joint is not None and names:
+        if joint not in names:
+            raise ParameterError(f"no joint {joint!r} in the message, which holds {', '.join(names)}")
+        return names.index(joint)
+    if joint is None and len(names) > 1:
+        raise ParameterError(f"{len(names)} joints ({', '.join(names)}), expected one; name it with `joint`")
+    return 0
+
+
+def _value(field: Sequence[float], index: int) -> float:
+    return float(field[index]) if index < len(field) else math.nan
