@@ -1,0 +1,1 @@
+"""The catalogue of physical effects: one file each, see effect.py."""

@@ -1,0 +1,32 @@
+"""Friction that differs between the two directions of motion.
+
+    T = -offset - 1/2 viscous_difference * |w|,   w the speed of the gear output against the housing
+
+offset (N m) is the one-sided part: what the drive takes more forward than backward. viscous_difference
+(N m s/rad) is how much the viscous coefficient forward exceeds the one backward. Source: Janot, Gautier,
+Brunot, Data set and reference models of EMPS, 2019 (offset); realdata README (two viscous coefficients).
+"""
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Subtract the one-sided torque from the torque on the gear output."""
+    s[GEAR_TORQUE] -= p[0] + 0.5 * p[1] * abs(s[GEAR_VELOCITY])
+
+
+EFFECT = Effect(
+    name="asymmetric_friction",
+    port=Port.GEAR,
+    parameters=(
+        Parameter("offset", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),
+        Parameter("viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0),
+    ),
+    claims=Claims("ft", "even", amplitude_exponent=None, confusable_with=("ft_bias",)),
+    function=apply,
+    reads=(GEAR_VELOCITY,),
+    about="friction that differs between forward and backward",
+    equation="T = -offset - ½ viscous_difference · |ω|",
+)

@@ -1,0 +1,59 @@
+"""The catalogue: every file of this folder that has an `EFFECT`, and files that a user adds."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import pkgutil
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+
+import rsea_ros.effects as package
+from rsea_ros.effects.effect import Effect
+from rsea_ros.errors import ParameterError
+
+_NOT_EFFECTS = {"effect", "catalogue", "signal_table"}
+EXTRA_PATH = "RSEA_EFFECTS"
+"""Environment variable: effect files or folders of them beside the package's own, separated like PATH."""
+
+
+@lru_cache(maxsize=8)
+def _catalogue(extra: tuple[str, ...]) -> Mapping[str, Effect]:
+    names = [m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in _NOT_EFFECTS and not m.name.startswith("_")]
+    modules = [importlib.import_module(f"rsea_ros.effects.{name}") for name in sorted(names)]
+    modules += [_load(path) for path in extra]
+    effects = [m.EFFECT for m in modules]
+    return MappingProxyType({e.name: e for e in effects})
+
+
+def catalogue() -> Mapping[str, Effect]:
+    """Return every effect by name, those of RSEA_EFFECTS included."""
+    return _catalogue(tuple(str(p) for p in _extra_files(os.environ.get(EXTRA_PATH, ""))))
+
+
+def effect_named(name: str) -> Effect:
+    """Return one effect. Raises ParameterError when the catalogue has none of that name."""
+    effects = catalogue()
+    if name not in effects:
+        raise ParameterError(f"effect {name!r}: not in the catalogue, expected one of {', '.join(effects)}")
+    return effects[name]
+
+
+def _extra_files(paths: str) -> Iterable[Path]:
+    for item in filter(None, paths.split(os.pathsep)):
+        path = Path(item)
+        yield from sorted(path.glob("[!_]*.py")) if path.is_dir() else [path]
+
+
+def _load(path: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    if spec is None or spec.loader is None or not Path(path).exists():
+        raise ParameterError(f"{EXTRA_PATH}: {path}: no such effect file, expected a Python file with an EFFECT")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not isinstance(getattr(module, "EFFECT", None), Effect):
+        raise ParameterError(f"{EXTRA_PATH}: {path}: no EFFECT in it, expected a constant of type Effect")
+    return module

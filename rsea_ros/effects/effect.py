@@ -1,0 +1,119 @@
+"""The effect: a small change to one named signal of the nominal actuator.
+
+An effect is one file of this folder with one constant `EFFECT`. Its function is compiled on its own and
+called through its address, so the step is compiled once for all and a run pays only for what is on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from numba import cfunc, types
+
+from rsea_ros.effects.signal_table import Port
+from rsea_ros.errors import ParameterError
+
+_POINTER = types.CPointer(types.float64)
+_SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
+
+Parity = Literal["odd", "even", "neither"]
+
+
+class RigLike(Protocol):
+    """What a structural effect needs of a rig (the model's Rig has it; effects do not import the model)."""
+
+    def __getitem__(self, name: str) -> float: ...
+    def with_values(self, values: Mapping[str, float]) -> Any: ...
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect, SI.
+
+    null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
+    may well have. starts: where fits begin besides `typical`, for problems with several minima.
+    """
+
+    name: str
+    unit: str
+    null: float
+    low: float
+    high: float
+    typical: float
+    starts: tuple[float, ...] = ()
+    logarithmic: bool = False
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What the effect does, told so that a test can check it in simulation.
+
+    channel: where it shows most. parity: odd when turning the command's sign turns the sign of the
+    change, even when it keeps it. amplitude_exponent: the change grows with the command's amplitude to
+    this power (None: no power law). passive: it can only take energy from the mechanics.
+    """
+
+    channel: str
+    parity: Parity
+    amplitude_exponent: float | None
+    passive: bool = False
+    confusable_with: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of the catalogue. The docstring of its file is its description.
+
+    function: compiled `f(s, p, x)` with the signal table s, the parameters p in order, its own states x.
+    structure: instead of a function, a change to the rig: `f(rig, parameters) -> rig`.
+    main: the parameter that says how large the effect is.
+    reads: the signals among FIRST_READ … LAST_READ that the function looks at.
+    """
+
+    name: str
+    port: Port
+    parameters: tuple[Parameter, ...]
+    claims: Claims
+    function: Any = None
+    structure: Callable[[Any, Mapping[str, float]], Any] | None = None
+    states: int = 0
+    reads: tuple[int, ...] = ()
+    order: int = 0
+    about: str = ""
+    equation: str = ""
+
+    @property
+    def main(self) -> Parameter:
+        """Return the first parameter, the one that says how large the effect is."""
+        return self.parameters[0]
+
+    @property
+    def null(self) -> dict[str, float]:
+        """Return the parameters at which the effect vanishes."""
+        return {p.name: p.null for p in self.parameters}
+
+    @property
+    def typical(self) -> dict[str, float]:
+        """Return parameters of a size that a bench may well have."""
+        return {p.name: p.typical for p in self.parameters}
+
+    def vector(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
+        """Return parameters in order. Raises ParameterError for a missing, unknown or non-finite one."""
+        names = [p.name for p in self.parameters]
+        for name in parameters:
+            if name not in names:
+                raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, expected {', '.join(names)}")
+        for name in names:
+            if name not in parameters:
+                raise ParameterError(f"effect {self.name}: parameter {name!r} is missing, expected {', '.join(names)}")
+            if math.isnan(parameters[name]):
+                raise ParameterError(f"effect {self.name}: {name} = nan, expected a number")
+        return tuple(float(parameters[name]) for name in names)
+
+
+def compiled(function: Callable[[Any, Any, Any], None]) -> Any:
+    """Compile an effect's function to an address that the step can call; cached on disk."""
+    return cfunc(_SIGNATURE, cache=True, error_model="numpy")(function)

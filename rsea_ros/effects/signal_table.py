@@ -1,0 +1,76 @@
+"""The named signals that an effect may read and change inside the compiled step.
+
+An effect's function gets the table as `s` and indexes it by these constants: `s[GEAR_TORQUE] -= …`.
+The step fills what can be read, calls the effects that are on, and uses what they changed.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Port(IntEnum):
+    """Where in the chain an effect acts; the step calls the ports in this order.
+
+    COMMAND: once a step, changes s[COMMAND] before the motor's current is measured.
+    MOTOR: once a step, changes s[COMMAND] after that: what the measured current does not show.
+    GEAR: at every evaluation of the torques, with the signals at the middle of the step; adds to
+        s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
+    SPRING: likewise, adds to s[SPRING_TORQUE]; and once more at the end of the step with s[COMMIT] = 1:
+        then it may change its own states x, and what it adds is what the F/T sensor sees.
+    SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY] or s[CURRENT].
+    STRUCTURE: not called; the effect changes the rig itself.
+    """
+
+    COMMAND = 0
+    MOTOR = 1
+    GEAR = 2
+    SPRING = 3
+    SENSOR = 4
+    STRUCTURE = 5
+
+
+TIME = 0  # s, since the first command
+STEP = 1  # s, length of the step
+DURATION = 2  # s, length of the record; a plant that runs on takes its `duration`
+COMMIT = 3  # 1 when the step is done: only then may a SPRING effect change its own states x
+COMMAND = 4  # N m, held over the step
+CURRENT = 5  # N m, motor torque that the measured current shows
+REFERENCE = 6  # rad, of a controller in the loop
+K_S = 7  # N m/rad
+B_S = 8  # N m s/rad
+B_M = 9  # N m s/rad
+
+ROTOR_ANGLE = 10  # rad, rotor relative to the housing
+GEAR_ANGLE = 11  # rad, gear output before its own compliance, relative to the housing
+GEAR_VELOCITY = 12  # rad/s
+OUTPUT_ANGLE = 13  # rad, gear output relative to the housing: what the encoder sees
+OUTPUT_VELOCITY = 14  # rad/s
+DEFLECTION = 15  # rad, chassis against distal side
+DEFLECTION_RATE = 16  # rad/s
+JOINT_ANGLE = 17  # rad, gear output before against after its own compliance
+JOINT_RATE = 18  # rad/s
+HOUSING_ANGLE = 19  # rad, absolute
+HOUSING_VELOCITY = 20  # rad/s
+DISTAL_ANGLE = 21  # rad, absolute
+DISTAL_VELOCITY = 22  # rad/s
+FIRST_READ, LAST_READ = ROTOR_ANGLE, DISTAL_VELOCITY
+
+LOAD = 23  # N m, torque in the spring, effects included
+
+GEAR_TORQUE = 24  # N m, on the gear output, against the housing
+SPRING_TORQUE = 25  # N m, in the spring beside K_s d + b_s d'
+JOINT_TORQUE = 26  # N m, on the chassis, against the gear output
+HOUSING_TORQUE = 27  # N m, on the housing, from outside
+DISTAL_TORQUE = 28  # N m, on the distal side, from outside
+FIRST_FORCE = GEAR_TORQUE
+
+FT = 29  # N m
+POSITION = 30  # rad
+VELOCITY = 31  # rad/s
+
+GEAR_VELOCITY_SPAN = 32  # rad/s, change of GEAR_VELOCITY over the step: it goes from -span/2 to +span/2
+DEFLECTION_SPAN = 33  # rad, change of DEFLECTION over the step; 0 when COMMIT is 1
+MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to GEAR_VELOCITY at its end
+
+SIZE = 35

@@ -1,0 +1,1 @@
+"""The nominal physics: rig, equations of motion, transfer functions, simulation."""

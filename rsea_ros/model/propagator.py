@@ -1,0 +1,96 @@
+"""From the equations of motion to the propagators of one step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.model.equations import Mechanics, mechanics, train_ratio
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.step import Linear
+from rsea_ros.signals import FloatArray
+
+_DIFFERENCES = {
+    st.GEAR_ANGLE: (-1.0, 1.0, 0.0, 0.0),
+    st.OUTPUT_ANGLE: (-1.0, 0.0, 1.0, 0.0),
+    st.DEFLECTION: (0.0, 0.0, 1.0, -1.0),
+    st.JOINT_ANGLE: (0.0, 1.0, -1.0, 0.0),
+    st.HOUSING_ANGLE: (1.0, 0.0, 0.0, 0.0),
+    st.DISTAL_ANGLE: (0.0, 0.0, 0.0, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """x' = A x + B tau with x = (q, q') and tau the torques at equations.PORTS."""
+
+    a: FloatArray
+    b: FloatArray
+    mechanics: Mechanics
+
+
+def state_space(rig: Rig, *, linear_gravity: bool = True) -> StateSpace:
+    """Return A, shape (2n, 2n), and B, shape (2n, 5), of a rig."""
+    m = mechanics(rig, linear_gravity=linear_gravity)
+    n = m.order
+    a = np.zeros((2 * n, 2 * n))
+    a[:n, n:] = np.eye(n)
+    a[n:, :n] = -np.linalg.solve(m.mass, m.stiffness)
+    a[n:, n:] = -np.linalg.solve(m.mass, m.damping)
+    b = np.zeros((2 * n, m.ports.shape[0]))
+    b[n:] = np.linalg.solve(m.mass, m.ports.T)
+    return StateSpace(a, b, m)
+
+
+def read_row(rig: Rig, m: Mechanics, signal: int) -> FloatArray:
+    """Return the row that reads a signal of the table (ROTOR_ANGLE … DISTAL_VELOCITY) from x."""
+    n = m.order
+    if signal == st.ROTOR_ANGLE:
+        return train_ratio(rig) * read_row(rig, m, st.GEAR_ANGLE)
+    is_rate = signal not in _DIFFERENCES
+    difference = np.array(_DIFFERENCES[signal - 1 if is_rate else signal])
+    row = np.zeros(2 * n)
+    row[n * is_rate : n * is_rate + n] = difference @ m.placement
+    return row
+
+
+def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
+    """Return the propagators of a step of h seconds, by one matrix exponential.
+
+    expm of [[A h, B h], [0, 0]] holds e^{Ah} and G (Van Loan, IEEE TAC 23, 1978).
+    """
+    system = state_space(rig, linear_gravity=False)
+    n, m = system.b.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = system.a * h, system.b * h
+    exponential = expm(block)
+    reads = set(reads)
+    reads_load = st.LOAD in reads
+    angles = {st.HOUSING_ANGLE: "housing_end.gravity", st.DISTAL_ANGLE: "spring_end.gravity"}
+    reads |= {signal for signal, name in angles.items() if rig[name] != 0.0}
+    reads |= {st.DEFLECTION, st.DEFLECTION_RATE} if reads_load else set()
+    rows = np.array(sorted(reads - {st.LOAD}), dtype=np.int64)
+    matrix = np.array([read_row(rig, system.mechanics, int(r)) for r in rows]).reshape(len(rows), n)
+    return Linear(
+        phi=np.ascontiguousarray(exponential[:n, :n]),
+        g=np.ascontiguousarray(exponential[:n, n:]),
+        rows=rows,
+        matrix=np.ascontiguousarray(matrix),
+        spans=np.array([read_row(rig, system.mechanics, s) for s in (st.GEAR_VELOCITY, st.DEFLECTION)]),
+        outputs=_outputs(rig, system.mechanics),
+        gravity=np.array([rig["housing_end.gravity"], rig["spring_end.gravity"]]),
+        reads_load=reads_load,
+    )
+
+
+def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
+    """Return the rows of position, velocity and linear spring torque."""
+    position, velocity = (read_row(rig, m, s) for s in (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY))
+    if rig.rigid_spring:
+        return np.array([position, velocity, np.zeros(2 * m.order)])
+    deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
+    return np.array([position, velocity, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate])

@@ -1,0 +1,188 @@
+"""Rig: what the bench is. Values in SI with their prior spread, which ends are clamped, which effects act.
+
+The model calls everything by the dotted name of the YAML file (`rotor.reflected_inertia`); FIELDS is the
+only list of them. Reading and writing of files is in `rig_file.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Literal
+
+from rsea_ros.errors import RigError
+
+Train = Literal["planetary", "star"]
+END_NAMES = ("housing_end", "spring_end")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A value that a rig may have: unit, smallest value, whether that is allowed itself, default."""
+
+    unit: str
+    low: float = 0.0
+    low_allowed: bool = True
+    default: float | None = None
+
+
+_END_FIELDS = {
+    "inertia": Field("kg m^2", low_allowed=False),
+    "damping": Field("N m s/rad", default=0.0),
+    "stiffness": Field("N m/rad", default=0.0),
+    "gravity": Field("N m", default=0.0),
+}
+
+FIELDS: Mapping[str, Field] = MappingProxyType(
+    {
+        "rotor.reflected_inertia": Field("kg m^2", low_allowed=False),
+        "rotor.reflected_damping": Field("N m s/rad"),
+        "gear.ratio": Field("1", low=1.0, default=1.0),
+        "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+        "chassis.inertia": Field("kg m^2", default=0.0),
+        "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+        "spring.damping": Field("N m s/rad", default=0.0),
+        **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+    }
+)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A value in SI, the relative one-sigma spread of what is known of it, and where it comes from."""
+
+    value: float
+    spread: float = 0.0
+    source: str = ""
+    ci95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS)."""
+
+    noise: float = 0.0
+    quantum: float = 0.0
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """An effect of the catalogue that acts on this rig, with its parameters in SI."""
+
+    name: str
+    parameters: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Position loop that ran while the record was made: command = k_v (k_p (reference - q) - dq/dt).
+
+    k_p: 1/s; k_v: N m s/rad; limit: N m on the command.
+    """
+
+    k_p: float
+    k_v: float
+    limit: float = math.inf
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A bench. See the module docstring.
+
+    known: names that no fit may move. proximal: which end the paper's *proximal* is.
+    """
+
+    name: str
+    quantities: Mapping[str, Quantity]
+    clamped: frozenset[str] = frozenset()
+    rigid_spring: bool = False
+    train: Train = "planetary"
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    known: frozenset[str] = frozenset()
+    proximal: str = "housing_end"
+    controller: Controller | None = None
+    effects: tuple[EffectSetting, ...] = ()
+    about: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("quantities", "sensors"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        for name, quantity in self.quantities.items():
+            check_value(name, quantity.value, where=self.name)
+        _check_structure(self)
+
+    def __getitem__(self, name: str) -> float:
+        """Return a value in SI, or the default of a field that the rig leaves out."""
+        if name in self.quantities:
+            return self.quantities[name].value
+        default = FIELDS[name].default if name in FIELDS else None
+        if default is None:
+            raise RigError(f"rig {self.name}: {name} is missing, expected a value in {unit_of(name)}")
+        return default
+
+    def values(self) -> dict[str, float]:
+        """Return every stated value by name, SI."""
+        return {name: q.value for name, q in self.quantities.items()}
+
+    def with_values(self, values: Mapping[str, float]) -> Rig:
+        """Return the rig with some values replaced; their spread and source stay."""
+        changed = {n: replace(self.quantities.get(n, Quantity(v)), value=float(v)) for n, v in values.items()}
+        return replace(self, quantities={**self.quantities, **changed})
+
+    def with_effects(self, *effects: EffectSetting) -> Rig:
+        """Return the rig with exactly these effects acting."""
+        return replace(self, effects=effects)
+
+    def free(self) -> tuple[str, ...]:
+        """Return the names that a fit may move: stated with a spread, and not listed as known."""
+        return tuple(n for n, q in self.quantities.items() if q.spread > 0.0 and n not in self.known)
+
+    def spread(self, name: str) -> float:
+        """Return the relative one-sigma prior spread of a value."""
+        return self.quantities[name].spread
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a value."""
+        return unit_of(name)
+
+    def end_is_free(self, end: str) -> bool:
+        """Tell whether an end can move (it has an inertia of its own)."""
+        return end not in self.clamped
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a rig field. Raises RigError for a name that is none."""
+    if name not in FIELDS:
+        raise RigError(f"{name}: no such rig field, expected one of {', '.join(FIELDS)}")
+    return FIELDS[name].unit
+
+
+def check_value(name: str, value: float, where: str = "rig") -> None:
+    """Raise RigError when a value is not a possible one for its field."""
+    unit = unit_of(name)
+    low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
+    infinite_ok = FIELDS[name].default == math.inf
+    possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
+    if not possible:
+        bound = f">= {low:g}" if allowed else f"> {low:g}"
+        raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}")
+
+
+def _check_structure(rig: Rig) -> None:
+    for end in set(rig.clamped) - set(END_NAMES):
+        raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
+    if rig.train not in ("planetary", "star"):
+        raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, expected planetary or star")
+    if rig.proximal not in END_NAMES:
+        raise RigError(f"rig {rig.name}: proximal = {rig.proximal!r}, expected one of {', '.join(END_NAMES)}")
+    if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
+        raise RigError(f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move")
+    if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        raise RigError(f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`")
+    rig["rotor.reflected_inertia"], rig["rotor.reflected_damping"]

@@ -1,0 +1,176 @@
+"""Simulation of a rig with its effects: whole records, or one sample at a time for the plant.
+
+Fixed step, deterministic; the same compiled step (step.py) serves both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
+from rsea_ros.model.drive import Drive, drive_from, sample, steps_per_sample
+from rsea_ros.model.loop import control
+from rsea_ros.model.propagator import propagator
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.signals import Channel, FloatArray, Record
+
+@dataclass(frozen=True)
+class Machine:
+    """A rig made ready for the step: propagators, calls of its effects, and its state, which the step changes."""
+
+    linear: Linear
+    calls: Calls
+    x: FloatArray
+    table: FloatArray
+    own: FloatArray
+
+
+def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
+    """Return what a noise-free bench would have measured: each channel of the record at its own stamps.
+
+    The record's `command` drives it, held at its stamps; with `rig.controller` and a `reference` channel
+    the loop is closed in the simulation. refine divides the fixed step.
+    """
+    in_loop = rig.controller is not None and "reference" in record
+    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop))
+
+
+def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
+    """Return each channel of a drive at its sampling instants. ride: use the measured rotor angle."""
+    machine = build(rig, drive.step, drive.duration, drive.initial, in_loop=len(drive.reference) > 0)
+    ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
+    out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
+    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT]]
+    run(machine, drive.command, out[1:], reference=drive.reference, ridden=ridden)
+    out[0, 2] = out[1, 2]
+    channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
+    return {n: sample(n, out[:, OUTPUTS.index(n)], drive.at[n]) for n in channels}
+
+
+def _middles(ends: FloatArray) -> FloatArray:
+    """Return the values at the middle of each step from those at their ends."""
+    return 0.5 * (ends + np.concatenate([ends[:1], ends[:-1]]))
+
+
+def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float = 0.0,
+        reference: FloatArray | None = None, ridden: FloatArray | None = None) -> None:  # fmt: skip
+    """Advance a machine over the steps of `command`, in place; `out` gets OUTPUTS of every step."""
+    empty = np.empty(0)
+    reference, ridden = (empty if v is None else v for v in (reference, ridden))
+    advance(machine.linear, machine.calls, command, reference, ridden, start,
+            machine.x, machine.table, machine.own, out)  # fmt: skip
+
+
+def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] = (0.0, 0.0), *,
+          in_loop: bool = False) -> Machine:  # fmt: skip
+    """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
+    settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
+    for effect, parameters in settings:
+        effect.vector(parameters)
+        if effect.structure is not None:
+            rig = effect.structure(rig, parameters)
+    active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
+    linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
+    calls, states = _calls(rig, active, in_loop)
+    table = np.zeros(st.SIZE)
+    table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
+    table[[st.K_S, st.B_S, st.B_M]] = _constants(rig)
+    table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
+    x = np.linalg.pinv(linear.outputs[:2]) @ np.array(initial) if any(initial) else np.zeros(len(linear.phi))
+    table[[st.POSITION, st.OUTPUT_ANGLE]], table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
+    table[st.FT] = linear.outputs[2] @ x
+    return Machine(linear, calls, x, table, np.zeros(states))
+
+
+def _constants(rig: Rig) -> tuple[float, float, float]:
+    k_s = 0.0 if rig.rigid_spring else rig["spring.stiffness"]
+    return k_s, rig["spring.damping"], rig["rotor.reflected_damping"]
+
+
+def _calls(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]], in_loop: bool) -> tuple[Calls, int]:
+    """Return the calls in the order of the ports, and how many states they own."""
+    items: list[tuple[st.Port, int, Any, tuple[float, ...], int]] = [
+        (e.port, e.order, e.function, e.vector(p), e.states) for e, p in active
+    ]
+    if in_loop and rig.controller:
+        c = rig.controller
+        items.append((st.Port.COMMAND, -1, control, (c.k_p, c.k_v, c.limit), 0))
+    items.sort(key=lambda item: (item[0], item[1]))
+    ports = [item[0] for item in items]
+    p_sizes, x_sizes = [len(i[3]) for i in items], [i[4] for i in items]
+    calls = Calls(
+        first=np.array([sum(p < port for p in ports) for port in range(len(st.Port) + 1)], dtype=np.int64),
+        address=np.array([i[2].address for i in items], dtype=np.int64),
+        p_at=np.cumsum([0, *p_sizes], dtype=np.int64),
+        x_at=np.cumsum([0, *x_sizes], dtype=np.int64),
+        p=np.array([v for i in items for v in i[3]] or [0.0]),
+        nonlinear=st.Port.GEAR in ports or st.Port.SPRING in ports or rig["housing_end.gravity"] != 0.0 or rig["spring_end.gravity"] != 0.0,
+    )
+    return calls, max(1, sum(x_sizes))
+
+
+def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True) -> Record:
+    """Return the record that a bench would have logged: measurements stamped at the end of each hold."""
+    period = float(command.t[-1] - command.t[0]) / (len(command) - 1)
+    stamps, blank = command.t + period, np.zeros(len(command))
+    names = [n for n in OUTPUTS if not (n == "ft" and rig.rigid_spring)]
+    asked = Record({"command": command, **{n: Channel(stamps, blank) for n in names}}, source=rig.name)
+    rng = np.random.default_rng(seed)
+    true = simulate(rig, asked)
+    measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
+    return asked.with_channels(**measured)
+
+
+def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return what the rig's sensor makes of true values: noise added, rounded to its quantum."""
+    sensor = rig.sensors.get(channel)
+    if sensor is None:
+        return value
+    noisy = value + sensor.noise * rng.standard_normal(np.shape(value))
+    return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum else noisy
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure)."""
+
+    position: float
+    velocity: float
+    motor_torque: float
+    ft: float
+
+
+class Plant:
+    """A bench that is stepped one sample at a time, with the noise and the quantum of its sensors."""
+
+    def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0) -> None:
+        """rate: samples a second. duration: over which drifts come to their full size, s."""
+        self._rig, self._noise, self._duration = rig, noise, duration
+        self._count = steps_per_sample(1.0 / rate)
+        self._step = 1.0 / rate / self._count
+        self._out = np.empty((self._count, len(OUTPUTS)))
+        self._rng = np.random.default_rng(seed)
+        self.reset()
+
+    def reset(self) -> None:
+        """Go back to rest, at time zero."""
+        self._machine = build(self._rig, self._step, self._duration)
+        self._time = 0.0
+
+    def step(self, command: float) -> Sample:
+        """Hold a command (N m) for one sample period and return the measurement at its end."""
+        run(self._machine, np.full(self._count, command), self._out, start=self._time)
+        self._time += self._count * self._step
+        values = dict(zip(OUTPUTS, self._out[-1], strict=True))
+        if self._noise:
+            values = {n: float(measure(self._rig, n, v, self._rng)) for n, v in values.items()}
+        ft = math.nan if self._rig.rigid_spring else float(values["ft"])
+        return Sample(float(values["position"]), float(values["velocity"]), float(values["motor_torque"]), ft)

@@ -1,0 +1,155 @@
+"""The compiled step: exact for the linear rig, second order in the torques that effects add.
+
+The linear part x' = A x + B tau is integrated by its matrix exponential, with the torques of the step held
+(the exponential midpoint rule: Hochbruck and Ostermann, Acta Numerica 19, 2010, section 2):
+
+    x_next = e^{A h} x + G (u + f),   G = int_0^h e^{A s} ds B
+
+u is the motor torque held over the step, f the torques of the effects at the five ports, taken in the middle
+between x and an x_next predicted with the last step's f: one evaluation a step, and second order still.
+Friction takes its mean over the step instead (effects/_friction.py).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.model.call import call
+from rsea_ros.signals import FloatArray
+
+IntArray = npt.NDArray[np.int64]
+
+OUTPUTS = ("position", "velocity", "motor_torque", "ft")
+
+_COMMAND, _MOTOR, _GEAR, _SPRING, _SENSOR = (int(port) for port in st.Port if port != st.Port.STRUCTURE)
+_FORCES = 5
+
+
+class Linear(NamedTuple):
+    """Propagators of one step and what is read from the state x (order n).
+
+    phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
+    velocity and deflection; outputs (3, n): position, velocity and the linear spring torque; gravity: m g l
+    of the two ends, N m.
+    """
+
+    phi: FloatArray
+    g: FloatArray
+    rows: IntArray
+    matrix: FloatArray
+    spans: FloatArray
+    outputs: FloatArray
+    gravity: FloatArray
+    reads_load: bool
+
+
+class Calls(NamedTuple):
+    """The effects that are on, in the order of their ports.
+
+    first[port] … first[port + 1] are those of a port; p_at and x_at say where their parameters and states
+    begin. nonlinear: whether anything adds torques at all.
+    """
+
+    first: IntArray
+    address: IntArray
+    p_at: IntArray
+    x_at: IntArray
+    p: FloatArray
+    nonlinear: bool
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
+    for i in range(calls.first[port], calls.first[port + 1]):
+        call(calls.address[i], s_at, p_at + 8 * calls.p_at[i], own_at + 8 * calls.x_at[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _dot(row, x):  # type: ignore[no-untyped-def]
+    value = 0.0
+    for j in range(len(x)):
+        value += row[j] * x[j]
+    return value
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _read(linear, x, s):  # type: ignore[no-untyped-def]
+    """Put the signals that effects look at into the table, and clear the torques."""
+    for r in range(len(linear.rows)):
+        s[linear.rows[r]] = _dot(linear.matrix[r], x)
+    if linear.reads_load:
+        s[st.LOAD] = s[st.K_S] * s[st.DEFLECTION] + s[st.B_S] * s[st.DEFLECTION_RATE] + s[st.SPRING_TORQUE]
+    for i in range(_FORCES):
+        s[st.FIRST_FORCE + i] = 0.0
+    if linear.gravity[0] != 0.0:
+        s[st.HOUSING_TORQUE] = -linear.gravity[0] * np.sin(s[st.HOUSING_ANGLE])
+    if linear.gravity[1] != 0.0:
+        s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _add_torques(linear, s, a):  # type: ignore[no-untyped-def]
+    for i in range(len(a)):
+        a[i] += _dot(linear.g[i], s[st.FIRST_FORCE : st.FIRST_FORCE + _FORCES])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
+    """Put what the sensors of the nominal actuator see into the table."""
+    s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs[0], x)
+    s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs[1], x)
+    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SPRING_TORQUE]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  # type: ignore[no-untyped-def]
+    """Run the steps of `command` (N m, held over each), in place.
+
+    x, s, own: state of the mechanics, signal table, states of the effects; they go in and come out.
+    reference (rad) and ridden (rad, measured rotor angle at the middle of each step) may be empty.
+    out (steps, 4): OUTPUTS at the end of each step. start: s, of the first step.
+    """
+    n, h = len(x), s[st.STEP]
+    free, end, middle = np.empty(n), np.empty(n), np.empty(n)
+    s_at, p_at, own_at = s.ctypes.data, calls.p.ctypes.data, own.ctypes.data
+    for k in range(len(command)):
+        s[st.TIME], s[st.COMMAND] = start + k * h, command[k]
+        if len(reference) > 0:
+            s[st.REFERENCE] = reference[k]
+        _call_port(_COMMAND, calls, s_at, p_at, own_at)
+        s[st.CURRENT] = s[st.COMMAND]
+        _call_port(_MOTOR, calls, s_at, p_at, own_at)
+        for i in range(n):
+            free[i] = end[i] = linear.g[i, 0] * s[st.COMMAND] + _dot(linear.phi[i], x)
+        if calls.nonlinear:
+            s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
+            _add_torques(linear, s, end)
+            for i in range(n):
+                middle[i] = 0.5 * (x[i] + end[i])
+            s[st.GEAR_VELOCITY_SPAN] = _dot(linear.spans[0], end) - _dot(linear.spans[0], x)
+            s[st.DEFLECTION_SPAN] = _dot(linear.spans[1], end) - _dot(linear.spans[1], x)
+            _read(linear, middle, s)
+            if len(ridden) > 0:
+                s[st.ROTOR_ANGLE] = ridden[k]
+            _call_port(_GEAR, calls, s_at, p_at, own_at)
+            _call_port(_SPRING, calls, s_at, p_at, own_at)
+            for i in range(n):
+                end[i] = free[i]
+            _add_torques(linear, s, end)
+        for i in range(n):
+            x[i] = end[i]
+        s[st.TIME] = start + (k + 1) * h
+        if calls.first[_SPRING] < calls.first[_SPRING + 1]:
+            held = s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE]
+            s[st.COMMIT], s[st.DEFLECTION_SPAN] = 1.0, 0.0
+            _read(linear, x, s)
+            _call_port(_SPRING, calls, s_at, p_at, own_at)
+            s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
+        _read_outputs(linear, x, s)
+        _call_port(_SENSOR, calls, s_at, p_at, own_at)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT], s[st.FT]
