@@ -6,7 +6,6 @@ import fcntl
 import os
 import tempfile
 from pathlib import Path
-from typing import IO
 
 import hypothesis
 
@@ -14,19 +13,18 @@ hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, da
 hypothesis.settings.load_profile("rsea")
 
 
-def _own_domain() -> IO[str]:
-    """Take a ROS domain that no other worker or test run on this machine has; held while the file is open."""
-    for domain in range(1, 102):  # above 101 DDS ports run into the ephemeral ones
-        lock = (Path(tempfile.gettempdir()) / f"rsea-test-domain-{os.getuid()}-{domain}").open("w")
+def _take_domain() -> int:
+    """Take a ROS domain that no other worker or test run on this machine has, until this process ends."""
+    for domain in range(1, 102):  # above 101 the ports of DDS run into the ephemeral ones
+        path = Path(tempfile.gettempdir()) / f"rsea-test-domain-{os.getuid()}-{domain}"
+        lock = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return domain
         except BlockingIOError:
-            lock.close()
-            continue
-        os.environ["ROS_DOMAIN_ID"] = str(domain)
-        return lock
+            os.close(lock)
     raise RuntimeError("no free ROS domain between 1 and 101: other test runs hold all of them")
 
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-DOMAIN_LOCK = _own_domain()
+os.environ["ROS_DOMAIN_ID"] = str(_take_domain())

@@ -1,0 +1,153 @@
+"""./rsea makes its environment once, never uses a half-made one, and says in one line why it cannot."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LOCKS = ("requirements.lock", "requirements-ros.lock")
+PACKAGE = 'import sys\nprint("ran", *sys.argv[1:])\n'
+DECOY = PACKAGE if sys.version_info < (3, 11) else 'print("from the working directory")\n'
+FOREIGN = ("ROS_", "AMENT_", "PYTHON", "_ROS")
+
+
+@pytest.fixture
+def clone(tmp_path: Path) -> Path:
+    """Return a repository with the real launcher, locks without packages, and a package that says it ran.
+
+    The directory from which it is called holds another package of that name, which must not run.
+    """
+    root = tmp_path / "a clone"
+    shutil.copytree(ROOT / "launcher", root / "launcher", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "rsea", root / "rsea")
+    for name in LOCKS:
+        (root / name).touch()
+    for place, code in ((root, PACKAGE), (tmp_path, DECOY)):
+        (place / "rsea_ros").mkdir()
+        (place / "rsea_ros" / "__main__.py").write_text(code)
+    return root
+
+
+@pytest.fixture
+def silent_server() -> Iterator[socket.socket]:
+    """Listen as a package server that takes requests and never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(60)
+        yield server
+
+
+def start(root: Path, *arguments: str, path: Path | None = None, **environment: str) -> subprocess.Popen[str]:
+    """Start the launcher in a process group of its own, with this Python's base (or `path`) first on PATH."""
+    search = os.pathsep.join([str(path or Path(sys.base_prefix) / "bin"), os.environ["PATH"]])
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
+    return subprocess.Popen(
+        [str(root / "rsea"), *arguments], cwd=root.parent, text=True, start_new_session=True,
+        env=inherited | {"PATH": search, "no_proxy": "127.0.0.1"} | environment,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+
+
+def run(root: Path, *arguments: str, path: Path | None = None, **environment: str) -> tuple[int, str, str]:
+    """Run the launcher to its end and return status, stdout, stderr."""
+    process = start(root, *arguments, path=path, **environment)
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def ask_for(root: Path, server: tuple[str, int]) -> None:
+    """Put a package of that server into the lock."""
+    (root / LOCKS[0]).write_text(f"slow @ http://{server[0]}:{server[1]}/slow-1.0.tar.gz\n")
+
+
+def fake_python(directory: Path, body: str) -> Path:
+    """Make every name under which the launcher looks for Python a shell script with that body."""
+    directory.mkdir()
+    for name in ("python3", *(f"python3.{minor}" for minor in range(10, 15))):
+        (directory / name).write_text(f"#!/bin/sh\n{body}\n")
+        (directory / name).chmod(0o755)
+    return directory
+
+
+def test_the_environment_is_made_once_and_anew_when_the_lock_changes(clone):
+    both = [start(clone, "verb", "--flag", "two words") for _ in range(2)]
+    ends = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert [out for out, _ in ends] == ["ran verb --flag two words\n"] * 2
+    assert sum(err.count("making .venv with") for _, err in ends) == 1
+    assert run(clone, "verb") == (0, "ran verb\n", "")
+
+    (clone / LOCKS[1]).write_text("# changed\n")
+    status, out, err = run(clone)
+    assert (status, out) == (0, "ran\n")
+    assert "making .venv with" in err
+    assert run(clone) == (0, "ran\n", "")
+
+
+def test_an_interrupted_environment_is_never_used(clone, silent_server):
+    ask_for(clone, silent_server.getsockname())
+    connections = []
+    for end, status in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
+        process = start(clone)
+        connections.append(silent_server.accept()[0])
+        os.killpg(process.pid, end)
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, out) == (status, "")
+    assert "interrupted" in err.splitlines()[-1]
+    for connection in connections:
+        connection.close()
+
+    (clone / LOCKS[0]).write_text("")
+    status, out, err = run(clone)
+    assert (status, out) == (0, "ran\n")
+    assert "making .venv with" in err
+
+
+def test_without_network_it_says_so(clone, silent_server):
+    address = silent_server.getsockname()
+    silent_server.close()
+    ask_for(clone, address)
+    status, out, err = run(clone)
+    assert (status, out) == (2, "")
+    assert err.splitlines()[-1].startswith("rsea: no network: the package index does not answer")
+
+
+def test_a_sourced_ros_is_used_instead_of_the_wheels(clone, tmp_path):
+    ros = tmp_path / "ros"
+    ros.mkdir()
+    (ros / "rclpy.py").write_text("")
+    (clone / LOCKS[1]).write_text("./the-wheels-must-not-be-installed\n")
+    (clone / "rsea_ros" / "__main__.py").write_text("import rclpy\nprint(rclpy.__file__)\n")
+    sourced = {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": str(ros), "PYTHONPATH": str(ros)}
+    status, out, err = run(clone, **sourced)
+    assert (status, out) == (0, f"{ros / 'rclpy.py'}\n")
+    assert "sourced ROS 2 jazzy" in err
+    assert "include-system-site-packages = true" in (clone / ".venv" / "pyvenv.cfg").read_text()
+    assert run(clone, **sourced) == (0, f"{ros / 'rclpy.py'}\n", "")
+
+
+def test_a_python_too_old_is_named(clone, tmp_path):
+    old = fake_python(tmp_path / "bin", 'if [ "$1" = --version ]; then echo Python 3.8.10; else exit 1; fi')
+    assert run(clone, path=old) == (2, "", "rsea: Python 3.10 to 3.14 needed, found Python 3.8.10\n")
+
+
+def test_a_python_without_venv_is_named(clone, tmp_path):
+    bare = fake_python(tmp_path / "bin", 'case "$2" in *venv*) exit 1;; esac; exit 0')
+    status, out, err = run(clone, path=bare)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert f"{bare}/python3 has no venv" in err
+
+
+def test_the_locks_pin_every_package_with_hashes():
+    for name in LOCKS:
+        pins = [line for line in (ROOT / name).read_text().splitlines() if line[:1].isalpha()]
+        assert pins
+        assert all("==" in pin and pin.endswith("\\") for pin in pins)
