@@ -126,9 +126,10 @@ def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
 
 
 def _with_log_times(where: str, stamps: IntArray, log_times: Sequence[int], notes: list[str]) -> IntArray:
-    """Put the log time where the header stamp is zero."""
-    unset = stamps == 0
+    """Put the log time where the header stamp is zero, which means that nobody set it."""
+    logged = np.array(log_times, np.int64)
+    unset = (stamps == 0) & (logged != 0)
     if not unset.any():
         return stamps
     notes.append(f"{where}: {np.count_nonzero(unset)} of {unset.size} header stamps are zero, log time taken")
-    return np.where(unset, np.array(log_times, np.int64), stamps)
+    return np.where(unset, logged, stamps)

@@ -108,8 +108,8 @@ def effort_of(message: JointState, joint: str | None = None) -> tuple[int, float
 def joint_state_of(message: JointState, joint: str | None = None) -> tuple[int, float, float, float]:
     """Return the stamp (ns), position (rad), velocity (rad/s) and torque (N m) of one joint."""
     index = _index(message, joint)
-    values = (_value(field, index) for field in (message.position, message.velocity, message.effort))
-    return stamp_of(message.header.stamp), *values
+    position, velocity = _value(message.position, index), _value(message.velocity, index)
+    return stamp_of(message.header.stamp), position, velocity, _value(message.effort, index)
 
 
 def wrench_of(message: WrenchStamped, axis: str = "torque.z") -> tuple[int, float]:

@@ -1,0 +1,39 @@
+"""Stamps of a clock that is coarser than the samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+
+LONG = 1.5
+"""Where the clock moved this many times its usual tick, whole ticks passed without a sample."""
+
+
+def repaired(t: FloatArray) -> tuple[FloatArray, str]:
+    """Spread samples with equal stamps evenly until the clock's next tick; say what was done.
+
+    The first sample after a tick is dated by it to within one sample period, so the error of each stamp
+    stays below that, whatever the rate does meanwhile; a line through all samples would be off by as much
+    as the rate wanders. t: s, shape (n,), not decreasing. Returns t as it is where no stamp repeats.
+    """
+    first = np.flatnonzero(np.diff(t, prepend=-np.inf))
+    if len(first) == len(t) or len(first) < 2:
+        return t, ""
+    ticks = t[first]
+    counts = np.diff(first, append=len(t))
+    spans = np.diff(ticks)
+    tick = float(np.median(spans))
+    spans = np.append(np.where(spans > LONG * tick, tick, spans), tick)
+    period = tick / float(np.median(counts))
+    steps = spans / counts
+    steps[-1] = min(period, steps[-1])
+    place = np.arange(len(t)) - np.repeat(first, counts)
+    spread = np.repeat(ticks, counts) + place * np.repeat(steps, counts)
+    if counts[0] * period < spans[0]:
+        spread[: counts[0]] = ticks[1] - (counts[0] - np.arange(counts[0])) * period
+    rates = 1.0 / np.quantile(steps, [0.95, 0.05])
+    return spread, (
+        f"{len(t) - len(first)} of {len(t)} stamps repeat (clock of {tick * 1e3:.3g} ms):"
+        f" samples spread evenly between its ticks, {rates[0]:.0f} to {rates[1]:.0f} Hz"
+    )

@@ -1,0 +1,43 @@
+"""`rsea import`: a measurement of a real machine becomes a bag."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from msg_adapters import write_record
+from msg_adapters.tables import import_record, load_map, summary
+from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.model.rig_file import rig_folders
+
+HELP = "turn a CSV, TSV or MAT file of a real machine into a bag, by a map of columns and units"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("file", help="measurement: .csv, .tsv (also .gz) or .mat (up to version 7)")
+    parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
+    parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
+    parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
+    add_topic_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the bag and say what is in it."""
+    mapping = load_map(_map_path(args.map))
+    record = import_record(args.file, mapping)
+    write_record(record, args.out, topic_map(args), args.storage)
+    for line in summary(record, mapping):
+        print(line)
+    rate = next(iter(record.channels.values())).rate
+    print(f"{args.out}: {record.stop - record.start:.3f} s at {rate:.1f} Hz")
+    return 0
+
+
+def _map_path(name: str) -> Path:
+    """Return the file of a map given by path, or by the bare name of one in config/imports."""
+    for folder in rig_folders():
+        path = folder.parent / "imports" / f"{name}.yaml"
+        if path.exists() and not Path(name).suffix:
+            return path
+    return Path(name)
