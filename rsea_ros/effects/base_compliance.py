@@ -1,0 +1,65 @@
+"""Base that gives: the clamped end of the spring is a mass on a stiff spring.
+
+    inertia q'' + c q' + stiffness q = T_s,   c = 2 damping_ratio sqrt(stiffness inertia)
+
+q is the angle of the base; the F/T sensor sits between it and the spring.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter
+from rsea_ros.effects.signal_table import Port
+from rsea_ros.errors import ParameterError
+
+
+def change(rig: Any, parameters: Mapping[str, float]) -> Any:
+    """Return the rig with its spring end on the base. Raises ParameterError when that end is free already."""
+    stiffness, inertia = parameters["stiffness"], parameters["inertia"]
+    if math.isinf(stiffness):
+        return rig
+    if "spring_end" not in rig.clamped:
+        raise ParameterError(f"effect base_compliance: rig {rig.name}: spring_end is free, expected clamped")
+    values = {
+        "spring_end.inertia": inertia,
+        "spring_end.stiffness": stiffness,
+        "spring_end.damping": 2.0 * parameters["damping_ratio"] * math.sqrt(stiffness * inertia),
+    }
+    return replace(rig.with_values(values), clamped=rig.clamped - {"spring_end"})
+
+
+EFFECT = Effect(
+    name="base_compliance",
+    port=Port.STRUCTURE,
+    parameters=(
+        Parameter(
+            "stiffness",
+            "N m/rad",
+            null=math.inf,
+            low=2e3,
+            high=1e7,
+            typical=3e4,
+            starts=(8e3, 2e5),
+            logarithmic=True,
+        ),
+        Parameter(
+            "inertia",
+            "kg m^2",
+            null=0.5,
+            low=1e-3,
+            high=100.0,
+            typical=0.5,
+            starts=(0.05, 3.0),
+            logarithmic=True,
+        ),
+        Parameter("damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True),
+    ),
+    claims=Claims(
+        "position", "odd", amplitude_exponent=1.0, passive=True, confusable_with=("structural_resonance",)
+    ),
+    structure=change,
+    about="the clamped end of the spring gives",
+    equation="inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s",
+)

@@ -1,0 +1,41 @@
+"""Command that takes effect later than its stamp says.
+
+    T_m(t) = T_command(t - delay)
+
+Commands are kept on the grid of the step; a delay that is no whole number of steps mixes two of them, which
+is the exact mean over the step of the held command.
+"""
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import COMMAND, STEP, Port
+
+LENGTH = 1023
+"""Commands kept: 60 ms at a step of 60 us."""
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Put the command into the ring x[1:] and take out the delayed one; x[0] is where the next one goes."""
+    if p[0] == 0.0:
+        return
+    steps = min(p[0] / s[STEP], LENGTH - 2.0)
+    whole, now = int(steps), int(x[0])
+    part = steps - whole
+    x[1 + now] = s[COMMAND]
+    newer, older = x[1 + (now - whole) % LENGTH], x[1 + (now - whole - 1) % LENGTH]
+    x[0] = (now + 1) % LENGTH
+    s[COMMAND] = newer + part * (older - newer)
+
+
+EFFECT = Effect(
+    name="command_delay",
+    port=Port.COMMAND,
+    parameters=(
+        Parameter("delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03)),
+    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("current_loop_lag",)),
+    function=apply,
+    states=1 + LENGTH,
+    about="the command takes effect later than its stamp says",
+    equation="T_motor(t) = T_command(t - delay)",
+)

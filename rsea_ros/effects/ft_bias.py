@@ -1,0 +1,25 @@
+"""F/T sensor whose zero is off.
+
+T_ft = T + bias
+"""
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import FT, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the bias to what the sensor sees."""
+    s[FT] += p[0]
+
+
+EFFECT = Effect(
+    name="ft_bias",
+    port=Port.SENSOR,
+    order=30,
+    parameters=(Parameter("bias", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),),
+    claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),
+    function=apply,
+    about="zero of the F/T sensor that is off",
+    equation="T_ft = T + bias",
+)

@@ -1,0 +1,25 @@
+"""F/T sensor whose zero walks away during the record.
+
+T_ft = T + drift * t / duration
+"""
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the drift so far to what the sensor sees."""
+    s[FT] += p[0] * s[TIME] / s[DURATION]
+
+
+EFFECT = Effect(
+    name="ft_drift",
+    port=Port.SENSOR,
+    order=30,
+    parameters=(Parameter("drift", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),),
+    claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_bias",)),
+    function=apply,
+    about="zero of the F/T sensor that walks during the record",
+    equation="T_ft = T + drift · t / duration",
+)

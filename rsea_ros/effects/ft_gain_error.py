@@ -1,0 +1,25 @@
+"""F/T sensor whose calibration is off.
+
+T_ft = gain * T
+"""
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import FT, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Scale what the sensor sees."""
+    s[FT] *= p[0]
+
+
+EFFECT = Effect(
+    name="ft_gain_error",
+    port=Port.SENSOR,
+    order=20,
+    parameters=(Parameter("gain", "1", null=1.0, low=0.2, high=3.0, typical=0.95),),
+    claims=Claims("ft", "odd", amplitude_exponent=1.0, confusable_with=("torque_constant_error",)),
+    function=apply,
+    about="calibration of the F/T sensor that is off",
+    equation="T_ft = gain · T",
+)

@@ -1,0 +1,31 @@
+"""Mains that the F/T sensor's cable picks up.
+
+T_ft = T + amplitude * sin(2 pi frequency t + phase)
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import FT, TIME, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the hum to what the sensor sees."""
+    s[FT] += p[0] * math.sin(2.0 * math.pi * p[1] * s[TIME] + p[2])
+
+
+EFFECT = Effect(
+    name="mains_interference",
+    port=Port.SENSOR,
+    order=40,
+    parameters=(
+        Parameter("amplitude", "N m", null=0.0, low=0.0, high=10.0, typical=0.3),
+        Parameter("frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,)),
+        Parameter("phase", "rad", null=0.0, low=-math.pi, high=math.pi, typical=0.0, starts=(-1.6, 1.6, 3.1)),
+    ),
+    claims=Claims("ft", "even", amplitude_exponent=0.0),
+    function=apply,
+    about="mains hum in the F/T sensor",
+    equation="T_ft = T + amplitude · sin(2π · frequency · t + phase)",
+)

@@ -1,0 +1,46 @@
+"""Stribeck friction of the gear train: more friction near rest than at speed.
+
+    T = -(coulomb_torque + stribeck_torque * exp(-(w / stribeck_velocity)^2)) * sign(w)
+
+w is the speed of the gear output against the housing; the sign is smoothed below 2 mrad/s, see
+_friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, eq. (3).
+"""
+
+import math
+
+from rsea_ros.effects._friction import mean_friction
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Subtract the friction torque from the torque on the gear output."""
+    ratio = s[GEAR_VELOCITY] / p[2]
+    x[0] = mean_friction(s, p[0] + p[1] * math.exp(-ratio * ratio), x[0])
+    s[GEAR_TORQUE] -= x[0]
+
+
+EFFECT = Effect(
+    name="stribeck_friction",
+    port=Port.GEAR,
+    parameters=(
+        Parameter("coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.5),
+        Parameter("stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),
+        Parameter(
+            "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, logarithmic=True
+        ),
+    ),
+    claims=Claims(
+        "velocity",
+        "odd",
+        amplitude_exponent=None,
+        passive=True,
+        confusable_with=("coulomb_friction", "load_dependent_friction"),
+    ),
+    function=apply,
+    states=1,
+    reads=(GEAR_VELOCITY,),
+    about="friction that is larger near rest than at speed",
+    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω)",
+)

@@ -1,0 +1,52 @@
+"""Torque ripple of the motor: cogging, or a harmonic of the rotor.
+
+    T = amplitude * sin(cycles_per_revolution * rotor_angle + phase)
+
+rotor_angle is that of the rotor against the housing, the gear's ratio times that of the output. The torque
+of a step is the mean over it, so ripple faster than the step averages out instead of aliasing.
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
+
+LAST, STARTED = range(2)
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the ripple at the middle of the step, times the sinc of the half angle that the step covers."""
+    angle = s[ROTOR_ANGLE]
+    half = 0.5 * p[1] * (angle - x[LAST]) if x[STARTED] == 1.0 else 0.0
+    x[LAST], x[STARTED] = angle, 1.0
+    share = math.sin(half) / half if half != 0.0 else 1.0
+    s[GEAR_TORQUE] += p[0] * share * math.sin(p[1] * angle + p[2])
+
+
+EFFECT = Effect(
+    name="torque_ripple",
+    port=Port.GEAR,
+    parameters=(
+        Parameter("amplitude", "N m", null=0.0, low=0.0, high=20.0, typical=1.0),
+        Parameter(
+            "cycles_per_revolution",
+            "1",
+            null=4.0,
+            low=0.2,
+            high=60.0,
+            typical=4.0,
+            starts=(1.0, 2.0, 6.0, 8.0, 12.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "phase", "rad", null=0.0, low=-math.pi, high=math.pi, typical=0.7, starts=(-2.4, -0.9, 2.3)
+        ),
+    ),
+    claims=Claims("position", "neither", amplitude_exponent=None),
+    function=apply,
+    states=2,
+    reads=(ROTOR_ANGLE,),
+    about="torque that repeats with the rotor's angle",
+    equation="T = amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
+)

@@ -1,0 +1,38 @@
+"""Motor torque that stops growing at a limit (of current, voltage or drive).
+
+T_m = min(max(T_command, -limit), limit)
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import COMMAND, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Clip the command."""
+    s[COMMAND] = min(max(s[COMMAND], -p[0]), p[0])
+
+
+EFFECT = Effect(
+    name="torque_saturation",
+    port=Port.COMMAND,
+    order=10,
+    parameters=(
+        Parameter(
+            "limit",
+            "N m",
+            null=math.inf,
+            low=0.5,
+            high=200.0,
+            typical=15.0,
+            starts=(20.0, 10.0, 6.0),
+            logarithmic=True,
+        ),
+    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=None),
+    function=apply,
+    about="motor torque that stops growing at a limit",
+    equation="T_motor = min(max(T_command, -limit), limit)",
+)
