@@ -1,0 +1,190 @@
+"""Excitations: torque commands on a uniform grid, N m.
+
+Every kind is a function of one `Settings` and stands in KINDS under the name by which the excite node and the
+command line choose it. `excitation()` adds the ramps.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.signals import FloatArray
+
+IntArray = npt.NDArray[np.int64]
+
+NYQUIST_SHARE = 0.95
+"""No excitation goes above this share of half the sample rate."""
+_DETECTION_GROUP = 4
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What shapes an excitation.
+
+    rate: Hz. duration: s, without the ramps of periodic kinds. amplitude: N m, peak of chirp and steps, rms
+    of multisine and white noise. noise: N m, standard deviation of the noise on top of the chirp. low, high:
+    band, Hz. period: s, of the multisine and of a full cycle of steps. seed: of everything random.
+    """
+
+    rate: float = 280.0
+    duration: float = 160.0
+    amplitude: float = 20.0
+    noise: float = 10.0
+    low: float = 0.01
+    high: float = 140.0
+    period: float = 10.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("rate", "Hz"), ("duration", "s"), ("low", "Hz"), ("period", "s")):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"excitation: {name} = {value:g} {unit}, expected > 0 {unit}")
+        if not self.low < self.top:
+            raise ParameterError(f"excitation: low = {self.low:g} Hz, expected below {self.top:g} Hz")
+
+    @property
+    def top(self) -> float:
+        """Highest frequency, Hz: `high`, kept below Nyquist."""
+        return min(self.high, NYQUIST_SHARE * self.rate / 2.0)
+
+    @property
+    def samples(self) -> int:
+        """Samples of the whole duration."""
+        return round(self.duration * self.rate)
+
+
+def chirp(settings: Settings) -> FloatArray:
+    """Return the paper's excitation: a logarithmic sweep with white noise on top (section 3.2.1).
+
+        u(t) = A sin(2 pi low T / ln r ((r)^(t/T) - 1)) + w(t),   r = top / low
+
+    The paper has A = 20 N m, 0.01-140 Hz, T = 160 s and w of 10 N m standard deviation in the same band.
+    """
+    t = np.arange(settings.samples) / settings.rate
+    log_ratio = math.log(settings.top / settings.low)
+    turns = settings.low * settings.duration / log_ratio * np.expm1(log_ratio * t / settings.duration)
+    sweep: FloatArray = settings.amplitude * np.sin(2.0 * np.pi * turns)
+    return sweep + _band_noise(settings, settings.noise)
+
+
+def white_noise(settings: Settings) -> FloatArray:
+    """Return Gaussian white noise between low and top, `amplitude` N m rms."""
+    return _band_noise(settings, settings.amplitude)
+
+
+def steps(settings: Settings) -> FloatArray:
+    """Return steps 0, A, 0, -A, each held for a quarter of `period`."""
+    quarter = np.floor(np.arange(settings.samples) / settings.rate * 4.0 / settings.period + 1e-9)
+    levels = np.array([0.0, settings.amplitude, 0.0, -settings.amplitude])
+    held: FloatArray = levels[quarter.astype(np.int64) % 4]
+    return held
+
+
+def multisine(settings: Settings) -> FloatArray:
+    """Return whole periods of a random-phase multisine on odd harmonics, `amplitude` N m rms.
+
+        u(t) = sqrt(2 / K) A sum_k cos(2 pi k t / period + phi_k),   k in odd_lines(settings)
+
+    The lines left out tell odd distortion, the even ones even distortion (Pintelon, Schoukens, System
+    Identification, 2nd ed., section 4.3). Raises ParameterError for a period that is no whole number of
+    samples or does not fit the duration.
+    """
+    size = _period_samples(settings)
+    lines = odd_lines(settings)
+    spectrum = np.zeros(size // 2 + 1, complex)
+    phases = np.random.default_rng([settings.seed, 1]).uniform(0.0, 2.0 * np.pi, len(lines))
+    spectrum[lines] = np.exp(1j * phases)
+    period = np.fft.irfft(spectrum, size) * size * settings.amplitude / math.sqrt(2.0 * len(lines))
+    whole: FloatArray = np.tile(period, settings.samples // size)
+    return whole
+
+
+def odd_lines(settings: Settings) -> IntArray:
+    """Return the excited harmonics of 1/period: odd ones in the band, one of each four left out at random."""
+    first, last = math.ceil(settings.low * settings.period), math.floor(settings.top * settings.period)
+    odd = np.arange(first + (first + 1) % 2, last + 1, 2)
+    if len(odd) < 1:
+        band = f"{settings.low:g} to {settings.top:g} Hz"
+        raise ParameterError(
+            f"multisine: period = {settings.period:g} s, expected one with odd lines in {band}"
+        )
+    rng = np.random.default_rng([settings.seed, 0])
+    groups = len(odd) // _DETECTION_GROUP
+    left_out = _DETECTION_GROUP * np.arange(groups) + rng.integers(0, _DETECTION_GROUP, groups)
+    return np.delete(odd, left_out)
+
+
+def _period_samples(settings: Settings) -> int:
+    size = round(settings.period * settings.rate)
+    where = f"multisine: period = {settings.period:g} s"
+    if abs(size - settings.period * settings.rate) > 1e-6 * size:
+        raise ParameterError(f"{where}, expected a whole number of samples at {settings.rate:g} Hz")
+    if size > settings.samples:
+        raise ParameterError(f"{where}, expected at most the duration of {settings.duration:g} s")
+    return size
+
+
+def _band_noise(settings: Settings, deviation: float) -> FloatArray:
+    """Return Gaussian noise that is white from low to top and nothing elsewhere. deviation: N m."""
+    n = settings.samples
+    spectrum = np.fft.rfft(np.random.default_rng(settings.seed).standard_normal(n))
+    frequency = np.fft.rfftfreq(n, 1.0 / settings.rate)
+    inside = (frequency >= settings.low) & (frequency <= settings.top)
+    spectrum[~inside] = 0.0
+    share = 2.0 * np.count_nonzero(inside) / n
+    noise: FloatArray = np.fft.irfft(spectrum, n) * (deviation / math.sqrt(share))
+    return noise
+
+
+KINDS: Mapping[str, Callable[[Settings], FloatArray]] = MappingProxyType(
+    {"chirp": chirp, "multisine": multisine, "white_noise": white_noise, "steps": steps}
+)
+PERIODIC = frozenset({"multisine"})
+
+
+def excitation(kind: str, settings: Settings, ramp: float = 0.0) -> FloatArray:
+    """Return a command that begins and ends at rest, N m, shape (n,).
+
+    ramp: s, raised cosine in and out. Periodic kinds get it before and after, as their own continuation, so
+    that their periods stay whole; the others are shaped within their duration.
+    Raises ParameterError for an unknown kind and for a ramp longer than half the duration.
+    """
+    if kind not in KINDS:
+        raise ParameterError(f"excitation {kind!r}, expected one of {', '.join(KINDS)}")
+    command = KINDS[kind](settings)
+    n = round(ramp * settings.rate)
+    if not 0 <= 2 * n <= len(command):
+        longest = len(command) / settings.rate / 2.0
+        raise ParameterError(f"excitation: ramp = {ramp:g} s, expected 0 to {longest:g} s")
+    if kind in PERIODIC:
+        command = np.concatenate([command[len(command) - n :], command, command[:n]])
+    return ramped(command, n)
+
+
+def ramped(command: FloatArray, n: int) -> FloatArray:
+    """Return the command with its first and last n samples under a raised cosine, (1 - cos(pi k / n)) / 2."""
+    window = np.ones(len(command))
+    rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(n) / max(n, 1)))
+    window[:n] = rise
+    window[len(command) - n :] *= rise[::-1]
+    return command * window
+
+
+def check_limits(command: FloatArray, limit: float, rate: float) -> None:
+    """Raise ParameterError for the first sample above the limit (N m) or not finite. rate: Hz."""
+    bad = ~(np.abs(command) <= limit)
+    if bad.any():
+        first = int(np.argmax(bad))
+        largest = np.max(np.abs(command))
+        raise ParameterError(
+            f"command of {command[first]:.4g} N m at {first / rate:.3f} s (largest {largest:.4g} N m), "
+            f"expected at most {limit:g} N m either way"
+        )
