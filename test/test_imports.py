@@ -1,0 +1,145 @@
+"""The layers: who may import whom (docs/architecture.md), read from the syntax tree of every module."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
+
+BASE = {"errors", "signals"}
+CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
+OWN = {
+    "errors": set(),
+    "signals": {"errors"},
+    "effects": BASE,
+    "model": BASE | {"effects"},
+    "identification": BASE | {"effects", "model"},
+    "diagnosis": BASE | {"effects", "model", "identification"},
+    "control": BASE,
+    "design": BASE,
+    "hardware": BASE,
+    "hardware.simulated": BASE | {"model"},
+    "msg_adapters": BASE,
+    "report": CORE,
+    "nodes": CORE | {"hardware", "report", "msg_adapters"},
+    "cli": CORE | {"hardware", "report", "msg_adapters", "nodes"},
+    "__main__": {"cli"},
+    "__init__": set(),
+}
+"""Layers of this project that a layer may import beside itself."""
+
+NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
+MESSAGES = {
+    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "rcl_interfaces",
+    "rosgraph_msgs", "rosidl_runtime_py", "sensor_msgs", "std_msgs", "std_srvs",
+}
+FOREIGN = {
+    "effects": NUMERIC,
+    "model": NUMERIC | {"yaml"},
+    "identification": NUMERIC,
+    "diagnosis": NUMERIC,
+    "control": NUMERIC,
+    "design": NUMERIC | {"yaml"},
+    "signals": {"numpy"},
+    "hardware": {"numpy", "dynamixel_sdk", "serial"},
+    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,
+    "report": {"numpy", "plotly", "rich"},
+    "nodes": {"numpy", "rclpy", "rich", "yaml"},
+    "cli": {"numpy", "rich", "rclpy", "yaml"},
+}
+"""Packages of others that a layer may import beside the standard library."""
+
+
+def layer_of(module: str) -> str:
+    """Return the layer of a module of this project, the longest name that the table has."""
+    name = module.removeprefix("rsea_ros.") if module != "rsea_ros" else "__init__"
+    fitting = [layer for layer in OWN if name == layer or name.startswith(layer + ".")]
+    assert fitting, f"{module} lies in no layer of docs/architecture.md"
+    return max(fitting, key=len)
+
+
+def name_of(path: Path) -> str:
+    """Return the dotted name of a module's file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports(path: Path, source: str) -> Iterator[tuple[str, int]]:
+    """Yield every module that a source imports, at any depth, by its absolute name, with its line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            module = absolute(path, node)
+            names = [f"{module}.{alias.name}" for alias in node.names] if module == "rsea_ros" else [module]
+            yield from ((name, node.lineno) for name in names)
+
+
+def absolute(path: Path, node: ast.ImportFrom) -> str:
+    """Return the absolute name of the module of a `from … import`."""
+    if not node.level:
+        return str(node.module)
+    ancestors = path.relative_to(ROOT).parent.parts
+    kept = ancestors[: len(ancestors) - node.level + 1]
+    return ".".join([*kept, node.module] if node.module else kept)
+
+
+def offences(path: Path, source: str) -> list[str]:
+    """Return the imports that a source in that place may not have."""
+    layer = layer_of(name_of(path))
+    where = path.relative_to(ROOT)
+    found = [(module, line) for module, line in imports(path, source) if not may_import(layer, module)]
+    return [f"{where}:{line}: layer {layer} may not import {module}" for module, line in found]
+
+
+def may_import(layer: str, module: str) -> bool:
+    """Tell whether the tables allow it; a part of a layer belongs to that layer too."""
+    whole, top = layer.split(".")[0], module.split(".")[0]
+    if top in ("rsea_ros", "msg_adapters"):
+        return layer_of(module).split(".")[0] in OWN[layer] | {whole}
+    return top in sys.stdlib_module_names or top in FOREIGN.get(whole, set())
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_imports_only_what_its_layer_may(path):
+    assert offences(path, path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("place", "source"),
+    [
+        ("rsea_ros/model/rig.py", "from rsea_ros.identification import identify"),
+        ("rsea_ros/model/rig.py", "def f():\n    import rclpy"),
+        ("rsea_ros/effects/backlash.py", "from ..model import rig"),
+        ("rsea_ros/effects/backlash.py", "from rsea_ros import model"),
+        ("rsea_ros/identification/fit.py", "import plotly.graph_objects as go"),
+        ("rsea_ros/hardware/dynamixel.py", "from rsea_ros.model.simulation import Plant"),
+        ("rsea_ros/nodes/plant.py", "from sensor_msgs.msg import JointState"),
+        ("rsea_ros/cli/identify.py", "from rosbags.highlevel import AnyReader"),
+        ("rsea_ros/cli/identify.py", "import plotly"),
+        ("msg_adapters/bags.py", "from rsea_ros.model.rig import Rig"),
+        ("msg_adapters/ros.py", "import rclpy"),
+    ],
+)
+def test_an_offence_is_found(place, source):
+    assert len(offences(ROOT / place, source)) == 1
+
+
+@pytest.mark.parametrize(
+    ("place", "source"),
+    [
+        ("rsea_ros/model/rig.py", "import numpy as np\nfrom rsea_ros.effects.effect import Effect"),
+        ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant"),
+        ("rsea_ros/nodes/plant.py", "import rclpy\nfrom msg_adapters.ros import JointState"),
+        ("msg_adapters/ros.py", "from sensor_msgs.msg import JointState"),
+        ("rsea_ros/report/bode.py", "import plotly\nfrom ..identification.identify import Identification"),
+    ],
+)
+def test_what_is_allowed_passes(place, source):
+    assert offences(ROOT / place, source) == []

@@ -1,0 +1,99 @@
+"""The repository is an ament_python package: colcon builds it, and what it installs runs from there."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+import rclpy.qos
+
+from msg_adapters.ros import JointState
+
+ROOT = Path(__file__).resolve().parents[1]
+EXECUTABLES = ("driver", "excite", "identify", "plant", "record", "replay")
+
+
+@pytest.fixture(scope="module")
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a scratch workspace in which colcon has built the package."""
+    place = tmp_path_factory.mktemp("workspace")
+    colcon = [sys.executable, "-m", "colcon", "--log-base", "log", "build", "--base-paths", str(ROOT)]
+    done = subprocess.run(colcon, cwd=place, env=environment(), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return place
+
+
+def environment() -> dict[str, str]:
+    """Return this environment without the source tree on Python's path."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+
+
+def start(workspace: Path, *command: str) -> subprocess.Popen[str]:
+    """Start a command with the workspace sourced, as a user's shell would, away from the source tree."""
+    line = f". ./install/setup.sh && exec {shlex.join(command)}"
+    return subprocess.Popen(
+        ["sh", "-c", line], cwd=workspace, env=environment(), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )
+
+
+@pytest.fixture
+def plant(workspace: Path) -> Iterator[subprocess.Popen[str]]:
+    """Run the installed plant executable."""
+    process = start(workspace, str(workspace / "install/rsea_ros/lib/rsea_ros/plant"))
+    with process:
+        yield process
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+
+
+def test_the_executables_are_where_ros2_run_looks(workspace):
+    directory = workspace / "install/rsea_ros/lib/rsea_ros"
+    assert {path.name for path in directory.iterdir() if os.access(path, os.X_OK)} == {*EXECUTABLES, "rsea"}
+    marker = "install/rsea_ros/share/ament_index/resource_index/packages/rsea_ros"
+    assert (workspace / marker).is_file()
+
+
+@pytest.mark.parametrize("top", ["rsea_ros", "msg_adapters"])
+def test_every_module_is_installed(workspace, top):
+    (installed,) = (workspace / "install/rsea_ros/lib").glob(f"python3*/site-packages/{top}")
+    assert files(installed, "*.py") == files(ROOT / top, "*.py")
+
+
+@pytest.mark.parametrize("top", ["config", "launch"])
+def test_every_config_and_launch_file_is_installed(workspace, top):
+    assert files(workspace / "install/rsea_ros/share/rsea_ros" / top, "*") == files(ROOT / top, "*")
+
+
+def files(top: Path, pattern: str) -> set[str]:
+    """Return the files under a directory, relative to it."""
+    found = (path for path in top.rglob(pattern) if path.is_file() and path.suffix != ".pyc")
+    return {str(path.relative_to(top)) for path in found}
+
+
+def test_rsea_is_a_command_of_the_sourced_workspace(workspace):
+    with start(workspace, "rsea", "--help") as process:
+        out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, out
+    assert out.startswith("usage: rsea VERB")
+
+
+def test_the_installed_plant_publishes_joint_states(plant):
+    heard: list[JointState] = []
+    with rclpy.init():
+        node = rclpy.create_node("listener", namespace="rsea")
+        node.create_subscription(JointState, "joint_states", heard.append, rclpy.qos.qos_profile_sensor_data)
+        deadline = time.monotonic() + 60.0
+        while not heard and plant.poll() is None and time.monotonic() < deadline:
+            rclpy.spin_once(node, timeout_sec=0.5)
+        node.destroy_node()
+    assert heard, plant.stdout.read() if plant.poll() is not None else "no message in 60 s"
+    assert len(heard[0].position) == len(heard[0].velocity) == len(heard[0].effort) == 1
