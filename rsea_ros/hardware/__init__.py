@@ -1,0 +1,1 @@
+"""Devices: the simulated actuator, behind the interface that real ones have."""

@@ -1,0 +1,108 @@
+"""The simulated actuator: its physics go on with a clock, whoever reads or writes it, and when."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import State
+from rsea_ros.model.drive import steps_per_sample
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import build, measure, run
+from rsea_ros.model.step import OUTPUTS
+from rsea_ros.signals import FloatArray
+
+SECOND = 1_000_000_000
+
+
+class SimulatedDevice:
+    """A rig behind the Device interface.
+
+    The fixed step divides the period of `rate` (Hz). A torque written within a step acts from that instant
+    on: the step gets the mean of what was held in it. A reading is the end of the last whole step.
+    clock: returns the time, ns since the epoch. duration: over which drifts come to their full size, s.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        rate: float,
+        *,
+        seed: int = 0,
+        noise: bool = True,
+        duration: float = 60.0,
+        clock: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._rig, self._noise, self._clock = rig, noise, clock
+        self._rng = np.random.default_rng(seed)
+        self._per_second = rate * steps_per_sample(1.0 / rate)
+        self._machine = build(rig, 1.0 / self._per_second, duration)
+        self._values = np.zeros(len(OUTPUTS))
+        self._start: int | None = None
+        self._steps, self._torque = 0, 0.0
+        self._writes: list[tuple[int, float]] = []
+
+    def open(self) -> None:
+        """Start at rest, now. The compiled step is warmed first, so that time does not run away from it."""
+        run(self._machine, np.zeros(1), np.empty((1, len(OUTPUTS))))
+        self._start = self._clock()
+
+    def read(self) -> State:
+        """Advance to now and measure."""
+        self._advance()
+        values = {name: self._measured(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
+        stamp = self._instant(self._steps)
+        wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
+        return State(stamp, values["position"], values["velocity"], values["motor_torque"], stamp, wrench)
+
+    def write(self, torque: float) -> None:
+        """Hold a torque (N m) from now on. Raises DeviceError for one that is not finite."""
+        if not np.isfinite(torque):
+            raise DeviceError(f"torque of {torque} N m, expected a finite value")
+        self._writes.append((self._clock(), float(torque)))
+
+    def close(self) -> None:
+        """Command zero torque and stop."""
+        if self._start is not None:
+            self.write(0.0)
+            self._advance()
+            self._start = None
+
+    def _instant(self, steps: int) -> int:
+        """Return the stamp at the end of so many steps, ns."""
+        if self._start is None:
+            raise DeviceError("simulated device is not open")
+        return self._start + round(steps * SECOND / self._per_second)
+
+    def _advance(self) -> None:
+        """Run all steps that are over by now."""
+        first, begin = self._steps, self._instant(self._steps)
+        count = int((self._clock() - begin) * self._per_second / SECOND + 1e-3)
+        if count < 1:
+            return
+        held = self._held(begin, count)
+        out = np.empty((count, len(OUTPUTS)))
+        run(self._machine, held, out, start=first / self._per_second)
+        self._steps, self._values = first + count, out[-1]
+
+    def _held(self, begin: int, count: int) -> FloatArray:
+        """Return the mean torque of each step from `begin` (ns) on, and keep the writes that come later."""
+        held, last = np.full(count, self._torque), self._torque
+        for k, (stamp, torque) in enumerate(self._writes):
+            at = max(0.0, (stamp - begin) * self._per_second / SECOND)
+            step = int(at)
+            if step >= count:
+                self._writes = self._writes[k:]
+                break
+            held[step] += (torque - last) * (step + 1 - at)
+            held[step + 1 :] = last = torque
+        else:
+            self._writes = []
+        self._torque = last
+        return held
+
+    def _measured(self, channel: str, value: FloatArray) -> float:
+        return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
