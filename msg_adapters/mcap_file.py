@@ -50,7 +50,7 @@ class _Scanner:
         self.sinks: dict[int, Messages | None] = {}
 
     def run(self, buffer: Buffer, at: int, stop: int) -> bool:
-        """Take the records from `at` to `stop`; return whether the data ended as they should."""
+        """Take the records from `at` to `stop`; return whether the end of the data was among them."""
         while at + RECORD.size <= stop:
             opcode, size = RECORD.unpack_from(buffer, at)
             first = at + RECORD.size
@@ -71,7 +71,7 @@ class _Scanner:
                 self.types[_uint16(buffer, first)] = _text(buffer, first + 2)[0]
             elif opcode == CHANNEL:
                 self._channel(buffer, first)
-        return at == stop
+        return False
 
     def _channel(self, buffer: Buffer, first: int) -> None:
         topic, at = _text(buffer, first + 4)

@@ -61,7 +61,10 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
         if not filled.intersection(roles):
             wanted = " or ".join(topics.topic(role) for role in roles)
             have = ", ".join(f"{name} ({m.msgtype})" for name, m in sorted(contents.topics.items()))
-            raise BagError(f"{source}: no message on {wanted}; the bag holds {have or 'no topic at all'}")
+            told = f" ({'; '.join(contents.notes)})" if contents.notes else ""
+            raise BagError(
+                f"{source}: no message on {wanted}; the bag holds {have or 'no topic at all'}{told}"
+            )
 
 
 def _require_values(source: str, series: dict[str, Series], strict: bool) -> None:

@@ -9,6 +9,10 @@ from pathlib import Path
 from msg_adapters.contents import Contents, Messages
 
 MAGIC = b"SQLite format 3\x00"
+TOPICS = "SELECT id, name, type FROM topics WHERE typeof(name) = 'text' AND typeof(type) = 'text'"
+MESSAGES = """SELECT topic_id, timestamp, data FROM messages
+    WHERE typeof(timestamp) = 'integer' AND typeof(data) = 'blob'"""
+"""The types are asked for because a damaged page gives NULL."""
 
 
 def scan(path: Path, contents: Contents) -> None:
@@ -18,11 +22,16 @@ def scan(path: Path, contents: Contents) -> None:
     Raises ValueError for a file that is no rosbag2 database.
     """
     with path.open("rb") as file:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise ValueError(f"no sqlite3 file, expected it to start with {MAGIC!r}")
+        header = file.read(100)
+    if not header.startswith(MAGIC):
+        raise ValueError(f"no sqlite3 file, expected it to start with {MAGIC!r}")
+    page = int.from_bytes(header[16:18], "big")
+    pages = int.from_bytes(header[28:32], "big")
+    if path.stat().st_size < pages * (65536 if page == 1 else page):
+        contents.notes.append("cut off, read as far as it goes")
     try:
         with closing(_connect(path)) as database:
-            topics = database.execute("SELECT id, name, type FROM topics").fetchall()
+            topics = database.execute(TOPICS).fetchall()
             sinks = {key: contents.sink(name, msgtype) for key, name, msgtype in topics}
             _messages(database, {key: sink for key, sink in sinks.items() if sink is not None}, contents)
     except sqlite3.Error as error:
@@ -30,21 +39,26 @@ def scan(path: Path, contents: Contents) -> None:
 
 
 def _connect(path: Path) -> sqlite3.Connection:
-    """Open for reading; a database on a read-only medium that wants recovery is read as it stands."""
-    uri = path.resolve().as_uri()
-    database = sqlite3.connect(f"{uri}?mode=ro", uri=True)
-    try:
-        database.execute("SELECT count(*) FROM sqlite_master")
-    except sqlite3.OperationalError:
-        database.close()
-        database = sqlite3.connect(f"{uri}?immutable=1", uri=True)
+    """Open for reading.
+
+    A database on a read-only medium that wants recovery is read as it stands, and one that is shorter than
+    its header says (which the pragma is for) up to where it ends.
+    """
+    for mode in ("mode=ro", "immutable=1"):
+        database = sqlite3.connect(f"{path.resolve().as_uri()}?{mode}", uri=True)
+        database.execute("PRAGMA writable_schema=ON")
+        try:
+            database.execute("SELECT count(*) FROM sqlite_master")
+            break
+        except sqlite3.OperationalError:
+            database.close()
     return database
 
 
 def _messages(database: sqlite3.Connection, sinks: dict[int, Messages], contents: Contents) -> None:
     keys = ",".join(str(int(key)) for key in sinks)
-    rows = database.execute(f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({keys})")
     try:
+        rows = database.execute(f"{MESSAGES} AND topic_id IN ({keys})")
         for key, log_time, raw in rows:
             sinks[key].log_times.append(log_time)
             sinks[key].raw.append(raw)

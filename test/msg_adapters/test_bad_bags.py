@@ -1,0 +1,185 @@
+"""What is refused, each with one line that names file, topic, value and expectation."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from foreign import EPOCH, joint_state, make, run_rows, wrench, write_foreign
+
+from msg_adapters import TopicMap, read_record
+from rsea_ros.errors import BagError, ParameterError
+
+
+def _without(topic):
+    return [row for row in run_rows(4) if row[0] != topic]
+
+
+def _changed(index, message):
+    rows = run_rows(4)
+    rows[index] = (rows[index][0], rows[index][1], message)
+    return rows
+
+
+def _wrong_type():
+    at = EPOCH
+    return [*_without("/rsea/ft"), ("/rsea/ft", at, joint_state(at, effort=[1.0]))]
+
+
+STATE = joint_state(EPOCH + 3_572_428, position=[0.1], velocity=[np.nan], effort=[0.3])
+REFUSED = {
+    "no command": (
+        _without("/rsea/torque_command"),
+        r"no message on /rsea/torque_command; the bag holds /rsea/ft \(",
+    ),
+    "no measurement": (run_rows(4)[::3], "no message on /rsea/joint_states or /rsea/ft; the bag holds"),
+    "wrong type": (
+        _wrong_type(),
+        "/rsea/ft is sensor_msgs/msg/JointState, expected geometry_msgs/msg/WrenchStamped",
+    ),
+    "empty bag": ([], "no message on /rsea/torque_command; the bag holds no topic at all"),
+    "NaN": (
+        _changed(4, STATE),
+        r"/rsea/joint_states velocity\[1\] is nan at 1763000000.127029217 s, expected a finite",
+    ),
+    "stamp back": (
+        _changed(8, wrench(EPOCH + 1000, [0.0] * 6)),
+        r"/rsea/ft wrench\[2\] is stamped 1763000000.123457789 s, 0.003572 s before its predecessor",
+    ),
+    "two joints": (
+        _changed(1, joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])),
+        r"/rsea/joint_states: 3 joints \(joint, hip, knee\), expected one; name it with --joint",
+    ),
+    "joints without names": (
+        _changed(1, joint_state(EPOCH, [], [0.0, 1.0])),
+        r"2 joints \(joint\), expected one",
+    ),
+    "empty command": (
+        [(name, at, joint_state(at) if "command" in name else m) for name, at, m in run_rows(4)],
+        "the command's messages hold no effort, expected the torque in N m",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused(tmp_path, case):
+    rows, text = REFUSED[case]
+    bag = write_foreign(tmp_path / "bag", rows)
+    with pytest.raises(BagError, match=text) as caught:
+        read_record(bag)
+    assert str(caught.value).startswith(str(bag))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("case", ["no command", "no measurement", "NaN", "stamp back"])
+def test_faults_pass_where_a_diagnosis_asks_for_them(tmp_path, case):
+    rows, _ = REFUSED[case]
+    record = read_record(write_foreign(tmp_path / "bag", rows), strict=False)
+    for name, count in (
+        ("ft", "/rsea/ft"),
+        ("command", "/rsea/torque_command"),
+        ("velocity", "/rsea/joint_states"),
+    ):
+        expected = sum(topic == count for topic, _, _ in rows)
+        assert len(record[name]) == expected if expected else name not in record
+    if case == "NaN":
+        assert np.isnan(record["velocity"].y[1])
+    if case == "stamp back":
+        assert np.diff(record["ft"].t).min() < 0
+
+
+def test_repeated_stamps_are_dropped_with_a_note_or_kept(tmp_path):
+    bag = write_foreign(tmp_path / "bag", [*run_rows(4), *run_rows(4)[-1:]])
+    record = read_record(bag)
+    assert len(record["ft"]) == 4
+    assert record.notes == (f"{bag}: /rsea/ft wrench: 1 of 5 stamps repeat, the first of each kept",)
+    assert len(read_record(bag, strict=False)["ft"]) == 5
+
+
+def test_a_joint_that_is_not_there(tmp_path):
+    bag = write_foreign(tmp_path / "bag", run_rows(4))
+    with pytest.raises(BagError, match="no joint 'knee', the messages hold joint"):
+        read_record(bag, topics=TopicMap(joint="knee"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("a.mcap", b"", "empty file"),
+        ("a.mcap", b"nothing of the kind", "no MCAP file, expected it to start with"),
+        (
+            "a.mcap",
+            b"\x89MCAP0\r\n",
+            r"no message on /rsea/torque_command; the bag holds no topic at all \(.*cut off",
+        ),
+        ("a.db3", b"nothing of the kind", "no sqlite3 file"),
+        ("a.db3", b"SQLite format 3\x00" + bytes(200), "no rosbag2 database"),
+        ("a.csv", b"1,2", "no bag, expected a directory, or a .mcap or .db3 file"),
+        ("a.mcap.zstd", b"nothing of the kind", "Unable to decompress|Unknown frame|decompress"),
+    ],
+)
+def test_files_that_are_no_bags(tmp_path, name, content, text):
+    file = tmp_path / name
+    file.write_bytes(content)
+    with pytest.raises(BagError, match=text) as caught:
+        read_record(file)
+    assert str(caught.value).startswith(str(file))
+
+
+def test_directories_that_are_no_bags(tmp_path):
+    with pytest.raises(BagError, match="no bag, expected a directory with"):
+        read_record(tmp_path)
+    with pytest.raises(BagError, match="no such bag"):
+        read_record(tmp_path / "nothing")
+    bag = write_foreign(tmp_path / "bag", run_rows(4))
+    (bag / "bag.mcap").rename(bag / "other.mcap")
+    with pytest.raises(BagError, match=r"metadata.yaml: names bag.mcap, which is not there"):
+        read_record(bag)
+
+
+def test_a_damaged_chunk_is_refused(tmp_path):
+    from rosbags.rosbag2 import CompressionMode, StoragePlugin
+
+    bag = write_foreign(tmp_path / "bag", run_rows(60), StoragePlugin.MCAP, CompressionMode.STORAGE)
+    data = bytearray((bag / "bag.mcap").read_bytes())
+    data[400:420] = bytes(20)
+    (bag / "bag.mcap").write_bytes(data)
+    with pytest.raises(BagError, match="damaged MCAP"):
+        read_record(bag)
+
+
+def test_a_reader_without_permission(tmp_path):
+    bag = write_foreign(tmp_path / "bag", run_rows(4))
+    (bag / "bag.mcap").chmod(0)
+    load = "import os, sys; from msg_adapters import read_record"
+    as_nobody = f"{load}; os.geteuid() or os.seteuid(65534); read_record(sys.argv[1])"
+    for directory in (tmp_path, *tmp_path.parents[:2], bag):
+        directory.chmod(0o755)
+    done = subprocess.run(
+        [sys.executable, "-c", as_nobody, str(bag)],
+        capture_output=True,
+        text=True,
+        cwd=os.getcwd(),
+        check=False,
+    )
+    assert done.stderr.strip().splitlines()[-1].endswith("bag.mcap: no permission to read it")
+
+
+def test_topic_options_that_make_no_sense():
+    with pytest.raises(ParameterError, match="axis 'yaw': expected one of"):
+        TopicMap(axis="yaw")
+    with pytest.raises(
+        ParameterError, match="topic 'wrench=/ft': expected ROLE=TOPIC with ROLE one of torque_command"
+    ):
+        TopicMap().renamed(["wrench=/ft"])
+
+
+def test_a_message_in_another_encoding_is_a_wrong_type(tmp_path):
+    bag = write_foreign(tmp_path / "bag", [("/rsea/ft", EPOCH, make("std_msgs/msg/Bool", data=True))])
+    with pytest.raises(
+        BagError, match="/rsea/ft is std_msgs/msg/Bool, expected geometry_msgs/msg/WrenchStamped"
+    ):
+        read_record(bag)

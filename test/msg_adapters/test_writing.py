@@ -1,0 +1,202 @@
+"""Bags that we write: others read them, and nothing half-written gets the final name."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from foreign import run_rows, write_foreign
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader, StoragePlugin
+
+from msg_adapters import BagWriter, TopicMap, iterate, read_record, write_record, write_records
+from rsea_ros.errors import BagError
+from rsea_ros.signals import Channel, Record
+
+STORAGES = ["mcap", "sqlite3"]
+BOOL = bytes([0, 1, 0, 0, 1])
+
+
+def assert_same(got: Record, expected: Record):
+    assert set(got.channels) == set(expected.channels)
+    assert got.epoch_ns == expected.epoch_ns
+    for name, channel in expected.channels.items():
+        assert np.array_equal(got[name].y, channel.y), name
+        assert np.allclose(got[name].t, channel.t, rtol=0, atol=1e-9), name
+
+
+@pytest.mark.parametrize("target", ["mcap", "sqlite3", "run.mcap", "run.db3"])
+def test_a_record_comes_back(tmp_path, record, target):
+    path = tmp_path / target
+    write_record(record, path, storage=target if target in STORAGES else "mcap")
+    assert_same(read_record(path), record)
+    assert [entry.name for entry in tmp_path.iterdir()] == [target]
+
+
+def test_notes_names_joint_and_axis_come_back(tmp_path, record):
+    topics = TopicMap(namespace="/lab", joint="knee", axis="-force.x").renamed(["ft=/wrist"])
+    write_record(replace(record, notes=("one: with a colon", "two")), tmp_path / "bag", topics)
+    got = read_record(tmp_path / "bag", topics=topics)
+    assert_same(got, record)
+    assert got.notes == ("one: with a colon", "two")
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert {c.topic for c in reader.connections} == {
+            "/lab/torque_command",
+            "/lab/joint_states",
+            "/wrist",
+            "/lab/desired_position",
+        }
+
+
+def test_faults_come_back_as_they_were(tmp_path, record):
+    """Stamps that repeat or go back, values that are not finite, channels of one topic apart."""
+    t, y = record["ft"].t.copy(), record["ft"].y.copy()
+    t[300:400] -= 0.5
+    t[500] = t[499]
+    y[7] = np.nan
+    half = Channel(record["velocity"].t[::2], record["velocity"].y[::2])
+    faulty = record.with_channels(ft=Channel(t, y), velocity=half)
+    write_record(faulty, tmp_path / "bag")
+    got = read_record(tmp_path / "bag", strict=False)
+    assert np.array_equal(got["ft"].y, y, equal_nan=True)
+    assert np.allclose(got["ft"].t, t, rtol=0, atol=1e-9)
+    assert np.array_equal(got["velocity"].y, half.y)
+    assert np.array_equal(got["position"].y, record["position"].y)
+
+
+def test_several_records_in_one_file(tmp_path, record):
+    other = record.with_channels(ft=Channel(record["ft"].t, record["ft"].y * 2))
+    maps = TopicMap(), TopicMap(namespace="/simulated")
+    path = tmp_path / "overlay.mcap"
+    write_records([(record, maps[0]), (other, maps[1])], path)
+    write_records([(record, maps[0]), (other, maps[1])], path)
+    assert_same(read_record(path, topics=maps[0]), record)
+    assert_same(read_record(path, topics=maps[1]), other)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_rosbags_finds_everything_in_order(tmp_path, record, storage):
+    write_record(record, tmp_path / "bag", storage=storage)
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 4 * 560
+        assert {topic: info.msgcount for topic, info in reader.topics.items()} == {
+            f"/rsea/{name}": 560 for name in ("torque_command", "joint_states", "ft", "desired_position")
+        }
+        assert reader.start_time == record.epoch_ns
+        times = [time for _, time, _ in reader.messages(reader.connections)]
+        assert times == sorted(times)
+        assert reader.end_time == times[-1] + 1
+    with AnyReader([tmp_path / "bag"]) as reader:  # with the definitions in the bag, no type store
+        (ft,) = (c for c in reader.connections if c.topic == "/rsea/ft")
+        values = [reader.deserialize(raw, c.msgtype).wrench.torque.z for c, _, raw in reader.messages([ft])]
+    assert values == record["ft"].y.tolist()
+
+
+def test_chunks_are_indexed_across_a_long_run(tmp_path):
+    """More than one chunk: rosbags reads by the index, which must lead to every message."""
+    with BagWriter(tmp_path / "bag") as bag:
+        for k in range(50_000):
+            bag.write("/a" if k % 3 else "/b", "std_msgs/msg/Bool", 10**18 + k, BOOL)
+    with Reader(tmp_path / "bag") as reader:
+        assert sum(1 for _ in reader.messages(reader.connections, start=10**18 + 30_000)) == 20_000
+        assert {name: info.msgcount for name, info in reader.topics.items()} == {"/a": 33_333, "/b": 16_667}
+
+
+@pytest.mark.parametrize(
+    ("storage", "plugin"), [("mcap", StoragePlugin.MCAP), ("sqlite3", StoragePlugin.SQLITE3)]
+)
+def test_metadata_equal_those_of_rosbags(tmp_path, storage, plugin):
+    theirs = write_foreign(tmp_path / "theirs" / "bag", run_rows(5), plugin)
+    with BagWriter(tmp_path / "bag", storage) as bag:
+        for topic, kind, log_time, raw in iterate(theirs):
+            bag.write(topic, kind, log_time, raw)
+    known, expected = (
+        yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+        for path in (tmp_path / "bag", theirs)
+    )
+    assert known.pop("ros_distro") == "rsea_ros"
+    expected.pop("ros_distro")
+    assert known == expected
+    assert list(iterate(tmp_path / "bag")) == list(iterate(theirs))
+
+
+def test_a_type_that_nobody_knows_is_recorded_all_the_same(tmp_path):
+    with BagWriter(tmp_path / "bag") as bag:
+        bag.write("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")
+    assert list(iterate(tmp_path / "bag")) == [("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")]
+
+
+def test_an_empty_recording_is_a_bag(tmp_path):
+    with BagWriter(tmp_path / "bag"):
+        pass
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 0
+
+
+def test_a_taken_name_is_refused_before_anything_is_written(tmp_path, record):
+    write_record(record, tmp_path / "bag")
+    with pytest.raises(BagError, match="bag: exists already, expected a new name"):
+        write_record(record, tmp_path / "bag")
+    with pytest.raises(BagError, match="storage 'tape', expected one of mcap, sqlite3"):
+        write_record(record, tmp_path / "other", storage="tape")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["bag"]
+
+
+@pytest.mark.parametrize("recording", [True, False])
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_failure_leaves_a_recording_and_no_result(tmp_path, recording, error):
+    with pytest.raises(error), BagWriter(tmp_path / "bag", recording=recording) as bag:
+        bag.write("/a", "std_msgs/msg/Bool", 5, BOOL)
+        bag.flush()
+        raise error
+    left = [entry.name for entry in tmp_path.iterdir()]
+    expected = {(True, RuntimeError): ["bag.partial"], (True, KeyboardInterrupt): ["bag"]}
+    assert left == expected.get((recording, error), [])
+    for name in left:
+        assert len(list(iterate(tmp_path / name))) == 1
+
+
+def _full_disk() -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_500_000, 1_500_000))
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize("recording", [True, False])
+def test_a_full_disk_is_one_error_and_loses_nothing_recorded(tmp_path, storage, recording):
+    """A limit on the size of files stands in for the full disk: the write fails half-way just the same."""
+    program = (
+        "import sys; from msg_adapters import BagWriter; from rsea_ros.errors import BagError\n"
+        "try:\n"
+        f"    with BagWriter(sys.argv[1], sys.argv[2], recording={recording}) as bag:\n"
+        "        for k in range(100_000):\n"
+        "            bag.write('/a', 'std_msgs/msg/Bool', 10 ** 18 + k, bytes([0, 1, 0, 0, 1]))\n"
+        "            if k % 10_000 == 0: bag.flush()\n"
+        "except BagError as error:\n"
+        "    print(error); sys.exit(2)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path / "bag"), storage],
+        preexec_fn=_full_disk,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=os.getcwd(),
+    )
+    assert (done.returncode, done.stderr) == (2, "")
+    assert done.stdout.startswith(f"{tmp_path}/bag: cannot be written: ")
+    assert [path.name for path in tmp_path.iterdir()] == (["bag.partial"] if recording else [])
+    if recording:
+        assert f"is in {tmp_path}/bag.partial" in done.stdout
+        assert len(list(iterate(tmp_path / "bag.partial"))) >= 10_000
+
+
+def test_a_directory_without_permission(tmp_path: Path):
+    with pytest.raises(BagError, match="/proc/nothing"):
+        BagWriter("/proc/nothing/bag").__enter__()
