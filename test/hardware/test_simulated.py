@@ -62,7 +62,7 @@ def test_a_command_acts_from_its_instant_on(offset):
     ft = np.array([s.wrench[5] for s in states])
     assert np.max(np.abs(ft - expected["ft"])) < 0.1 * rig.sensors["ft"].noise
     position = np.array([s.position for s in states])
-    assert np.max(np.abs(position - expected["position"])) < 0.3 * rig.sensors["position"].noise
+    assert np.max(np.abs(position - expected["position"])) < 0.5 * rig.sensors["position"].noise
 
 
 def test_stamps_are_the_cycle_ends_and_the_torque_is_the_held_one():
