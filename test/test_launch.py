@@ -1,0 +1,101 @@
+"""The launch files describe one graph. `launch` is not among the wheels: stand-ins record what they get."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LAUNCH = ROOT / "launch"
+API = {
+    "launch": ["LaunchDescription"],
+    "launch.actions": ["DeclareLaunchArgument", "IncludeLaunchDescription"],
+    "launch.conditions": ["IfCondition"],
+    "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
+    "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution"],
+    "launch_ros": [],
+    "launch_ros.actions": ["Node"],
+}
+
+
+class Part:
+    """An action or a substitution: its kind and what it was made from."""
+
+    def __init__(self, kind: str, *arguments: Any, **options: Any) -> None:
+        self.kind, self.arguments, self.options = kind, arguments, options
+
+
+@pytest.fixture
+def describe(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[Part]]:
+    """Return a function that gives the parts that a launch file describes."""
+    for name, kinds in API.items():
+        module = types.ModuleType(name)
+        for kind in kinds:
+            setattr(module, kind, lambda *a, kind=kind, **o: Part(kind, *a, **o))
+        monkeypatch.setitem(sys.modules, name, module)
+
+    def parts(name: str) -> list[Part]:
+        spec = importlib.util.spec_from_file_location(name.replace(".", "_"), LAUNCH / f"{name}.launch.py")
+        assert spec and spec.loader
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return list(module.generate_launch_description().arguments[0])
+
+    return parts
+
+
+def configurations(part: Any) -> set[str]:
+    """Return the names of the launch arguments that a part uses, at any depth."""
+    if isinstance(part, Part):
+        own = {part.arguments[0]} if part.kind == "LaunchConfiguration" else set()
+        return own | configurations([part.arguments, part.options])
+    if isinstance(part, dict):
+        return configurations(list(part.values()))
+    return set().union(*map(configurations, part)) if isinstance(part, list | tuple) else set()
+
+
+def defaults(parts: list[Part]) -> dict[str, str | None]:
+    """Return the default of every launch argument that is declared; None where one must be given."""
+    declared = (part for part in parts if part.kind == "DeclareLaunchArgument")
+    return {part.arguments[0]: part.options.get("default_value") for part in declared}
+
+
+FIRST = {"simulation": "plant", "hardware": "driver", "replay": "replay"}
+
+
+@pytest.mark.parametrize(("name", "first"), FIRST.items())
+def test_a_launch_file_is_the_graph_behind_its_first_node(describe, name, first):
+    (include,) = describe(name)
+    assert include.kind == "IncludeLaunchDescription"
+    assert include.arguments[0].arguments == (str(LAUNCH / "graph.launch.py"),)
+    assert include.options["launch_arguments"] == [("first", first)]
+
+
+def test_no_launch_file_is_untested():
+    assert {path.name.removesuffix(".launch.py") for path in LAUNCH.glob("*.py")} == {"graph", *FIRST}
+
+
+def test_the_graph_declares_every_argument_that_it_uses(describe):
+    parts = describe("graph")
+    assert configurations(parts) == set(defaults(parts))
+
+
+def test_only_the_first_node_and_identify_start_unasked(describe):
+    parts = describe("graph")
+    first, *others = (part.options for part in parts if part.kind == "Node")
+    assert first["condition"] is None
+    assert configurations(first["executable"]) == {"first"}
+    asked = {node["executable"]: configurations(node["condition"]) for node in others}
+    assert asked == {name: {name} for name in ("identify", "record", "excite")}
+    assert [defaults(parts)[name] for name in asked] == ["true", "false", "false"]
+
+
+def test_every_node_of_the_graph_has_a_parameter_file():
+    for name in ("plant", "driver", "replay", "identify", "record", "excite"):
+        assert (ROOT / "config" / "nodes" / f"{name}.yaml").is_file(), name
