@@ -9,7 +9,7 @@ from numba import types
 from numba.extending import intrinsic
 
 
-@intrinsic  # type: ignore[misc]
+@intrinsic
 def call(typingctx: Any, address: Any, s: Any, p: Any, x: Any) -> Any:
     """Call `void f(double*, double*, double*)` at an address with three addresses, all given as integers."""
 

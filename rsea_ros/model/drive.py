@@ -56,7 +56,9 @@ def drive_from(record: Record, *, refine: int = 1, closed_loop: bool = False) ->
     """
     command = record["command"]
     if len(command) < 10:
-        raise IdentificationError(f"{record.source}: command has {len(command)} samples, expected at least 10")
+        raise IdentificationError(
+            f"{record.source}: command has {len(command)} samples, expected at least 10"
+        )
     period = _period(command.t)
     step = period / (steps_per_sample(period) * refine)
     start = float(command.t[0])
@@ -64,7 +66,9 @@ def drive_from(record: Record, *, refine: int = 1, closed_loop: bool = False) ->
     count = math.ceil((stop - start) / step - 1e-6)
     held = _mean_of_held(command.t - start, command.y, step, count)
     if closed_loop:
-        held = held - _mean_of_held(command.t - start, np.interp(command.t, *_ty(record["motor_torque"])), step, count)
+        held = held - _mean_of_held(
+            command.t - start, np.interp(command.t, *_ty(record["motor_torque"])), step, count
+        )
     ends = start + step * np.arange(1, count + 1)
     return Drive(
         step=step,
@@ -96,7 +100,7 @@ def _initial(record: Record) -> tuple[float, float]:
     return position, velocity
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _mean_of_held(t, y, step, count):  # type: ignore[no-untyped-def]
     """Return the mean over each step of the piecewise constant signal y held from its stamps t (s)."""
     means, k = np.empty(count), 0
@@ -112,7 +116,7 @@ def _mean_of_held(t, y, step, count):  # type: ignore[no-untyped-def]
     return means
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _sample_smooth(values, at):  # type: ignore[no-untyped-def]
     """Interpolate values at steps 0, 1, 2, … at fractional steps, by cubics through four points."""
     out, last = np.empty(len(at)), len(values) - 1
@@ -125,7 +129,7 @@ def _sample_smooth(values, at):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True)
 def _sample_held(values, at):  # type: ignore[no-untyped-def]
     """Return the value of the step that ends nearest to each instant (a hold that just ended)."""
     out = np.empty(len(at))
@@ -139,5 +143,3 @@ def sample(name: str, values: FloatArray, at: FloatArray) -> FloatArray:
     sampler = _sample_held if name == "motor_torque" else _sample_smooth
     result: FloatArray = sampler(values, at)
     return result
-
-

@@ -4,6 +4,7 @@ Coordinates (absolute angles, rad): h housing, g gear output before the gear's o
 c spring chassis, d distal output. The rotor turns at
 
     w_rotor = w_h + n (w_g - w_h),   n = N (planetary) or -(N - 1) (star: annulus and carrier exchanged)
+    w_rotor = N w_g                  (lumped: grounded, as if the housing's motion did not turn it)
 
 so with J_r = J_m / N^2 the kinetic energy
 
@@ -25,13 +26,14 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 H, G, C, D = range(4)
+END_COORDINATES = ((H, "housing_end"), (D, "spring_end"))
 
 PORTS = ("gear", "spring", "joint", "housing", "distal")
 """Where a torque can act. gear: on the gear output against the housing (the motor's torque acts here);
 spring: in the spring, positive when it pushes the distal side forward; joint: between gear output and
 chassis, positive when it pushes the chassis forward; housing, distal: from outside on that end."""
 
-_PORT_DIRECTIONS = np.array(
+PORT_DIRECTIONS = np.array(
     [
         [-1.0, 1.0, 0.0, 0.0],
         [0.0, 0.0, -1.0, 1.0],
@@ -62,8 +64,8 @@ class Mechanics:
 
 
 def train_ratio(rig: Rig) -> float:
-    """Return n of w_rotor = w_h + n (w_g - w_h)."""
-    return rig["gear.ratio"] if rig.train == "planetary" else -(rig["gear.ratio"] - 1.0)
+    """Return n, the rotor's turns for one of the gear output, both against the housing."""
+    return -(rig["gear.ratio"] - 1.0) if rig.train == "star" else rig["gear.ratio"]
 
 
 def rotor_inertia(rig: Rig) -> float:
@@ -78,24 +80,35 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
     leaves it out here and adds m g l sin(theta) itself.
     """
     placement = _placement(rig)
-    mass = placement.T @ _full_mass(rig) @ placement
+    mass, damping, stiffness = (
+        placement.T @ (inside + load) @ placement
+        for inside, load in zip(actuator_matrices(rig), _load_matrices(rig, linear_gravity), strict=True)
+    )
     if np.linalg.eigvalsh(mass).min() <= 0.0:
-        raise RigError(f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move")
+        raise RigError(
+            f"rig {rig.name}: the mass matrix is singular, expected an inertia on every part that can move"
+        )
     return Mechanics(
         mass=mass,
-        damping=placement.T @ _full_damping(rig) @ placement,
-        stiffness=placement.T @ _full_stiffness(rig, linear_gravity) @ placement,
-        ports=_PORT_DIRECTIONS @ placement,
+        damping=damping,
+        stiffness=stiffness,
+        ports=PORT_DIRECTIONS @ placement,
         placement=placement,
     )
 
 
-def _placement(rig: Rig) -> FloatArray:
-    """Return P of q_full = P q: one column for each coordinate that moves on its own."""
+def owners(rig: Rig) -> dict[int, int]:
+    """Return which coordinate each of H, G, C, D moves with (a stiff gear, a rigid spring)."""
     owner = {H: H, G: G, C: G if math.isinf(rig["gear.stiffness"]) else C, D: D}
     if rig.rigid_spring:
         owner[D] = owner[C]
-    fixed = {owner[coordinate] for coordinate, end in ((H, "housing_end"), (D, "spring_end")) if end in rig.clamped}
+    return owner
+
+
+def _placement(rig: Rig) -> FloatArray:
+    """Return P of q_full = P q: one column for each coordinate that moves on its own."""
+    owner = owners(rig)
+    fixed = {owner[end] for end, name in END_COORDINATES if name in rig.clamped}
     moving = [c for c in sorted(set(owner.values())) if c not in fixed]
     placement = np.zeros((4, len(moving)))
     for coordinate in (H, G, C, D):
@@ -104,34 +117,31 @@ def _placement(rig: Rig) -> FloatArray:
     return placement
 
 
-def _full_mass(rig: Rig) -> FloatArray:
-    n, j_r = train_ratio(rig), rotor_inertia(rig)
-    mass = np.zeros((4, 4))
-    mass[np.ix_((H, G), (H, G))] = j_r * np.array([[(1 - n) ** 2, n * (1 - n)], [n * (1 - n), n**2]])
+def actuator_matrices(rig: Rig) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return mass, damping and stiffness of all that is between the two ends, shape (4, 4) each."""
+    mass, stiffness = np.zeros((4, 4)), np.zeros((4, 4))
+    n = train_ratio(rig)
+    rotor = np.array([0.0 if rig.train == "lumped" else 1.0 - n, n])  # its speed by those of h and g
+    mass[np.ix_((H, G), (H, G))] = rotor_inertia(rig) * np.outer(rotor, rotor)
     mass[C, C] += rig["chassis.inertia"]
-    for coordinate, end in ((H, "housing_end"), (D, "spring_end")):
-        if rig.end_is_free(end):
-            mass[coordinate, coordinate] += rig[f"{end}.inertia"]
-    return mass
-
-
-def _full_damping(rig: Rig) -> FloatArray:
     damping = _between(H, G, rig["rotor.reflected_damping"]) + _between(C, D, rig["spring.damping"])
-    damping[H, H] += rig["housing_end.damping"]
-    damping[D, D] += rig["spring_end.damping"]
-    return damping
-
-
-def _full_stiffness(rig: Rig, linear_gravity: bool) -> FloatArray:
-    stiffness = np.zeros((4, 4))
     if not rig.rigid_spring:
         stiffness += _between(C, D, rig["spring.stiffness"])
     if math.isfinite(rig["gear.stiffness"]):
         stiffness += _between(G, C, rig["gear.stiffness"])
-    for coordinate, end in ((H, "housing_end"), (D, "spring_end")):
-        gravity = rig[f"{end}.gravity"] if linear_gravity else 0.0
-        stiffness[coordinate, coordinate] += rig[f"{end}.stiffness"] + gravity
-    return stiffness
+    return mass, damping, stiffness
+
+
+def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return mass, damping and stiffness of what is on the ends."""
+    mass, damping, stiffness = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    for end, name in END_COORDINATES:
+        if rig.end_is_free(name):
+            gravity = rig[f"{name}.gravity"] if linear_gravity else 0.0
+            mass[end, end] = rig[f"{name}.inertia"]
+            damping[end, end] = rig[f"{name}.damping"]
+            stiffness[end, end] = rig[f"{name}.stiffness"] + gravity
+    return mass, damping, stiffness
 
 
 def _between(a: int, b: int, value: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """The position loop that ran while a record was made, at the command port.
 
-    command += k_v (k_p (reference - q) - dq/dt), limited
+command += k_v (k_p (reference - q) - dq/dt), limited
 """
 
 from rsea_ros.effects.effect import compiled

@@ -10,11 +10,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, get_args
 
 from rsea_ros.errors import RigError
 
-Train = Literal["planetary", "star"]
+Train = Literal["planetary", "star", "lumped"]
 END_NAMES = ("housing_end", "spring_end")
 
 
@@ -177,12 +177,18 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
 def _check_structure(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    if rig.train not in ("planetary", "star"):
-        raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, expected planetary or star")
+    if rig.train not in get_args(Train):
+        raise RigError(
+            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}"
+        )
     if rig.proximal not in END_NAMES:
         raise RigError(f"rig {rig.name}: proximal = {rig.proximal!r}, expected one of {', '.join(END_NAMES)}")
     if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
-        raise RigError(f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move")
+        raise RigError(
+            f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
+        )
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
-        raise RigError(f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`")
+        raise RigError(
+            f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
+        )
     rig["rotor.reflected_inertia"], rig["rotor.reflected_damping"]

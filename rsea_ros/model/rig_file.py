@@ -9,14 +9,24 @@ from __future__ import annotations
 import math
 import os
 import sysconfig
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from rsea_ros.errors import RigError
-from rsea_ros.model.rig import END_NAMES, FIELDS, Controller, EffectSetting, Field, Quantity, Rig, Sensor, check_value
+from rsea_ros.model.rig import (
+    END_NAMES,
+    FIELDS,
+    Controller,
+    EffectSetting,
+    Field,
+    Quantity,
+    Rig,
+    Sensor,
+    check_value,
+)
 from rsea_ros.signals import UNITS
 
 _GROUPS = sorted({name.split(".")[0] for name in FIELDS})
@@ -39,7 +49,10 @@ def rig_path(name_or_path: str | Path) -> Path:
 def rig_folders() -> list[Path]:
     """Return where rigs lie: beside the source, or in the share of the installed package."""
     here = Path(__file__).resolve()
-    candidates = [here.parents[2] / "config" / "rigs", Path(sysconfig.get_path("data")) / "share/rsea_ros/config/rigs"]
+    candidates = [
+        here.parents[2] / "config" / "rigs",
+        Path(sysconfig.get_path("data")) / "share/rsea_ros/config/rigs",
+    ]
     candidates += [parent / "share/rsea_ros/config/rigs" for parent in here.parents[3:7]]
     return [folder for folder in candidates if folder.is_dir()]
 
@@ -67,6 +80,7 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
     groups = {g: _mapping(document.get(g, {}), g) for g in _GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
     clamped = frozenset(end for end in END_NAMES if _switch(groups[end], f"{end}.clamped"))
+    effects = _effects(document.get("effects", []))
     return Rig(
         name=_text(document.get("name", default_name), "name"),
         about=_text(document.get("about", ""), "about"),
@@ -76,10 +90,10 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
         rigid_spring=_switch(groups["spring"], "spring.rigid"),
         train=groups["gear"].get("train", "planetary"),
         sensors=_sensors(_mapping(document.get("sensors", {}), "sensors")),
-        known=_known(document.get("known", []), quantities),
+        known=_known(document.get("known", []), [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)]),
         proximal=_text(document.get("proximal", "housing_end"), "proximal"),
         controller=_controller(document.get("controller")),
-        effects=_effects(document.get("effects", [])),
+        effects=effects,
     )
 
 
@@ -87,13 +101,20 @@ def save_rig(rig: Rig, path: str | Path) -> None:
     """Write a rig as YAML that `load_rig` reads back to the same rig; aside first, then renamed."""
     path = Path(path)
     aside = path.with_name(path.name + ".partial")
-    aside.write_text(yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True), encoding="utf-8")
+    aside.write_text(
+        yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True), encoding="utf-8"
+    )
     os.replace(aside, path)
 
 
 def rig_to_document(rig: Rig) -> dict[str, Any]:
     """Return the rig as the mapping that its YAML file holds."""
-    document: dict[str, Any] = {"name": rig.name, "about": rig.about, "source": rig.source, "proximal": rig.proximal}
+    document: dict[str, Any] = {
+        "name": rig.name,
+        "about": rig.about,
+        "source": rig.source,
+        "proximal": rig.proximal,
+    }
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -103,10 +124,18 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     if rig.rigid_spring:
         document.setdefault("spring", {})["rigid"] = True
     document["known"] = sorted(rig.known)
-    document["sensors"] = {n: {"noise": s.noise, "quantum": s.quantum, "unit": UNITS[n]} for n, s in rig.sensors.items()}
+    document["sensors"] = {
+        n: {"noise": s.noise, "quantum": s.quantum, "unit": UNITS[n]} for n, s in rig.sensors.items()
+    }
     if rig.controller:
-        document["controller"] = {"k_p": rig.controller.k_p, "k_v": rig.controller.k_v, "limit": rig.controller.limit}
-    document["effects"] = [{"name": e.name, "parameters": {k: float(v) for k, v in e.parameters.items()}} for e in rig.effects]
+        document["controller"] = {
+            "k_p": rig.controller.k_p,
+            "k_v": rig.controller.k_v,
+            "limit": rig.controller.limit,
+        }
+    document["effects"] = [
+        {"name": e.name, "parameters": {k: float(v) for k, v in e.parameters.items()}} for e in rig.effects
+    ]
     return document
 
 
@@ -125,7 +154,11 @@ def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity
     switches = _SWITCHES.get(group, set())
     allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
     _only_keys(body, allowed | switches, group)
-    return [(f"{group}.{key}", _quantity(f"{group}.{key}", item)) for key, item in body.items() if key not in switches]
+    return [
+        (f"{group}.{key}", _quantity(f"{group}.{key}", item))
+        for key, item in body.items()
+        if key not in switches
+    ]
 
 
 def _quantity(name: str, item: Any) -> Quantity:
@@ -151,19 +184,23 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
         _only_keys(fields, {"noise", "quantum", "unit", "source"}, f"sensors.{name}")
         if fields.get("unit") != UNITS[name]:
             raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
-        noise, quantum = (number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum"))
+        noise, quantum = (
+            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
+        )
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
-            raise RigError(f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0")
+            raise RigError(
+                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
+            )
         sensors[name] = Sensor(noise, quantum)
     return sensors
 
 
-def _known(items: Any, quantities: Mapping[str, Quantity]) -> frozenset[str]:
+def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
     if not isinstance(items, list):
         raise RigError(f"known = {items!r}, expected a list of field names")
     for item in items:
-        if item not in quantities:
-            raise RigError(f"known: {item!r}, expected a field that this rig states: {', '.join(quantities)}")
+        if item not in stated:
+            raise RigError(f"known: {item!r}, expected a value that this rig states: {', '.join(stated)}")
     return frozenset(items)
 
 

@@ -18,13 +18,14 @@ from rsea_ros.effects.effect import Effect
 from rsea_ros.model.drive import Drive, drive_from, sample, steps_per_sample
 from rsea_ros.model.loop import control
 from rsea_ros.model.propagator import propagator
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.signals import Channel, FloatArray, Record
 
+
 @dataclass(frozen=True)
 class Machine:
-    """A rig made ready for the step: propagators, calls of its effects, and its state, which the step changes."""
+    """A rig made ready for the step: propagators, calls of its effects, and state for the step to change."""
 
     linear: Linear
     calls: Calls
@@ -57,7 +58,8 @@ def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, F
 
 def _middles(ends: FloatArray) -> FloatArray:
     """Return the values at the middle of each step from those at their ends."""
-    return 0.5 * (ends + np.concatenate([ends[:1], ends[:-1]]))
+    middles: FloatArray = 0.5 * (ends + np.concatenate([ends[:1], ends[:-1]]))
+    return middles
 
 
 def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float = 0.0,
@@ -82,7 +84,7 @@ def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] =
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
-    table[[st.K_S, st.B_S, st.B_M]] = _constants(rig)
+    table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
     table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
     x = np.linalg.pinv(linear.outputs[:2]) @ np.array(initial) if any(initial) else np.zeros(len(linear.phi))
     table[[st.POSITION, st.OUTPUT_ANGLE]], table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
@@ -90,12 +92,14 @@ def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] =
     return Machine(linear, calls, x, table, np.zeros(states))
 
 
-def _constants(rig: Rig) -> tuple[float, float, float]:
+def _constants(rig: Rig) -> tuple[float, float, float, float]:
     k_s = 0.0 if rig.rigid_spring else rig["spring.stiffness"]
-    return k_s, rig["spring.damping"], rig["rotor.reflected_damping"]
+    return k_s, rig["spring.damping"], rig["rotor.reflected_damping"], rig["chassis.inertia"]
 
 
-def _calls(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]], in_loop: bool) -> tuple[Calls, int]:
+def _calls(
+    rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]], in_loop: bool
+) -> tuple[Calls, int]:
     """Return the calls in the order of the ports, and how many states they own."""
     items: list[tuple[st.Port, int, Any, tuple[float, ...], int]] = [
         (e.port, e.order, e.function, e.vector(p), e.states) for e, p in active
@@ -112,7 +116,8 @@ def _calls(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]], in_lo
         p_at=np.cumsum([0, *p_sizes], dtype=np.int64),
         x_at=np.cumsum([0, *x_sizes], dtype=np.int64),
         p=np.array([v for i in items for v in i[3]] or [0.0]),
-        nonlinear=st.Port.GEAR in ports or st.Port.SPRING in ports or rig["housing_end.gravity"] != 0.0 or rig["spring_end.gravity"] != 0.0,
+        nonlinear=bool({st.Port.GEAR, st.Port.SPRING} & set(ports))
+        or any(rig[f"{e}.gravity"] for e in END_NAMES),
     )
     return calls, max(1, sum(x_sizes))
 
@@ -151,7 +156,9 @@ class Sample:
 class Plant:
     """A bench that is stepped one sample at a time, with the noise and the quantum of its sensors."""
 
-    def __init__(self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0) -> None:
+    def __init__(
+        self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0
+    ) -> None:
         """rate: samples a second. duration: over which drifts come to their full size, s."""
         self._rig, self._noise, self._duration = rig, noise, duration
         self._count = steps_per_sample(1.0 / rate)

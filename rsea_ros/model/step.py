@@ -63,13 +63,13 @@ class Calls(NamedTuple):
     nonlinear: bool
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
-def _call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
     for i in range(calls.first[port], calls.first[port + 1]):
-        call(calls.address[i], s_at, p_at + 8 * calls.p_at[i], own_at + 8 * calls.x_at[i])
+        call(calls.address[i], s_at, p_at + 8 * calls.p_at[i], own_at + 8 * calls.x_at[i])  # type: ignore[call-arg]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _dot(row, x):  # type: ignore[no-untyped-def]
     value = 0.0
     for j in range(len(x)):
@@ -77,7 +77,7 @@ def _dot(row, x):  # type: ignore[no-untyped-def]
     return value
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _read(linear, x, s):  # type: ignore[no-untyped-def]
     """Put the signals that effects look at into the table, and clear the torques."""
     for r in range(len(linear.rows)):
@@ -92,13 +92,16 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
         s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE])
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _add_torques(linear, s, a):  # type: ignore[no-untyped-def]
-    for i in range(len(a)):
-        a[i] += _dot(linear.g[i], s[st.FIRST_FORCE : st.FIRST_FORCE + _FORCES])
+    for j in range(_FORCES):
+        torque = s[st.FIRST_FORCE + j]
+        if torque != 0.0:
+            for i in range(len(a)):
+                a[i] += linear.g[i, j] * torque
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
     """Put what the sensors of the nominal actuator see into the table."""
     s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs[0], x)
@@ -106,7 +109,7 @@ def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
     s[st.FT] = _dot(linear.outputs[2], x) + s[st.SPRING_TORQUE]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, error_model="numpy")
 def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  # type: ignore[no-untyped-def]
     """Run the steps of `command` (N m, held over each), in place.
 
@@ -121,9 +124,9 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
         s[st.TIME], s[st.COMMAND] = start + k * h, command[k]
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
-        _call_port(_COMMAND, calls, s_at, p_at, own_at)
+        call_port(_COMMAND, calls, s_at, p_at, own_at)
         s[st.CURRENT] = s[st.COMMAND]
-        _call_port(_MOTOR, calls, s_at, p_at, own_at)
+        call_port(_MOTOR, calls, s_at, p_at, own_at)
         for i in range(n):
             free[i] = end[i] = linear.g[i, 0] * s[st.COMMAND] + _dot(linear.phi[i], x)
         if calls.nonlinear:
@@ -136,8 +139,8 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
             _read(linear, middle, s)
             if len(ridden) > 0:
                 s[st.ROTOR_ANGLE] = ridden[k]
-            _call_port(_GEAR, calls, s_at, p_at, own_at)
-            _call_port(_SPRING, calls, s_at, p_at, own_at)
+            call_port(_GEAR, calls, s_at, p_at, own_at)
+            call_port(_SPRING, calls, s_at, p_at, own_at)
             for i in range(n):
                 end[i] = free[i]
             _add_torques(linear, s, end)
@@ -148,8 +151,8 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
             held = s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE]
             s[st.COMMIT], s[st.DEFLECTION_SPAN] = 1.0, 0.0
             _read(linear, x, s)
-            _call_port(_SPRING, calls, s_at, p_at, own_at)
+            call_port(_SPRING, calls, s_at, p_at, own_at)
             s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
         _read_outputs(linear, x, s)
-        _call_port(_SENSOR, calls, s_at, p_at, own_at)
+        call_port(_SENSOR, calls, s_at, p_at, own_at)
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT], s[st.FT]

@@ -1,0 +1,102 @@
+"""Up to where an actuator is a pure torque source: Eq. (7), and the exact band in magnitude and phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from control import TransferFunction
+from numpy.polynomial import polynomial
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.equations import rotor_inertia, train_ratio
+from rsea_ros.model.outputs import Sees
+from rsea_ros.model.paper_formulas import eq_7_bandwidth
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.transfer import distal_per_proximal
+from rsea_ros.signals import FloatArray
+
+pure_torque_bandwidth = eq_7_bandwidth
+"""Eq. (7): Hz from K_s (N m/rad) and J_sc (kg m^2)."""
+
+
+def inner_inertia(rig: Rig) -> float:
+    """Return J_sc + n J_r, kg m^2: what (T_p - T_d) / q_c'' is with both ends clamped.
+
+    n J_r = J_m / N for a planetary train is the spin of the rotor, which Eqs. (5) to (7) leave out.
+    Negative where a star train turns the rotor backward.
+    """
+    return rig["chassis.inertia"] + train_ratio(rig) * rotor_inertia(rig)
+
+
+def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
+    """Return T_d / T_p of the rig with both ends clamped, exact: what Eq. (6) approximates."""
+    return distal_per_proximal(replace(rig, clamped=frozenset(END_NAMES)), sees)
+
+
+def flat_band(function: TransferFunction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0) -> float:
+    """Return the frequency, Hz, up to which a transfer function stays within tolerances of 1, or inf.
+
+    Exact: |f|^2 = 10^(±dB/10) and tan(arg f) = ±tan(deg) are polynomials in the frequency. 90 degrees leave
+    the phase out of account. Raises ParameterError for tolerances that are none.
+    """
+    if not (tolerance_db > 0.0 and 0.0 < tolerance_deg <= 90.0):
+        raise ParameterError(
+            f"tolerances {tolerance_db:g} dB, {tolerance_deg:g} deg, expected > 0 dB, > 0 to 90 deg"
+        )
+    top, bottom = _parts(function)
+    top_square, bottom_square = _inner(top, top), _inner(bottom, bottom)
+    edges = [
+        polynomial.polysub(top_square, 10 ** (db / 10.0) * bottom_square)
+        for db in (tolerance_db, -tolerance_db)
+    ]
+    if tolerance_deg < 90.0:
+        turned = polynomial.polysub(
+            polynomial.polymul(top[1], bottom[0]), polynomial.polymul(top[0], bottom[1])
+        )
+        along, slope = _inner(top, bottom), math.tan(math.radians(tolerance_deg))
+        edges += [polynomial.polysub(turned, sign * slope * along) for sign in (1.0, -1.0)]
+    roots = np.concatenate([_positive_roots(edge) for edge in edges])
+    return float(roots.min()) / (2.0 * math.pi) if len(roots) else math.inf
+
+
+def resonance_peak(function: TransferFunction) -> tuple[float, float]:
+    """Return where |f| is highest, Hz, and how high, dB; (0, gain at rest) where it only falls."""
+    top, bottom = (_inner(part, part) for part in _parts(function))
+    slope = polynomial.polysub(
+        polynomial.polymul(polynomial.polyder(top), bottom),
+        polynomial.polymul(top, polynomial.polyder(bottom)),
+    )
+    candidates = np.concatenate([[0.0], _positive_roots(slope)])
+    gains = polynomial.polyval(candidates, top) / polynomial.polyval(candidates, bottom)
+    best = int(np.argmax(gains))
+    return float(candidates[best]) / (2.0 * math.pi), float(10.0 * np.log10(gains[best]))
+
+
+_Complex = tuple[FloatArray, FloatArray]
+
+
+def _parts(function: TransferFunction) -> tuple[_Complex, _Complex]:
+    """Return numerator and denominator at s = i w: real and imaginary polynomials in w, lowest first."""
+    return _at_imaginary(function.num[0][0]), _at_imaginary(function.den[0][0])
+
+
+def _at_imaginary(highest_first: FloatArray) -> _Complex:
+    lowest_first = np.asarray(highest_first, dtype=np.float64)[::-1]
+    values = lowest_first * 1j ** np.arange(len(lowest_first))
+    return values.real, values.imag
+
+
+def _inner(a: _Complex, b: _Complex) -> FloatArray:
+    """Return Re(a conj(b)) as a polynomial."""
+    product = polynomial.polyadd(polynomial.polymul(a[0], b[0]), polynomial.polymul(a[1], b[1]))
+    return np.asarray(product, dtype=np.float64)
+
+
+def _positive_roots(p: npt.NDArray[np.floating]) -> FloatArray:
+    """Return the real roots above zero, rad/s."""
+    roots = polynomial.polyroots(polynomial.polytrim(p))
+    real: FloatArray = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
+    return real

@@ -1,0 +1,106 @@
+"""The inverse model: the motor torque that a measured motion takes.
+
+A drive without a spring drifts freely, so a simulation on its commands runs away from the measurement and
+the right model may look worse than the wrong one (realdata README, emps). The field's way is the inverse
+dynamic model (Gautier, Janot et al.): filter the measured position both ways, differentiate, and compare
+torques, filtered alike:
+
+    T = J q'' + D q' + K q + m g l sin(q) - (torques of the effects)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy import signal
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.errors import IdentificationError
+from rsea_ros.model.equations import mechanics, train_ratio
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import build
+from rsea_ros.model.step import call_port
+from rsea_ros.signals import FloatArray, Record
+
+CUT_OFF = 20.0
+"""Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""
+
+
+_MOTOR, _GEAR = int(st.Port.MOTOR), int(st.Port.GEAR)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m)."""
+
+    t: FloatArray
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    torque: FloatArray
+
+
+def is_inverse(rig: Rig) -> bool:
+    """Tell whether a rig is judged by torque: no spring holds it, so it drifts."""
+    return rig.rigid_spring
+
+
+def motion_from(record: Record) -> Motion:
+    """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
+    if "position" not in record:
+        raise IdentificationError(f"{record.source}: no position channel, expected one: a rig without a spring is judged by its motion")
+    position = record["position"]
+    period = 1.0 / position.rate
+    t = np.arange(position.t[0], position.t[-1] + 0.5 * period, period)
+    numerator, denominator = signal.butter(4, min(CUT_OFF * 2.0 * period, 0.8))
+    q = signal.filtfilt(numerator, denominator, np.interp(t, position.t, position.y))
+    acted = record["motor_torque" if "motor_torque" in record else "command"]
+    torque = np.interp(t, acted.t, acted.y)
+    v = np.gradient(q, period)
+    return Motion(t, q, v, np.gradient(v, period), signal.filtfilt(numerator, denominator, torque))
+
+
+def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
+    """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
+    m = mechanics(rig, linear_gravity=False)
+    if m.order != 1 or "housing_end" not in rig.clamped:
+        raise IdentificationError(f"rig {rig.name}: {m.order} moving parts, expected one on a clamped housing for the inverse model")
+    period = float(motion.t[1] - motion.t[0])
+    machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
+    torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
+    torque = torque + rig["spring_end.gravity"] * np.sin(motion.q)
+    gains = motor_gain(machine.calls, machine.table, machine.own)
+    added = _effect_torques(machine.calls, machine.table, machine.own, motion.q, motion.v, train_ratio(rig))
+    numerator, denominator = signal.butter(4, min(CUT_OFF * 2.0 * period, 0.8))
+    result: FloatArray = (torque - signal.filtfilt(numerator, denominator, added)) / gains
+    return result
+
+
+def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
+    """Return the one channel of an inverse comparison."""
+    return {"motor_torque": inverse_torque(rig, motion)}
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def motor_gain(calls, s, own):  # type: ignore[no-untyped-def]
+    """Return what the effects at the motor make of a torque of 1 N m."""
+    s[st.COMMAND] = 1.0
+    call_port(_MOTOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+    return s[st.COMMAND]
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _effect_torques(calls, s, own, q, v, ratio):  # type: ignore[no-untyped-def]
+    """Return what the effects add at the gear along a motion, N m."""
+    added = np.empty(len(q))
+    s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
+    for k in range(len(q)):
+        s[st.TIME] = k * s[st.STEP]
+        s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], ratio * q[k]
+        s[st.GEAR_TORQUE] = 0.0
+        call_port(_GEAR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        added[k] = s[st.GEAR_TORQUE]
+    return added

@@ -1,0 +1,15 @@
+"""The traditional lumped model of a rig, which the paper argues against.
+
+The reflected rotor inertia is taken for an inertia of the chassis against the ground, J_eff = J_sc + J_m,
+and the motor for a torque between ground and chassis: the housing's motion is left out. With both ends
+clamped this changes T_p, Eqs. (2) and (3), and nothing in T_d, Eq. (1).
+"""
+
+from dataclasses import replace
+
+from rsea_ros.model.rig import Rig
+
+
+def lumped(rig: Rig) -> Rig:
+    """Return the rig as the lumped model sees it; every function of the model takes it."""
+    return replace(rig, name=f"{rig.name}, lumped", train="lumped", clamped=rig.clamped | {"housing_end"})
