@@ -35,8 +35,8 @@ def scan(path: Path, contents: Contents) -> None:
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
             try:
                 complete = _Scanner(contents).run(buffer, len(MAGIC), len(buffer))
-            except (*ERRORS, ValueError, KeyError, struct.error) as error:
-                raise ValueError(f"damaged MCAP: {error!s}") from None
+            except (*ERRORS, ValueError, struct.error) as error:
+                raise ValueError(f"damaged MCAP: {error}") from None
     if not complete:
         contents.notes.append("cut off (recorder killed?), read up to its last complete message")
 
@@ -63,7 +63,7 @@ class _Scanner:
                 return False
             if opcode == MESSAGE:
                 channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(buffer, first)
-                sink = self.sinks[channel]
+                sink = self._sink(channel)
                 if sink is not None:
                     sink.log_times.append(log_time)
                     sink.raw.append(buffer[first + MESSAGE_HEAD.size : at])
@@ -72,6 +72,11 @@ class _Scanner:
             elif opcode == CHANNEL:
                 self._channel(buffer, first)
         return False
+
+    def _sink(self, channel: int) -> Messages | None:
+        if channel not in self.sinks:
+            raise ValueError(f"message of channel {channel}, which nothing declares before it")
+        return self.sinks[channel]
 
     def _channel(self, buffer: Buffer, first: int) -> None:
         topic, at = _text(buffer, first + 4)

@@ -13,6 +13,7 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
@@ -98,6 +99,20 @@ def diagnostics_message(
     )
     message.header.stamp = time_of(stamp_ns)
     return message
+
+
+def parameter_descriptor(
+    description: str, constraints: str = "", bounds: tuple[float, float] | tuple[int, int] | None = None
+) -> ParameterDescriptor:
+    """Return what a node says of a parameter that is fixed once it runs; bounds are inclusive."""
+    descriptor = ParameterDescriptor(
+        description=description, additional_constraints=constraints, read_only=True
+    )
+    if bounds is not None and isinstance(bounds[0], int):
+        descriptor.integer_range = [IntegerRange(from_value=bounds[0], to_value=int(bounds[1]))]
+    elif bounds is not None:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=bounds[0], to_value=bounds[1])]
+    return descriptor
 
 
 def effort_of(message: JointState, joint: str | None = None) -> tuple[int, float]:

@@ -20,20 +20,18 @@ def repaired(t: FloatArray) -> tuple[FloatArray, str]:
     first = np.flatnonzero(np.diff(t, prepend=-np.inf))
     if len(first) == len(t) or len(first) < 2:
         return t, ""
-    ticks = t[first]
     counts = np.diff(first, append=len(t))
-    spans = np.diff(ticks)
+    spans = np.diff(t[first])
     tick = float(np.median(spans))
     spans = np.append(np.where(spans > LONG * tick, tick, spans), tick)
-    period = tick / float(np.median(counts))
     steps = spans / counts
-    steps[-1] = min(period, steps[-1])
+    steps[-1] = min(steps[-2:])
     place = np.arange(len(t)) - np.repeat(first, counts)
-    spread = np.repeat(ticks, counts) + place * np.repeat(steps, counts)
-    if counts[0] * period < spans[0]:
-        spread[: counts[0]] = ticks[1] - (counts[0] - np.arange(counts[0])) * period
-    rates = 1.0 / np.quantile(steps, [0.95, 0.05])
+    spread = t + place * np.repeat(steps, counts)
+    if np.median(counts) > 1:  # the recording began within a tick
+        spread[: counts[0]] = spread[first[1]] - (counts[0] - place[: counts[0]]) * min(steps[:2])
+    slow, fast = 1.0 / np.quantile(steps, [0.95, 0.05])
     return spread, (
         f"{len(t) - len(first)} of {len(t)} stamps repeat (clock of {tick * 1e3:.3g} ms):"
-        f" samples spread evenly between its ticks, {rates[0]:.0f} to {rates[1]:.0f} Hz"
+        f" samples spread evenly between its ticks, {slow:.0f} to {fast:.0f} Hz"
     )

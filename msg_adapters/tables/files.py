@@ -92,9 +92,12 @@ def _index(column: str, names: Sequence[str]) -> int:
 
 
 def _mat(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
-    from scipy.io import loadmat  # 0.2 s that text files need not wait for
+    from scipy.io import loadmat, matlab  # 0.2 s that text files need not wait for
 
-    variables = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    try:
+        variables = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    except matlab.MatReadError as error:
+        raise ValueError(str(error)) from None
     table: dict[str, FloatArray] = {}
     for column in columns:
         _index(column, list(variables))

@@ -1,0 +1,63 @@
+"""Coarse clocks: the true time is known here, and the repaired stamps must be near it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from msg_adapters.tables.clock import repaired
+
+
+def _true_times(rng, count, rate, wander, stalls):
+    """Return sampling times whose rate wanders, with pauses."""
+    phase = np.cumsum(rng.normal(size=count)) / np.sqrt(count)
+    steps = (1 + wander * np.tanh(phase)) / rate
+    steps[rng.integers(0, count, stalls)] += rng.uniform(0.02, 0.2, stalls)
+    return np.cumsum(steps)
+
+
+@pytest.mark.parametrize("tick", [1 / 64, 0.01, 0.1])
+@pytest.mark.parametrize("wander", [0.0, 0.25])
+@pytest.mark.parametrize("stalls", [0, 6])
+def test_stamps_come_within_a_sample_of_the_truth(tick, wander, stalls):
+    rng = np.random.default_rng(8)
+    truth = _true_times(rng, 20_000, 400.0, wander, stalls)
+    stamps, report = repaired(np.floor(truth / tick) * tick)
+    error = stamps - truth
+    error -= np.median(error)
+    period = (1 + wander) / 400
+    assert np.all(np.diff(stamps) > 0)
+    near_stall = np.zeros(truth.size, bool)
+    for at in np.flatnonzero(np.diff(truth) > 0.01):
+        near_stall |= np.abs(truth - truth[at]) < 0.2 + 2 * tick
+    assert np.max(np.abs(error[~near_stall])) < 2 * period
+    assert np.std(error[~near_stall]) < 0.5 * period
+    assert np.max(np.abs(error)) < tick + 2 * period
+    assert "stamps repeat" in report
+
+
+def test_a_line_through_all_samples_would_be_worse():
+    """The reason for going tick by tick: a rate that wanders."""
+    rng = np.random.default_rng(8)
+    truth = _true_times(rng, 20_000, 400.0, 0.25, 0)
+    coarse = np.floor(truth * 64) / 64
+    index = np.arange(truth.size)
+    line = np.polyval(np.polyfit(index, coarse, 1), index)
+    assert np.std(line - truth) > 20 * np.std(repaired(coarse)[0] - truth)
+
+
+def test_a_good_clock_stays_as_it_is():
+    t = np.cumsum(np.random.default_rng(1).uniform(0.5e-3, 1.5e-3, 500))
+    stamps, report = repaired(t)
+    assert stamps is t
+    assert report == ""
+
+
+def test_one_repeated_stamp_moves_nothing_else():
+    t = np.arange(100) * 1e-3
+    t[40] = t[39]
+    stamps, report = repaired(t)
+    others = np.arange(100) != 40
+    assert np.allclose(stamps[others], t[others], rtol=0, atol=1e-12)
+    assert t[39] < stamps[40] < t[41]
+    assert "1 of 100 stamps repeat" in report

@@ -1,0 +1,73 @@
+"""The maps of this repository on the measurements that they are for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import butter, filtfilt
+
+from msg_adapters.tables import import_record, load_map
+from rsea_ros.signals import Record
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+REAL = REPOSITORY.parent / "shared" / "realdata"
+if not REAL.is_dir():
+    pytest.skip(f"{REAL} is missing", allow_module_level=True)
+
+
+def _imported(file: str, name: str) -> Record:
+    return import_record(REAL / file, load_map(REPOSITORY / "config" / "imports" / f"{name}.yaml"))
+
+
+def _smooth(y: np.ndarray, cutoff: float, rate: float) -> np.ndarray:
+    return filtfilt(*butter(4, cutoff / (rate / 2)), y)
+
+
+@pytest.mark.parametrize("name", ["emps_identification", "emps_pulses"])
+def test_emps_obeys_its_published_force_balance_and_its_controller(name):
+    """M 95.109 kg, 203.503 N s/m, 20.394 N, -3.165 N: with vir·gtau as the force, pulses or not."""
+    record = _imported({"emps_pulses": "emps/DATA_EMPS_PULSES.mat"}.get(name, "emps/DATA_EMPS.mat"), name)
+    force, q, reference = record["command"].y, record["position"].y, record["reference"].y
+    smooth = _smooth(q, 20, 1000)
+    v = np.gradient(smooth, 1e-3)
+    model = 95.109 * np.gradient(v, 1e-3) + 203.503 * v + 20.394 * _smooth(np.sign(v), 20, 1000) - 3.165
+    rest = (model - _smooth(force, 20, 1000))[100:-100]
+    assert np.linalg.norm(rest) < 0.05 * np.linalg.norm(force)
+    backward = np.diff(q, prepend=q[0]) / 1e-3
+    controller = 243.45 * 35.15065 * (160.18 * (reference - q) - backward)
+    assert np.linalg.norm((controller - force)[100:-100]) < 0.05 * np.linalg.norm(force)
+
+
+@pytest.mark.parametrize(
+    ("file", "degrees"),
+    [
+        ("2024-07-18__10-58-26__torqueramp__base_onyx_runin1", 1.95),
+        ("2024-07-18__16-28-57__torqueramp__split_onyx_runin1", 1.77),
+        ("2024-07-19__12-45-43__torqueramp__split_onyx_12pre1", 0.46),
+        ("2024-07-19__13-57-00__torqueramp__conic_onyx_2pre5", 0.43),
+    ],
+)
+def test_cycloidal_travel_between_the_ramps_ends(file, degrees):
+    record = _imported(f"cycloidal/{file}.csv.gz", "cycloidal_short_ramps")
+    command, position = record["command"].y, np.degrees(record["position"].y)
+    travel = np.median(position[command > 3.9]) - np.median(position[command < -3.9])
+    assert travel == pytest.approx(degrees, abs=0.15)
+    assert "stamps repeat (clock of 16 ms)" in record.notes[1]
+    assert np.all(np.diff(record["position"].t) > 0)
+
+
+def test_cycloidal_current_limit_shows_in_the_long_ramps():
+    file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
+    record = _imported(file, "cycloidal_long_ramps")
+    assert record["command"].y.max() == 40.0
+    assert 24.0 < record["motor_torque"].y.max() < 27.0
+
+
+def test_pendulum_gravity_is_that_of_the_read_me():
+    record = _imported("pendulum/gravity_compensation.measured.csv.gz", "pendulum")
+    torque, position = record["command"].y, record["position"].y
+    sine = np.sin(position)
+    assert np.dot(sine, torque) / np.dot(sine, sine) == pytest.approx(3.31, abs=0.01)
+    assert record["command"].rate == pytest.approx(1000, rel=0.01)

@@ -1,0 +1,85 @@
+"""Messages for the nodes: numbers in, the same numbers out, and bytes that the reader of bags understands."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from foreign import JOINT_STATE, WRENCH
+from rclpy.serialization import deserialize_message, serialize_message
+
+from msg_adapters import encoding, ros
+from msg_adapters.cdr import blocks
+from rsea_ros.errors import ParameterError
+
+STAMP = 1_763_000_000_123_456_789
+
+
+def test_values_survive_the_message():
+    assert ros.effort_of(ros.torque_command_message(STAMP, -3.5)) == (STAMP, -3.5)
+    assert ros.joint_state_of(ros.joint_state_message(STAMP, 1.5, 2.5, -3.5, "knee"), "knee") == (
+        STAMP,
+        1.5,
+        2.5,
+        -3.5,
+    )
+    assert ros.wrench_of(ros.wrench_message(STAMP, 4.5, "-torque.y"), "-torque.y") == (STAMP, 4.5)
+    assert ros.wrench_of(ros.wrench_message(STAMP, [1, 2, 3, 4, 5, 6]), "force.z") == (STAMP, 3.0)
+    assert ros.stamp_of(ros.clock_message(STAMP).clock) == STAMP
+    assert ros.bool_message(True).data is True
+
+
+def test_estimates_carry_their_names():
+    message = ros.efforts_message(STAMP, {"distal": 1.0, "proximal": 2.0})
+    assert ros.effort_of(message, "proximal") == (STAMP, 2.0)
+    with pytest.raises(ParameterError, match="no joint 'knee' in the message, which holds distal, proximal"):
+        ros.effort_of(message, "knee")
+    with pytest.raises(ParameterError, match=r"2 joints \(distal, proximal\), expected one"):
+        ros.effort_of(message)
+
+
+def test_what_a_message_does_not_hold_is_nan():
+    _, position, velocity, effort = ros.joint_state_of(ros.torque_command_message(STAMP, 2.0))
+    assert math.isnan(position)
+    assert math.isnan(velocity)
+    assert effort == 2.0
+
+
+def test_diagnostics_hold_level_and_values():
+    (status,) = ros.diagnostics_message(STAMP, "model", ros.WARN, "slow", {"bandwidth_hz": 53.2}).status
+    assert (status.name, status.level, status.message) == ("model", ros.WARN, "slow")
+    assert [(pair.key, pair.value) for pair in status.values] == [("bandwidth_hz", "53.2")]
+
+
+def test_types_by_name():
+    assert ros.message_type(JOINT_STATE) is ros.JointState
+    with pytest.raises(ParameterError, match="message type 'own_msgs/msg/Thing' is not installed"):
+        ros.message_type("own_msgs/msg/Thing")
+
+
+def test_bytes_of_fast_cdr_decode():
+    messages = [ros.joint_state_message(STAMP + k, k, 2 * k, 3 * k) for k in range(20)]
+    (block,) = blocks([serialize_message(message) for message in messages], JOINT_STATE, "here")
+    assert block.stamps().tolist() == [STAMP + k for k in range(20)]
+    assert block.field("velocity")[:, 0].tolist() == [2.0 * k for k in range(20)]
+    (block,) = blocks([serialize_message(ros.wrench_message(STAMP, 4.5))], WRENCH, "here")
+    assert block.field("wrench").tolist() == [[0, 0, 0, 0, 0, 4.5]]
+
+
+def test_our_bytes_are_understood_by_fast_cdr():
+    (raw,) = encoding.joint_states(np.array([STAMP]), "knee", effort=np.array([-3.5]))
+    assert ros.effort_of(deserialize_message(raw, ros.JointState), "knee") == (STAMP, -3.5)
+    (raw,) = encoding.wrenches(np.array([STAMP]), np.arange(6.0)[None, :])
+    assert ros.wrench_of(deserialize_message(raw, ros.WrenchStamped), "torque.x") == (STAMP, 3.0)
+
+
+def test_bags_need_no_ros():
+    program = (
+        "import sys, msg_adapters, msg_adapters.records, msg_adapters.tables\n"
+        "print([name for name in sys.modules if name.endswith('_msgs') or name == 'rclpy'])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
