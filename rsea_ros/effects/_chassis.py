@@ -1,0 +1,98 @@
+"""The spring chassis between the two flanks of the gear's play: free motion, contact, inelastic impact.
+
+Angles are relative to the distal side. Over a step the gear goes along the cubic through its angles and
+speeds at both ends (d_0, w_0, d_1, w_1). The chassis y, with the inertia j, the spring k and its damper b,
+
+    j y'' + b y' + k y = C,   |d - y| <= half the gap,   C pushes only, at a flank
+
+rides on a flank as long as that pushes, moves freely and exactly otherwise, and takes the gear's speed when
+it meets a flank.
+"""
+
+import math
+
+from numba import njit
+
+
+@njit(inline="always")  # type: ignore[untyped-decorator]
+def swing(y, v, t, k, b, j):  # type: ignore[no-untyped-def]
+    """Return y and v after a time t of free motion: exact, under- and overdamped."""
+    decay = 0.5 * b / j
+    square = k / j - decay * decay
+    turn = math.sqrt(abs(square))
+    if square > 0.0:
+        e = math.exp(-decay * t)
+        c, n = e * math.cos(turn * t), e * math.sin(turn * t) / turn
+    else:
+        slow, fast = math.exp(-(k / j) / (decay + turn) * t), math.exp(-(decay + turn) * t)
+        c, n = 0.5 * (slow + fast), t * slow if turn * t < 1e-6 else 0.5 * (slow - fast) / turn
+    return y * (c + decay * n) + v * n, v * (c - decay * n) - y * (k / j) * n
+
+
+@njit(inline="always")  # type: ignore[untyped-decorator]
+def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
+    """Return angle, speed and integral of the angle of the gear at a time t of the step."""
+    mean = (d_1 - d_0) / h
+    square, cube = (3.0 * mean - 2.0 * w_0 - w_1) / h, (w_0 + w_1 - 2.0 * mean) / (h * h)
+    angle = d_0 + t * (w_0 + t * (square + t * cube))
+    speed = w_0 + t * (2.0 * square + t * 3.0 * cube)
+    return angle, speed, t * (d_0 + t * (w_0 / 2.0 + t * (square / 3.0 + t * cube / 4.0)))
+
+
+@njit(inline="always")  # type: ignore[untyped-decorator]
+def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+    """Return when in the step the flank stops pushing: 0 when it does not touch, h when it goes on."""
+    if side == 0.0:
+        return 0.0
+    inertia = j * (w_1 - w_0) / h
+    c_0 = side * (inertia + b * w_0 + k * (d_0 - side * half))
+    c_1 = side * (inertia + b * w_1 + k * (d_1 - side * half))
+    if c_1 >= 0.0:
+        return h
+    return h * c_0 / (c_0 - c_1) if c_0 > 0.0 else 0.0
+
+
+@njit(inline="always")  # type: ignore[untyped-decorator]
+def impact(side, half, y, v, start, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+    """Return when a chassis free since `start` meets the flank that it is behind at h, by regula falsi."""
+    low, high = start, h
+    angle, _, _ = path(d_0, w_0, d_1, w_1, h, start)
+    f_low = side * (angle - y) - half
+    end, _ = swing(y, v, h - start, k, b, j)
+    f_high, t = side * (d_1 - end) - half, start
+    for _ in range(12):
+        if f_low >= 0.0:
+            return low
+        t = low + (high - low) * f_low / (f_low - f_high)
+        angle, _, _ = path(d_0, w_0, d_1, w_1, h, t)
+        at, _ = swing(y, v, t - start, k, b, j)
+        f = side * (angle - at) - half
+        if abs(f) < 1e-12:
+            break
+        if f > 0.0:
+            high, f_high, f_low = t, f, 0.5 * f_low
+        else:
+            low, f_low, f_high = t, f, 0.5 * f_high
+    return t
+
+
+@njit(inline="always")  # type: ignore[untyped-decorator]
+def over_step(y_0, v_0, side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
+    """Return y, v, the flank (-1, 0, 1) at the end of a step, and the integral of y over it."""
+    leaves = release(side, half, d_0, w_0, d_1, w_1, h, k, b, j)
+    _, _, whole = path(d_0, w_0, d_1, w_1, h, h)
+    if leaves == h:
+        return d_1 - side * half, w_1, side, whole - side * half * h
+    area, y, v = 0.0, y_0, v_0
+    if leaves > 0.0:
+        angle, v, area = path(d_0, w_0, d_1, w_1, h, leaves)
+        y, area = angle - side * half, area - side * half * leaves
+    end, speed = swing(y, v, h - leaves, k, b, j)
+    if abs(d_1 - end) <= half:
+        return end, speed, 0.0, area - (j * (speed - v) + b * (end - y)) / k
+    side = math.copysign(1.0, d_1 - end)
+    meets = impact(side, half, y, v, leaves, d_0, w_0, d_1, w_1, h, k, b, j)
+    end, speed = swing(y, v, meets - leaves, k, b, j)
+    area -= (j * (speed - v) + b * (end - y)) / k
+    _, _, before = path(d_0, w_0, d_1, w_1, h, meets)
+    return d_1 - side * half, w_1, side, area + whole - before - side * half * (h - meets)

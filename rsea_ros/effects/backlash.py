@@ -1,0 +1,68 @@
+"""Backlash: play between the gear output and the spring chassis.
+
+    T_s = K_s y + b_s y',   J_sc y'' + b_s y' + K_s y = C,   |d - y| <= gap / 2
+
+y is the chassis, which has its own inertia, d the gear output, both against the distal side. The flanks
+only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
+feels J_sc e'' + b_s e' + K_s e beside the torque of the nominal spring, the F/T sensor all but the first.
+Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft with play), with inertia.
+"""
+
+from rsea_ros.effects._chassis import over_step, path
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import (
+    B_S,
+    COMMIT,
+    DEFLECTION,
+    DEFLECTION_RATE,
+    DEFLECTION_SPAN,
+    DISTAL_TORQUE,
+    J_SC,
+    K_S,
+    SPRING_TORQUE,
+    STEP,
+    Port,
+)
+
+Y, V, SIDE, D, W, STARTED = range(6)
+FASTEST = 0.1
+"""Smallest inertia of the chassis, in K_s h^2: a faster one the step cannot show."""
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the mean torque of the step, or, when it is done, what the sensor sees at its end."""
+    half, h, k, b = 0.5 * p[0], s[STEP], s[K_S], s[B_S]
+    if half == 0.0 or k == 0.0:
+        return
+    j = max(s[J_SC], FASTEST * k * h * h)
+    d, w = s[DEFLECTION] + 0.5 * s[DEFLECTION_SPAN], s[DEFLECTION_RATE]
+    if x[STARTED] == 0.0:
+        x[D], x[W], x[STARTED] = s[DEFLECTION] - 0.5 * s[DEFLECTION_SPAN], w, 1.0
+        x[Y] = min(max(0.0, x[D] - half), x[D] + half)
+    if s[COMMIT] == 0.0:
+        w = 2.0 * w - x[W]
+    y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, x[D], x[W], d, w, h, k, b, j)
+    if s[COMMIT] == 1.0:
+        x[Y], x[V], x[SIDE], x[D], x[W] = y, v, side, d, w
+        s[SPRING_TORQUE] += k * (y - d) + b * (v - w)
+        return
+    _, _, whole = path(x[D], x[W], d, w, h, h)
+    inertia = j * ((v - x[V]) - (w - x[W])) / h
+    s[SPRING_TORQUE] += (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h + inertia
+    s[DISTAL_TORQUE] -= inertia
+
+
+EFFECT = Effect(
+    name="backlash",
+    port=Port.SPRING,
+    parameters=(Parameter("gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012)),),
+    claims=Claims(
+        "position", "odd", amplitude_exponent=None, passive=True, confusable_with=("nonlinear_spring",)
+    ),
+    function=apply,
+    states=6,
+    reads=(DEFLECTION, DEFLECTION_RATE),
+    about="play between the gear output and the spring",
+    equation="T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2",
+)
