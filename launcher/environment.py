@@ -31,8 +31,11 @@ def main(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         say("interrupted: .venv is not complete, the next call makes it anew")
         return 130
-    except (InstallError, OSError) as error:
+    except InstallError as error:
         say(str(error))
+        return 2
+    except OSError as error:
+        say(f"{error.filename}: {error.strerror}")
         return 2
     launcher = str(root / "rsea")
     os.execv(launcher, [launcher, *arguments[3:]])
@@ -57,7 +60,7 @@ def make(root: Path, ros: str, key: str, lock: int) -> None:
     """Make the environment from nothing and stamp it."""
     venv = root / ".venv"
     (venv / "complete").unlink(missing_ok=True)
-    say(f"making .venv with Python {platform.python_version()}, this once: about a minute, about 1.2 GB")
+    say(f"making .venv with Python {platform.python_version()}, this once: about a minute, about 1 GB")
     site = ["--system-site-packages"] if ros == "sourced" else []
     run([sys.executable, "-m", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
     locks = [root / "requirements.lock"]
