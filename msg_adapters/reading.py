@@ -14,6 +14,9 @@ from msg_adapters.topics import AXES, FIELDS, ROLES, TYPES, TopicMap
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, Record
 
+LATEST = 2**63 - 1
+"""The highest stamp in ns that a 64-bit integer holds; a damaged log time may be higher."""
+
 
 def read_record(
     paths: BagPath | Sequence[BagPath], *, topics: TopicMap | None = None, strict: bool = True
@@ -130,9 +133,8 @@ def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
 
 def _with_log_times(where: str, stamps: IntArray, log_times: Sequence[int], notes: list[str]) -> IntArray:
     """Put the log time where the header stamp is zero, which means that nobody set it."""
-    logged = np.array(log_times, np.int64)
-    unset = (stamps == 0) & (logged != 0)
-    if not unset.any():
-        return stamps
-    notes.append(f"{where}: {np.count_nonzero(unset)} of {unset.size} header stamps are zero, log time taken")
-    return np.where(unset, logged, stamps)
+    unset = [row for row in np.flatnonzero(stamps == 0).tolist() if log_times[row]]
+    if unset:
+        notes.append(f"{where}: {len(unset)} of {len(stamps)} header stamps are zero, log time taken")
+        stamps[unset] = [min(log_times[row], LATEST) for row in unset]
+    return stamps
