@@ -12,9 +12,8 @@ import math
 
 from numba import njit
 
-from rsea_ros.effects.signal_table import GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
+from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
-CREEP = 2e-3  # rad/s
 
 
 @njit(inline="always")  # type: ignore[untyped-decorator]
@@ -24,21 +23,19 @@ def mean_friction(s, size, last):  # type: ignore[no-untyped-def]
     size: friction torque at speed, N m. last: what this function returned at its last evaluation, which is
     already in the predicted end of the step.
     """
+    creep = s[CREEP]
     w_0 = s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]
     w_free = s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN] + s[MOBILITY] * last
-    gain, s_0 = s[MOBILITY] * size, math.sqrt(w_0 * w_0 + CREEP * CREEP)
+    gain, s_0 = s[MOBILITY] * size, math.sqrt(w_0 * w_0 + creep * creep)
     low, high = w_free - abs(gain), w_free + abs(gain)
     w_1 = w_free - gain * w_0 / s_0
     for _ in range(30):
-        s_1 = math.sqrt(w_1 * w_1 + CREEP * CREEP)
+        s_1 = math.sqrt(w_1 * w_1 + creep * creep)
         mean = (w_0 + w_1) / (s_0 + s_1)
         excess = w_1 + gain * mean - w_free
-        if excess > 0.0:
-            high = w_1
-        else:
-            low = w_1
         step = excess / (1.0 + gain * (1.0 - mean * w_1 / s_1) / (s_0 + s_1))
-        w_1 = w_1 - step if low < w_1 - step < high else 0.5 * (low + high)
-        if abs(step) < 1e-4 * CREEP:
+        if abs(step) < 1e-9 * creep:
             break
-    return (w_free - w_1) / s[MOBILITY]
+        low, high = (low, w_1) if excess > 0.0 else (w_1, high)
+        w_1 = w_1 - step if low < w_1 - step < high else 0.5 * (low + high)
+    return size * (w_0 + w_1) / (s_0 + math.sqrt(w_1 * w_1 + creep * creep))

@@ -22,8 +22,7 @@ EXTRA_PATH = "RSEA_EFFECTS"
 
 @lru_cache(maxsize=8)
 def _catalogue(extra: tuple[str, ...]) -> Mapping[str, Effect]:
-    names = [m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in _NOT_EFFECTS and not m.name.startswith("_")]
-    modules = [importlib.import_module(f"rsea_ros.effects.{name}") for name in sorted(names)]
+    modules = [importlib.import_module(f"rsea_ros.effects.{name}") for name in sorted(_own_names())]
     modules += [_load(path) for path in extra]
     effects = [m.EFFECT for m in modules]
     return MappingProxyType({e.name: e for e in effects})
@@ -35,11 +34,19 @@ def catalogue() -> Mapping[str, Effect]:
 
 
 def effect_named(name: str) -> Effect:
-    """Return one effect. Raises ParameterError when the catalogue has none of that name."""
+    """Return one effect, loading only its file. Raises ParameterError when the catalogue has none of that name."""
+    if name in _own_names():
+        return importlib.import_module(f"rsea_ros.effects.{name}").EFFECT  # type: ignore[no-any-return]
     effects = catalogue()
     if name not in effects:
         raise ParameterError(f"effect {name!r}: not in the catalogue, expected one of {', '.join(effects)}")
     return effects[name]
+
+
+@lru_cache(maxsize=1)
+def _own_names() -> frozenset[str]:
+    names = (m.name for m in pkgutil.iter_modules(package.__path__))
+    return frozenset(n for n in names if n not in _NOT_EFFECTS and not n.startswith("_"))
 
 
 def _extra_files(paths: str) -> Iterable[Path]:

@@ -29,6 +29,9 @@ CUT_OFF = 20.0
 """Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""
 
 
+_SIGN = 1e-5
+"""rad/s. Along a measured motion the sign of the speed needs no smoothing."""
+
 _MOTOR, _GEAR = int(st.Port.MOTOR), int(st.Port.GEAR)
 
 
@@ -51,7 +54,9 @@ def is_inverse(rig: Rig) -> bool:
 def motion_from(record: Record) -> Motion:
     """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
     if "position" not in record:
-        raise IdentificationError(f"{record.source}: no position channel, expected one: a rig without a spring is judged by its motion")
+        raise IdentificationError(
+            f"{record.source}: no position channel, expected one: a rig without a spring is judged by its motion"
+        )
     position = record["position"]
     period = 1.0 / position.rate
     t = np.arange(position.t[0], position.t[-1] + 0.5 * period, period)
@@ -67,7 +72,9 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
     m = mechanics(rig, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:
-        raise IdentificationError(f"rig {rig.name}: {m.order} moving parts, expected one on a clamped housing for the inverse model")
+        raise IdentificationError(
+            f"rig {rig.name}: {m.order} moving parts, expected one on a clamped housing for the inverse model"
+        )
     period = float(motion.t[1] - motion.t[0])
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
     torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
@@ -97,6 +104,7 @@ def _effect_torques(calls, s, own, q, v, ratio):  # type: ignore[no-untyped-def]
     """Return what the effects add at the gear along a motion, N m."""
     added = np.empty(len(q))
     s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
+    s[st.CREEP] = _SIGN
     for k in range(len(q)):
         s[st.TIME] = k * s[st.STEP]
         s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], ratio * q[k]

@@ -90,7 +90,10 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
         rigid_spring=_switch(groups["spring"], "spring.rigid"),
         train=groups["gear"].get("train", "planetary"),
         sensors=_sensors(_mapping(document.get("sensors", {}), "sensors")),
-        known=_known(document.get("known", []), [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)]),
+        known=_known(
+            document.get("known", []),
+            [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
+        ),
         proximal=_text(document.get("proximal", "housing_end"), "proximal"),
         controller=_controller(document.get("controller")),
         effects=effects,

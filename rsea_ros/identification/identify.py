@@ -1,0 +1,177 @@
+"""Identification: the parameters of a rig from records, by output error on all channels that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
+from rsea_ros.identification.noise import noise_floor
+from rsea_ros.identification.problem import Case, Problem, case_from, weighted
+#from rsea_ros.identification.responses import responses_of
+from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
+from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
+from rsea_ros.identification.unknowns import Unknown, apply, clocks, unknowns_of_effect, unknowns_of_rig
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, Record
+
+Progress = Callable[[str, float], None]
+CHANNELS = ("ft", "position", "velocity", "motor_torque")
+_MISFIT = 1.3
+_REWEIGHTINGS = 3
+
+
+def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:
+    """Return the parameters of the rig, effects that it lists included, with their confidence.
+
+    Raises IdentificationError when the records do not hold what the rig needs.
+    """
+    report = progress or (lambda step, share: None)
+    report("reading", 0.0)
+    for record in records:
+        check_usable(record)
+    cases = tuple(case_from(record, rig) for record in records)
+    report("fitting", 0.2)
+    with ThreadPoolExecutor(2) as pool:
+        solution = fit(cases, rig, run=in_pool(pool))
+    report("frequency responses", 0.7)
+    result = _result(solution, records)
+    report("done", 1.0)
+    return result
+
+
+def check_usable(record: Record) -> None:
+    """Raise IdentificationError for values that are not finite or stamps that do not rise."""
+    for name, channel in record.channels.items():
+        bad = ~(np.isfinite(channel.y) & np.isfinite(channel.t))
+        if bad.any():
+            k = int(np.argmax(bad))
+            raise IdentificationError(f"{record.source}: {name}[{k}] at {channel.t[k]:.4f} s = {channel.y[k]}, expected a finite value")
+        back = np.diff(channel.t) <= 0.0
+        if back.any():
+            k = int(np.argmax(back)) + 1
+            raise IdentificationError(
+                f"{record.source}: {name} stamp {k} = {channel.t[k]:.6f} s after {channel.t[k - 1]:.6f} s, expected rising stamps"
+            )
+
+
+def fit(cases: Sequence[Case], rig: Rig, run: Map = serial) -> Solution:
+    """Fit the rig's free values, its effects and the sensors' clocks; weights follow where the model misfits.
+
+    Where a channel's residual stays above its noise the weight becomes that residual, as maximum likelihood
+    with unknown noise has it.
+    """
+    unknowns = unknowns_of(rig, cases)
+    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
+    solution = solve(problem, run=run)
+    for _ in range(_REWEIGHTINGS):
+        ratios = misfit_ratios(solution)
+        if max(ratios.values()) < _MISFIT:
+            break
+        problem = replace(problem, cases=tuple(_reweighted(c, ratios) for c in problem.cases))
+        solution = solve(problem, solution.theta, run=run)
+    return solution
+
+
+def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
+    """Return all that a fit of these cases may move."""
+    channels = sorted({n for case in cases for n in case.measured})
+    effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
+    return (*unknowns_of_rig(rig), *(u for group in effects for u in group), *(clocks(channels) if not is_inverse(rig) else ()))
+
+
+def misfit_ratios(solution: Solution) -> dict[str, float]:
+    """Return by channel the RMS of the residual over its noise: 1 where it is at the noise."""
+    problem = solution.problem
+    parts: dict[str, list[FloatArray]] = {}
+    for case, out in zip(problem.cases, problem.outputs(solution.theta), strict=True):
+        for n in problem.present(case):
+            parts.setdefault(n, []).append(weighted(case, out, [n]))
+    return {n: _rms(np.concatenate(p)) for n, p in parts.items()}
+
+
+def _reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
+    return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})
+
+
+def _result(solution: Solution, records: Sequence[Record]) -> Identification:
+    problem = solution.problem
+    confidence = confidence_of(solution)
+    outputs = problem.outputs(solution.theta)
+    errors = errors_by_channel(problem, outputs)
+    rig = identified_rig(solution, confidence)
+    responses, models = responses_of(records[0], rig)
+    return Identification(
+        rig=rig,
+        sources=tuple(r.source for r in records),
+        duration=sum(r.stop - r.start for r in records),
+        rate=records[0]["command"].rate,
+        parameters=parameters_of(solution, confidence),
+        correlation=confidence.correlation,
+        residual_rms={n: _rms(e) for n, (e, _) in errors.items()},
+        noise_rms={n: float(np.mean([noise_floor(r, n) for r in records if n in r])) for n in errors},
+        fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
+        responses=responses,
+        models=models,
+        overlays=overlays_of(problem.cases[0], outputs[0]),
+        statements=what_is_not_told(problem.unknowns, confidence),
+        notes=tuple(note for r in records for note in r.notes),
+    )
+
+
+def errors_by_channel(problem: Problem, outputs: Sequence[Mapping[str, FloatArray]]) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return by channel the error (simulated - measured) and the measured values of the samples that count."""
+    parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    for case, out in zip(problem.cases, outputs, strict=True):
+        for n in problem.present(case):
+            keep, y = case.mask[n], case.measured[n]
+            parts.setdefault(n, []).append(((out[n] - y)[keep], y[keep]))
+    return {n: (np.concatenate([e for e, _ in p]), np.concatenate([y for _, y in p])) for n, p in parts.items()}
+
+
+def fit_percent(error: FloatArray, measured: FloatArray) -> float:
+    """Return 100 (1 - ||e|| / ||y - mean y||), %."""
+    scale = float(np.linalg.norm(measured - measured.mean()))
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
+
+
+def parameters_of(solution: Solution, confidence: Confidence) -> tuple[ParameterEstimate, ...]:
+    """Return the estimates of a fit with their 95 % intervals."""
+    sd = np.sqrt(np.diag(confidence.covariance))
+    return tuple(
+        ParameterEstimate(
+            name=u.name,
+            value=u.outer(float(theta)),
+            unit=u.unit,
+            ci95=interval(u, float(theta), float(s)),
+            start=u.start,
+            spread=u.doubt,
+            told_by_data=float(told),
+        )
+        for u, theta, s, told in zip(solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True)
+    )
+
+
+def identified_rig(solution: Solution, confidence: Confidence) -> Rig:
+    """Return the rig with the fitted values, their intervals, and their doubt as the next fit's spread."""
+    rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+    quantities = dict(rig.quantities)
+    for estimate in parameters_of(solution, confidence):
+        if estimate.name in quantities:
+            quantities[estimate.name] = replace(quantities[estimate.name], ci95=estimate.ci95, source="identified")
+    return replace(rig, quantities=quantities)
+
+
+def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:
+    """Return measured beside simulated for every channel of a case."""
+    return tuple(Overlay(n, case.t[n], case.measured[n], outputs[n]) for n in outputs)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

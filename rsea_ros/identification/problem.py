@@ -1,0 +1,135 @@
+"""A fit as a value: what was measured, with which weight, and the simulation that is held against it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.noise import noise_floor
+from rsea_ros.identification.unknowns import Unknown, apply
+from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.inverse import Motion, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import simulate_drive
+from rsea_ros.model.step import OUTPUTS
+from rsea_ros.signals import FloatArray, Record
+
+BoolArray = npt.NDArray[np.bool_]
+SETTLE = 0.3
+"""s at the start of a record that no fit looks at: the bench may not have been at rest."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One record ready to be simulated: drive, measured channels, their noise, and which samples count."""
+
+    drive: Drive | Motion
+    t: Mapping[str, FloatArray]
+    measured: Mapping[str, FloatArray]
+    noise: Mapping[str, float]
+    mask: Mapping[str, BoolArray]
+    source: str = ""
+
+    def within(self, mask: Mapping[str, BoolArray]) -> Case:
+        """Return the case with only samples that are also in `mask`."""
+        both = {n: m & mask[n] for n, m in self.mask.items()}
+        return Case(self.drive, self.t, self.measured, self.noise, both, self.source)
+
+
+    @property
+    def start(self) -> float:
+        """Record time at which the case begins, s."""
+        return self.drive.start if isinstance(self.drive, Drive) else float(self.drive.t[0])
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return self.drive.duration if isinstance(self.drive, Drive) else float(self.drive.t[-1] - self.drive.t[0])
+
+
+def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None = None) -> Case:
+    """Make a record ready. masked: samples by channel that are faulty and must not count.
+
+    Raises IdentificationError when no channel of the record is one that the rig has.
+    """
+    if is_inverse(rig):
+        return _inverse_case(record)
+    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
+    if not set(channels) - {"motor_torque"}:
+        raise IdentificationError(f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one")
+    in_loop = rig.controller is not None and "reference" in record
+    quanta = {n: rig.sensors[n].quantum if n in rig.sensors else 0.0 for n in channels}
+    good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
+    start = float(record["command"].t[0]) + SETTLE
+    return Case(
+        drive=drive_from(record, closed_loop=in_loop),
+        t=MappingProxyType({n: record[n].t for n in channels}),
+        measured=MappingProxyType({n: record[n].y for n in channels}),
+        noise=MappingProxyType({n: noise_floor(record, n, quanta[n]) for n in channels}),
+        mask=MappingProxyType({n: good[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}),
+        source=record.source,
+    )
+
+
+def _inverse_case(record: Record) -> Case:
+    """Make a record of a drive without a spring ready: its torque against the one that its motion takes."""
+    motion = motion_from(record)
+    residual = motion.torque - signal.savgol_filter(motion.torque, 2 * int(0.05 * record["position"].rate) + 1, 3)
+    edges = (motion.t < motion.t[0] + SETTLE) | (motion.t > motion.t[-1] - SETTLE)
+    return Case(
+        drive=motion,
+        t={"motor_torque": motion.t},
+        measured={"motor_torque": motion.torque},
+        noise={"motor_torque": max(float(np.std(residual)), 1e-9)},
+        mask={"motor_torque": ~edges},
+        source=record.source,
+    )
+
+
+def simulated(case: Case, rig: Rig, offsets: Mapping[str, float], *, ride: bool = False) -> dict[str, FloatArray]:
+    """Return the simulated channels of a case, sensors read `offsets` seconds later than stamped."""
+    if isinstance(case.drive, Motion):
+        return {"motor_torque": inverse_torque(rig, case.drive)}
+    shifted = {n: at + offsets.get(n, 0.0) / case.drive.step for n, at in case.drive.at.items()}
+    drive = Drive(**{**case.drive.__dict__, "at": shifted}) if any(offsets.values()) else case.drive
+    return simulate_drive(rig, drive, ride=ride)
+
+
+def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
+    """Return (simulated - measured) / noise of the samples that count, channel after channel."""
+    return np.concatenate([((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels])
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Records, the rig, and what may move. channels: what the residual is made of."""
+
+    cases: tuple[Case, ...]
+    rig: Rig
+    unknowns: tuple[Unknown, ...]
+    channels: tuple[str, ...]
+    ride: bool = False
+
+    def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
+        """Return the simulated channels of every case at theta."""
+        rig, offsets = apply(self.rig, self.unknowns, theta)
+        return [simulated(case, rig, offsets, ride=self.ride) for case in self.cases]
+
+    def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
+        """Return the weighted residuals of all cases, shape (m,)."""
+        parts = [weighted(c, o, self.present(c)) for c, o in zip(self.cases, outputs, strict=True)]
+        return np.concatenate(parts)
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Return the weighted residuals at theta, shape (m,)."""
+        return self.residual_of(self.outputs(theta))
+
+    def present(self, case: Case) -> list[str]:
+        """Return the channels of a case that count, in a fixed order."""
+        return [n for n in self.channels if n in case.measured]

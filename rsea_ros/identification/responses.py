@@ -1,0 +1,37 @@
+"""The frequency responses that a report shows: measured from the record, and of the fitted model."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.result import ComplexArray, FrequencyResponse
+from rsea_ros.model.propagator import read_row, state_space
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, Record
+
+
+def responses_of(record: Record, rig: Rig) -> tuple[tuple[FrequencyResponse, ...], tuple[ComplexArray, ...]]:
+    """Return the measured responses of a record's sensors to the command, and the rig's linear model of each."""
+    outputs = [n for n in ("ft", "position") if n in record and not (n == "ft" and rig.rigid_spring)]
+    measured = tuple(estimate_response(record, n) for n in outputs)
+    return measured, tuple(model_response(rig, r.output, r.frequency) for r in measured)
+
+
+def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray:
+    """Return output / command of the rig's linear part, at frequencies in Hz, shape (n,)."""
+    system = state_space(rig)
+    row = _output_row(rig, output)
+    s = 2j * np.pi * np.asarray(frequency)
+    eye = np.eye(len(system.a))
+    solved = np.linalg.solve(s[:, None, None] * eye - system.a, np.broadcast_to(system.b[:, :1], (len(s), len(eye), 1)))
+    response: ComplexArray = np.einsum("j,kj->k", row, solved[:, :, 0])
+    return response
+
+
+def _output_row(rig: Rig, output: str) -> FloatArray:
+    m = state_space(rig).mechanics
+    if output == "ft":
+        return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(rig, m, st.DEFLECTION_RATE)
+    return read_row(rig, m, {"position": st.OUTPUT_ANGLE, "velocity": st.OUTPUT_VELOCITY}[output])

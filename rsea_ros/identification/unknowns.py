@@ -1,0 +1,103 @@
+"""What a fit may move: values of the rig, parameters of effects, and the clocks of the sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect, Parameter
+from rsea_ros.model.rig import FIELDS, EffectSetting, Rig
+from rsea_ros.signals import FloatArray
+
+CLOCK = "clock"
+CLOCK_DOUBT = 1e-4
+"""s, one sigma. How far the stamps of a sensor may lie from the instant at which it measured."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number that a fit may move.
+
+    name: `rotor.reflected_inertia`, `coulomb_friction.torque`, `clock.ft`. low, high: bounds, SI.
+    logarithmic: the fit works on its logarithm. doubt: one sigma of the prior around `start`, in the
+    coordinate that the fit works in; inf for none. scale: a step of that coordinate that matters.
+    """
+
+    name: str
+    start: float
+    unit: str
+    low: float
+    high: float
+    logarithmic: bool
+    doubt: float
+    scale: float
+
+    def inner(self, value: float) -> float:
+        """Return the coordinate that the fit works in."""
+        return math.log(value) if self.logarithmic else value
+
+    def outer(self, coordinate: float) -> float:
+        """Return the value in SI, inside the bounds."""
+        value = math.exp(min(coordinate, 700.0)) if self.logarithmic else coordinate
+        return min(max(value, self.low), self.high)
+
+
+def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
+    """Return the values of the rig that a fit may move, with the rig's spread as their prior."""
+    return tuple(_rig_unknown(rig, name) for name in rig.free())
+
+
+def _rig_unknown(rig: Rig, name: str) -> Unknown:
+    value, spread = rig[name], rig.spread(name)
+    if value > 0.0:
+        return Unknown(name, value, rig.unit(name), value * 1e-4, value * 1e4, True, spread, 1.0)
+    return Unknown(name, value, rig.unit(name), FIELDS[name].low, math.inf, False, math.inf, 1.0)
+
+
+def unknowns_of_effect(effect: Effect, start: Mapping[str, float], known: Collection[str] = ()) -> tuple[Unknown, ...]:
+    """Return the parameters of an effect from a start, without a prior; not those listed as known."""
+    return tuple(_effect_unknown(effect, p, start[p.name]) for p in effect.parameters if f"{effect.name}.{p.name}" not in known)
+
+
+def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
+    scale = 1.0 if p.logarithmic else max(abs(p.typical), 1e-12)
+    start = min(max(start, p.low), p.high)
+    return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, math.inf, scale)
+
+
+def clocks(channels: Iterable[str]) -> tuple[Unknown, ...]:
+    """Return the clock errors of sensors, s: measured later than stamped when positive."""
+    return tuple(
+        Unknown(f"{CLOCK}.{c}", 0.0, "s", -1e-2, 1e-2, False, CLOCK_DOUBT, CLOCK_DOUBT)
+        for c in channels
+        if c != "motor_torque"
+    )
+
+
+def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, dict[str, float]]:
+    """Return the rig with the values of theta, effects included, and the clock errors by channel, s."""
+    values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
+    own = {n: v for n, v in values.items() if n in FIELDS}
+    offsets = {n.split(".")[1]: v for n, v in values.items() if n.startswith(CLOCK + ".")}
+    effects = tuple(_moved(e, values) for e in rig.effects)
+    return rig.with_values(own).with_effects(*effects), offsets
+
+
+def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
+    moved = {k: values.get(f"{setting.name}.{k}", v) for k, v in setting.parameters.items()}
+    return replace(setting, parameters=moved)
+
+
+def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
+    """Return where the fit begins, in its own coordinates."""
+    return np.array([u.inner(u.start) for u in unknowns])
+
+
+def with_effect(rig: Rig, name: str, parameters: Mapping[str, float]) -> Rig:
+    """Return the rig with one more effect acting."""
+    effect_named(name).vector(parameters)
+    return rig.with_effects(*rig.effects, EffectSetting(name, parameters))
