@@ -1,0 +1,54 @@
+"""`rsea identify`: parameters with confidence from recorded runs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from msg_adapters import read_record
+from rsea_ros.cli._progress import progress
+from rsea_ros.cli._topics import add_topic_options, topic_map
+
+HELP = "frequency response and parameters with confidence from recorded runs"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3")
+    parser.add_argument("--rig", default="paper_high_impedance", help="rig file, or the name of one in config/rigs (default %(default)s)")
+    parser.add_argument("--out", help="directory for identification.json, model.yaml, report.html (default out/identify-BAG)")
+    parser.add_argument("--json", action="store_true", help="print identification.json to stdout and nothing else")
+    add_topic_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Identify and write the results."""
+    from rsea_ros.identification.identify import identify
+    from rsea_ros.model.rig_file import load_rig
+    from rsea_ros.report.results import write_results
+
+    rig, topics = load_rig(args.rig), topic_map(args)
+    with progress("identify") as tell:
+        tell("reading", 0.0)
+        records = [read_record([bag], topics=topics) for bag in args.bags]
+        result = identify(records, rig, tell)
+        report = write_results(result, args.out or Path("out") / f"identify-{Path(args.bags[0]).stem}")
+    if args.json:
+        print((report.parent / "identification.json").read_text(encoding="utf-8"))
+        return 0
+    _print(result, report)
+    return 0
+
+
+def _print(result, report: Path) -> None:  # type: ignore[no-untyped-def]
+    from rich.console import Console
+
+    from rsea_ros.report.terminal import terminal_table
+
+    console = Console()
+    console.print(terminal_table(result, None))
+    for sentence in (*result.statements, *result.notes):
+        console.print(sentence, highlight=False)
+    console.print(f"report: {report}", highlight=False, soft_wrap=True)
+
+

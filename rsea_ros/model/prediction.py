@@ -1,0 +1,55 @@
+"""How well a model predicts a record that it has never seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import simulate
+from rsea_ros.signals import FloatArray, Record
+
+SETTLE = 0.3
+"""s at the start of a record that no comparison looks at: the bench may not have been at rest."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A channel at its stamps t (s): measured and predicted, in the channel's unit, and which samples count."""
+
+    t: FloatArray
+    measured: FloatArray
+    predicted: FloatArray
+    counts: np.ndarray
+
+    @property
+    def rms_error(self) -> float:
+        """RMS of predicted - measured, in the channel's unit."""
+        return float(np.sqrt(np.mean((self.predicted - self.measured)[self.counts] ** 2)))
+
+    @property
+    def fit_percent(self) -> float:
+        """100 (1 - ||e|| / ||y - mean y||), %."""
+        y = self.measured[self.counts]
+        scale = float(np.sqrt(np.mean((y - y.mean()) ** 2)))
+        return 100.0 * (1.0 - self.rms_error / scale) if scale > 0.0 else 0.0
+
+
+def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
+    """Simulate a rig on the commands of a record and hold it against every channel that was measured.
+
+    A rig without a spring is judged by the torque that the measured motion takes (see inverse.py).
+    """
+    if is_inverse(rig):
+        motion = motion_from(record)
+        return {"motor_torque": _comparison(motion.t, motion.torque, inverse_torque(rig, motion), edges=True)}
+    return {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+
+
+def _comparison(t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False) -> Comparison:
+    last = t[-1] - SETTLE if edges else t[-1]
+    counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SETTLE) & (t <= last)
+    return Comparison(t, measured, predicted, counts)
