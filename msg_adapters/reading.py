@@ -31,6 +31,11 @@ def read_record(
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
     contents = read_contents(paths, {topics.topic(role) for role in ROLES})
+    return record_from(contents, source, topics, strict=strict)
+
+
+def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
+    """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
     notes = contents.notes
     series: dict[str, Series] = {}
