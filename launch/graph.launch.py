@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from launch import LaunchDescription
+from launch import LaunchDescription, Substitution
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import EqualsSubstitution, LaunchConfiguration
 from launch_ros.actions import Node
 
 CONFIG = Path(__file__).resolve().parents[1] / "config" / "nodes"
@@ -21,33 +21,34 @@ ARGUMENTS = {
 }
 
 
+FIRST = {"plant": "rig", "driver": "rig", "replay": "bag"}
+OTHERS = {"identify": "rig", "record": None, "excite": None}
+"""Executables, and the launch argument that is a parameter of theirs."""
+
+
 def generate_launch_description() -> LaunchDescription:
     """Return the first node and, each if its argument is true, identify, record and excite."""
-    arguments = [
-        DeclareLaunchArgument(name, default_value=default, description=description)
-        for name, (default, description) in ARGUMENTS.items()
-    ]
-    others = ("identify", "record", "excite")
+    first = LaunchConfiguration("first")
     return LaunchDescription(
         [
-            DeclareLaunchArgument("first", description="source of measurements: plant, driver or replay"),
-            *arguments,
-            node(LaunchConfiguration("first")),
-            *(node(name, IfCondition(LaunchConfiguration(name))) for name in others),
+            DeclareLaunchArgument("first", description=f"source of measurements: {', '.join(FIRST)}"),
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=description)
+                for name, (default, description) in ARGUMENTS.items()
+            ),
+            *(node(name, own, EqualsSubstitution(first, name)) for name, own in FIRST.items()),
+            *(node(name, own, LaunchConfiguration(name)) for name, own in OTHERS.items()),
         ]
     )
 
 
-def node(executable: str | LaunchConfiguration, condition: IfCondition | None = None) -> Node:
-    """Return a node of the package with its parameter file; rig and bag go to those that declare them."""
+def node(name: str, own: str | None, wanted: Substitution) -> Node:
+    """Return a node of the package with its parameter file, started if `wanted` is true."""
     return Node(
         package="rsea_ros",
-        executable=executable,
+        executable=name,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[
-            PathJoinSubstitution([str(CONFIG), [executable, ".yaml"]]),
-            {"rig": LaunchConfiguration("rig"), "bag": LaunchConfiguration("bag")},
-        ],
-        condition=condition,
+        parameters=[str(CONFIG / f"{name}.yaml"), {own: LaunchConfiguration(own)} if own else {}],
+        condition=IfCondition(wanted),
         output="screen",
     )

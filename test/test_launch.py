@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import sys
 import types
@@ -10,15 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 LAUNCH = ROOT / "launch"
 API = {
-    "launch": ["LaunchDescription"],
+    "launch": ["LaunchDescription", "Substitution"],
     "launch.actions": ["DeclareLaunchArgument", "IncludeLaunchDescription"],
     "launch.conditions": ["IfCondition"],
     "launch.launch_description_sources": ["PythonLaunchDescriptionSource"],
-    "launch.substitutions": ["LaunchConfiguration", "PathJoinSubstitution"],
+    "launch.substitutions": ["EqualsSubstitution", "LaunchConfiguration"],
     "launch_ros": [],
     "launch_ros.actions": ["Node"],
 }
@@ -88,14 +90,24 @@ def test_the_graph_declares_every_argument_that_it_uses(describe):
 
 def test_only_the_first_node_and_identify_start_unasked(describe):
     parts = describe("graph")
-    first, *others = (part.options for part in parts if part.kind == "Node")
-    assert first["condition"] is None
-    assert configurations(first["executable"]) == {"first"}
-    asked = {node["executable"]: configurations(node["condition"]) for node in others}
-    assert asked == {name: {name} for name in ("identify", "record", "excite")}
-    assert [defaults(parts)[name] for name in asked] == ["true", "false", "false"]
+    wanted = {name: node["condition"].arguments[0] for name, node in nodes(parts).items()}
+    for name in FIRST.values():
+        first, value = wanted.pop(name).arguments
+        assert (configurations(first), value) == ({"first"}, name)
+    assert {name: configurations(part) for name, part in wanted.items()} == {name: {name} for name in wanted}
+    assert {name: defaults(parts)[name] for name in wanted} == {
+        "identify": "true", "record": "false", "excite": "false",
+    }
 
 
-def test_every_node_of_the_graph_has_a_parameter_file():
-    for name in ("plant", "driver", "replay", "identify", "record", "excite"):
-        assert (ROOT / "config" / "nodes" / f"{name}.yaml").is_file(), name
+def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
+    for name, node in nodes(describe("graph")).items():
+        file, own = node["parameters"]
+        given = set(yaml.safe_load(Path(file).read_text())["/**"]["ros__parameters"]) | set(own)
+        table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
+        assert given <= {parameter.name for parameter in table}, name
+
+
+def nodes(parts: list[Part]) -> dict[str, dict[str, Any]]:
+    """Return the options of every node by executable."""
+    return {part.options["executable"]: part.options for part in parts if part.kind == "Node"}
