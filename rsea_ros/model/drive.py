@@ -18,6 +18,9 @@ from rsea_ros.signals import Channel, FloatArray, Record
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
 
+ON_GRID = 1e-3
+"""Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
+
 
 @dataclass(frozen=True)
 class Drive:
@@ -26,6 +29,7 @@ class Drive:
     step: s. start: record time of the first step, s. command: mean over each step of the held command,
     N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
     each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
+    impulse: what the held command has brought by each of these beside its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start.
     """
 
@@ -33,6 +37,7 @@ class Drive:
     start: float
     command: FloatArray
     at: Mapping[str, FloatArray]
+    impulse: Mapping[str, FloatArray]
     reference: FloatArray
     angle: FloatArray
     initial: tuple[float, float]
@@ -64,17 +69,18 @@ def drive_from(record: Record, *, refine: int = 1, closed_loop: bool = False) ->
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
     count = math.ceil((stop - start) / step - 1e-6)
-    held = _mean_of_held(command.t - start, command.y, step, count)
+    knots, torque = _in_steps(command.t, start, step), command.y
     if closed_loop:
-        held = held - _mean_of_held(
-            command.t - start, np.interp(command.t, *_ty(record["motor_torque"])), step, count
-        )
+        torque = torque - np.interp(command.t, *_ty(record["motor_torque"]))
+    held = _mean_of_held(knots, torque, count)
+    at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
     ends = start + step * np.arange(1, count + 1)
     return Drive(
         step=step,
         start=start,
         command=held,
-        at=MappingProxyType({n: (record[n].t - start) / step for n in OUTPUTS if n in record}),
+        at=MappingProxyType(at),
+        impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=np.interp(ends, *_ty(record["position"])) if "position" in record else np.empty(0),
         initial=_initial(record),
@@ -100,46 +106,35 @@ def _initial(record: Record) -> tuple[float, float]:
     return position, velocity
 
 
+def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:
+    """Return stamps (s) in steps since `start`; those on the grid but for their rounding are put on it."""
+    at = (t - start) / step
+    nearest = np.rint(at)
+    result: FloatArray = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)
+    return result
+
+
+def _beside_mean(knots: FloatArray, y: FloatArray, means: FloatArray, at: FloatArray) -> FloatArray:
+    """Return the integral of the held signal less that of its means, at instants; all in steps."""
+    last = float(len(means))
+    held = np.concatenate([[0.0], np.cumsum(y * np.diff(knots, append=max(last, knots[-1])))])
+    stepped = np.concatenate([[0.0], np.cumsum(means)])
+    at = np.clip(at, 0.0, last)
+    knots = np.append(knots, max(last, knots[-1]))
+    beside: FloatArray = np.interp(at, knots, held) - np.interp(at, np.arange(last + 1.0), stepped)
+    return np.where(at == np.rint(at), 0.0, beside)
+
+
 @njit(cache=True, nogil=True)
-def _mean_of_held(t, y, step, count):  # type: ignore[no-untyped-def]
-    """Return the mean over each step of the piecewise constant signal y held from its stamps t (s)."""
+def _mean_of_held(at, y, count):  # type: ignore[no-untyped-def]
+    """Return the mean over each step of the piecewise constant signal y held from its stamps (in steps)."""
     means, k = np.empty(count), 0
     for i in range(count):
-        begin, end = i * step, (i + 1) * step
-        while k + 1 < len(t) and t[k + 1] <= begin:
+        while k + 1 < len(at) and at[k + 1] <= i:
             k += 1
-        total, at, j = 0.0, begin, k
-        while j + 1 < len(t) and t[j + 1] < end:
-            total += y[j] * (t[j + 1] - at)
-            at, j = t[j + 1], j + 1
-        means[i] = y[k] if j == k else (total + y[j] * (end - at)) / step
+        total, since, j = 0.0, float(i), k
+        while j + 1 < len(at) and at[j + 1] < i + 1:
+            total += y[j] * (at[j + 1] - since)
+            since, j = at[j + 1], j + 1
+        means[i] = y[k] if j == k else total + y[j] * (i + 1 - since)
     return means
-
-
-@njit(cache=True, nogil=True)
-def _sample_smooth(values, at):  # type: ignore[no-untyped-def]
-    """Interpolate values at steps 0, 1, 2, … at fractional steps, by cubics through four points."""
-    out, last = np.empty(len(at)), len(values) - 1
-    for i in range(len(at)):
-        u = min(max(at[i], 0.0), float(last))
-        k = min(max(int(u), 1), last - 2)
-        w = u - k
-        a, b, c, d = values[k - 1], values[k], values[k + 1], values[k + 2]
-        out[i] = b + 0.5 * w * (c - a + w * (2 * a - 5 * b + 4 * c - d + w * (3 * (b - c) + d - a)))
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _sample_held(values, at):  # type: ignore[no-untyped-def]
-    """Return the value of the step that ends nearest to each instant (a hold that just ended)."""
-    out = np.empty(len(at))
-    for i in range(len(at)):
-        out[i] = values[min(max(int(np.rint(at[i])), 1), len(values) - 1)]
-    return out
-
-
-def sample(name: str, values: FloatArray, at: FloatArray) -> FloatArray:
-    """Return a simulated channel at its sampling instants; `values` begins with the initial one."""
-    sampler = _sample_held if name == "motor_torque" else _sample_smooth
-    result: FloatArray = sampler(values, at)
-    return result

@@ -87,6 +87,18 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
     )
 
 
+def initial_state(rig: Rig, output: tuple[float, float]) -> FloatArray:
+    """Return the state of least energy with this output angle (rad) and velocity (rad/s), shape (2n,).
+
+    So an encoder that starts away from zero turns what is free to turn and leaves the spring alone.
+    """
+    m = mechanics(rig)
+    row = np.array(_DIFFERENCES[st.OUTPUT_ANGLE]) @ m.placement
+    stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
+    least = [np.linalg.solve(energy, row) for energy in (stiff, m.mass)]
+    return np.concatenate([value * x / (row @ x) for value, x in zip(output, least, strict=True)])
+
+
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
     """Return the rows of position, velocity and linear spring torque."""
     position, velocity = (read_row(rig, m, s) for s in (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY))

@@ -15,12 +15,16 @@ import numpy as np
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
-from rsea_ros.model.drive import Drive, drive_from, sample, steps_per_sample
+from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.loop import control
-from rsea_ros.model.propagator import propagator
+from rsea_ros.model.propagator import initial_state, propagator
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.signals import Channel, FloatArray, Record
+
+CREEP_VELOCITY = 2e-3
+"""rad/s. Below it a gear with friction creeps (presliding); standing still would make the step stiff."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,19 @@ def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, F
     run(machine, drive.command, out[1:], reference=drive.reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
-    return {n: sample(n, out[:, OUTPUTS.index(n)], drive.at[n]) for n in channels}
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], drive.at[n], drive.command) for n in channels}
+    return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
+
+
+def _kick(machine: Machine, channel: str) -> float:
+    """Return what an impulse of the command does to a channel at once, its unit per N m s.
+
+    None where an effect changes the command on its way.
+    """
+    if channel == "motor_torque" or machine.calls.first[st.Port.GEAR] > 0:
+        return 0.0
+    at_once = machine.linear.outputs[("position", "velocity", "ft").index(channel)] @ machine.linear.g[:, 0]
+    return float(at_once / machine.table[st.STEP])
 
 
 def _middles(ends: FloatArray) -> FloatArray:
@@ -85,8 +101,9 @@ def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] =
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
+    table[st.CREEP] = CREEP_VELOCITY
     table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
-    x = np.linalg.pinv(linear.outputs[:2]) @ np.array(initial) if any(initial) else np.zeros(len(linear.phi))
+    x = initial_state(rig, initial)
     table[[st.POSITION, st.OUTPUT_ANGLE]], table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
     table[st.FT] = linear.outputs[2] @ x
     return Machine(linear, calls, x, table, np.zeros(states))
