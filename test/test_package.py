@@ -33,7 +33,8 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def environment() -> dict[str, str]:
     """Return this environment without the source tree on Python's path."""
-    return {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    search = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    return os.environ | {"PYTHONPATH": os.pathsep.join(place for place in search if place != str(ROOT))}
 
 
 def start(workspace: Path, *command: str) -> subprocess.Popen[str]:
