@@ -3,18 +3,20 @@
     T = -offset - 1/2 viscous_difference * |w|,   w the speed of the gear output against the housing
 
 offset (N m) is the one-sided part: what the drive takes more forward than backward. viscous_difference
-(N m s/rad) is how much the viscous coefficient forward exceeds the one backward. Source: Janot, Gautier,
-Brunot, Data set and reference models of EMPS, 2019 (offset); realdata README (two viscous coefficients).
+(N m s/rad) is how much the viscous coefficient forward exceeds the one backward; their mean is b_m, and it
+counts up to 2 b_m, where one of them is zero. Source: Janot, Gautier, Brunot, Data set and reference models
+of EMPS, 2019 (offset); realdata README (two viscous coefficients).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+from rsea_ros.effects.signal_table import B_M, GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the one-sided torque from the torque on the gear output."""
-    s[GEAR_TORQUE] -= p[0] + 0.5 * p[1] * abs(s[GEAR_VELOCITY])
+    difference = min(max(p[1], -2.0 * s[B_M]), 2.0 * s[B_M])
+    s[GEAR_TORQUE] -= p[0] + 0.5 * difference * abs(s[GEAR_VELOCITY])
 
 
 EFFECT = Effect(
