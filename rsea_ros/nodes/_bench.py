@@ -1,0 +1,60 @@
+"""The topics of a bench, which plant and driver share: measurements out, commands in."""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.node import Node
+
+from msg_adapters.ros import JointState, WrenchStamped, effort_of, joint_state_message, wrench_message
+from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.device import State
+from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+
+class Bench:
+    """Publishes readings, and puts what comes on `torque_command` into a queue."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.commands = CommandQueue()
+        self._told = (0, 0, 0)
+        self._states = node.create_publisher(JointState, "joint_states", MEASUREMENT)
+        self._ft = node.create_publisher(WrenchStamped, "ft", MEASUREMENT)
+        self._subscription = node.create_subscription(JointState, "torque_command", self._command, COMMAND)
+
+    def publish(self, state: State) -> None:
+        """Publish one reading under its stamps."""
+        self._states.publish(
+            joint_state_message(state.stamp, state.position, state.velocity, state.motor_torque)
+        )
+        if state.wrench is not None:
+            self._ft.publish(wrench_message(state.ft_stamp, state.wrench))
+
+    def report(self, cycle: Cycle) -> Report:
+        """Return the health of a bench that runs in a cycle; warnings are of what is new since the last."""
+        timing, commands = cycle.timing(), self.commands
+        counts = (timing.missed, commands.late, commands.refused)
+        new = [now - before for now, before in zip(counts, self._told, strict=True)]
+        self._told = counts
+        kinds = ("cycles missed", "commands late", "commands refused")
+        troubles = [f"{count} {kind}" for count, kind in zip(new, kinds, strict=True) if count]
+        values = {**timing.values(), **commands.values(time.time_ns())}
+        return Report(WARN if troubles else OK, ", ".join(troubles) or "running", values)
+
+    def close(self) -> None:
+        """Take the topics away."""
+        for publisher in (self._states, self._ft):
+            self._node.destroy_publisher(publisher)
+        self._node.destroy_subscription(self._subscription)
+
+    def _command(self, message: JointState) -> None:
+        try:
+            stamp, torque = effort_of(message)
+        except ParameterError as error:
+            self._node.get_logger().error(f"torque_command: {error}", throttle_duration_sec=1.0)
+            return
+        self.commands.add(stamp, torque, time.time_ns())

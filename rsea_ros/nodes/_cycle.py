@@ -1,0 +1,101 @@
+"""A thread that works at absolute deadlines. Timers of rclpy lose ticks at 1 kHz and drift; this does not."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+SECOND = 1_000_000_000
+LONGEST_CATCH_UP = SECOND
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a cycle did since the last report: periods in s, and all cycles missed since its start."""
+
+    mean: float
+    p99: float
+    longest: float
+    missed: int
+
+    def values(self) -> dict[str, object]:
+        """Return it as diagnostics show it."""
+        return {
+            "period_mean_ms": f"{self.mean * 1e3:.4f}",
+            "period_p99_ms": f"{self.p99 * 1e3:.4f}",
+            "period_max_ms": f"{self.longest * 1e3:.4f}",
+            "missed_cycles": self.missed,
+        }
+
+
+class Cycle:
+    """Call `work(stamp)` at start + k / rate, stamp being that instant in ns since the epoch.
+
+    A cycle is missed when the next one was due before it began. catch_up: missed cycles are worked off late,
+    each with its own stamp (no more than a second of them); else they are left out.
+    The system clock is read once: stamps are even whatever is done to the clock later.
+    """
+
+    def __init__(self, rate: float, work: Callable[[int], None], *, catch_up: bool) -> None:
+        self._rate, self._work, self._catch_up = rate, work, catch_up
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._began: list[int] = []
+        self._missed = 0
+        self.error: Exception | None = None
+
+    def start(self, first: int | None = None) -> None:
+        """Begin with the cycle of stamp `first`, by default one period from now."""
+        self._offset = time.time_ns() - time.monotonic_ns()
+        self._first = time.time_ns() + self._instant(1) if first is None else first
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End after the cycle that runs now."""
+        self._stop.set()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            self._thread.join()
+
+    def running(self) -> bool:
+        """Tell whether it is still at it. Raises what `work` has raised."""
+        if self.error is not None:
+            raise self.error
+        return self._thread.is_alive()
+
+    def timing(self) -> Timing:
+        """Return the statistics since the last call."""
+        began, self._began = self._began, self._began[-1:]
+        periods = np.diff(began) / SECOND if len(began) > 1 else np.array([0.0])
+        return Timing(
+            float(periods.mean()), float(np.quantile(periods, 0.99)), float(periods.max()), self._missed
+        )
+
+    def _instant(self, k: int) -> int:
+        return round(k * SECOND / self._rate)
+
+    def _run(self) -> None:
+        k = 0
+        try:
+            while not self._stop.is_set():
+                due = self._first + self._instant(k) - self._offset
+                wait_until(due)
+                now = time.monotonic_ns()
+                self._began.append(now)
+                late = int((now - due) * self._rate / SECOND)
+                self._missed += late > 0
+                self._work(due + self._offset)
+                allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
+                k += 1 + (late if late > allowed else 0)
+        except Exception as error:  # handed to the main thread by `running`
+            self.error = error
+
+
+def wait_until(due: int) -> None:
+    """Sleep until an instant of the monotonic clock, ns; not at all when it is over."""
+    wait = due - time.monotonic_ns()
+    if wait > 0:
+        time.sleep(wait / SECOND)

@@ -1,0 +1,101 @@
+"""Parameters of a node: a table with description, unit and range; what does not fit it is refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters.ros import parameter_descriptor
+from rsea_ros.errors import ParameterError
+
+Value = bool | int | float | str
+
+_ROS_OWN = ("use_sim_time", "start_type_description_service")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter. Its type is the default's; a whole number does for a float.
+
+    low, high: inclusive range of a number. choices: what a text may be.
+    """
+
+    name: str
+    default: Value
+    description: str
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    choices: Sequence[str] = ()
+
+    def expected(self) -> str:
+        """Return what a value must be, in words."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        kind = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[
+            type(self.default)
+        ]
+        bounds = "" if self.low is None else f" from {self.low:g} to {self.high:g}"
+        return f"{kind}{bounds}{f' {self.unit}' if self.unit else ''}"
+
+    def checked(self, value: Any) -> Value:
+        """Return a value that fits, in the type of the default. Raises ParameterError for any other."""
+        if isinstance(self.default, float) and type(value) is int:
+            value = float(value)
+        if type(value) is not type(self.default) or not self._fits(value):
+            raise ParameterError(f"parameter {self.name} = {value!r}, expected {self.expected()}")
+        result: Value = value
+        return result
+
+    def _fits(self, value: Value) -> bool:
+        if isinstance(value, str):
+            return not self.choices or value in self.choices
+        return math.isfinite(value) and (
+            self.low is None or self.high is None or self.low <= value <= self.high
+        )
+
+
+def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
+    """Declare a table on a node and return the values.
+
+    The node was made with `automatically_declare_parameters_from_overrides`, so it has what was given.
+    Raises ParameterError for a value that does not fit, and for a name that the table does not have.
+    """
+    given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+    _refuse_unknown(given, table)
+    values = {p.name: p.checked(given.get(p.name, p.default)) for p in table}
+    for parameter in table:
+        if parameter.name in given:
+            node.undeclare_parameter(parameter.name)
+        node.declare_parameter(
+            parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
+        )
+    return values
+
+
+def _refuse_unknown(given: Mapping[str, Any], table: Sequence[Parameter]) -> None:
+    names = [p.name for p in table]
+    for name in given:
+        if name not in names and name not in _ROS_OWN and not name.startswith("qos_overrides."):
+            raise ParameterError(f"parameter {name}: no such parameter, expected one of {', '.join(names)}")
+
+
+def _descriptor(parameter: Parameter) -> Any:
+    low, high, bounds = parameter.low, parameter.high, None
+    if low is not None and high is not None:
+        bounds = (int(low), int(high)) if isinstance(parameter.default, int) else (float(low), float(high))
+    return parameter_descriptor(_described(parameter), f"expected {parameter.expected()}", bounds)
+
+
+def _described(parameter: Parameter) -> str:
+    return f"{parameter.description}, {parameter.unit}" if parameter.unit else parameter.description
+
+
+def usage(name: str, table: Sequence[Parameter]) -> str:
+    """Return the help text of a node."""
+    rows = [f"  {p.name:<11} {_described(p)}; {p.expected()} (default {p.default!r})" for p in table]
+    return "\n".join([f"usage: ros2 run rsea_ros {name} --ros-args -p NAME:=VALUE …", "", *rows, ""])

@@ -1,0 +1,111 @@
+"""From the start of a node's process to its exit status."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Any, Protocol
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.nodes._parameters import Parameter, declare, usage
+
+NAMESPACE = "rsea"
+SUCCESS, BAD_INPUT, INTERRUPTED = 0, 2, 130
+
+
+class Program(Protocol):
+    """What a node's file makes: its work beside the callbacks."""
+
+    def finished(self) -> bool:
+        """Tell whether the work is done; raises what has gone wrong in a thread."""
+
+    def conclude(self) -> None:
+        """Do what is left once the work is done or was stopped; Ctrl-C interrupts this one."""
+
+    def close(self) -> None:
+        """Leave nothing behind: torque zero, threads joined, files closed. On every way out."""
+
+
+def run_node(
+    name: str,
+    table: Sequence[Parameter],
+    make: Callable[[Any, dict[str, Any]], Program],
+    *,
+    kind: type[Node] = Node,
+    endless: bool = True,
+) -> int:
+    """Run one node in this process and return the exit status.
+
+    endless: to be stopped is the regular end; else it is an interruption (status 130).
+    Whatever the user can put right is one line in the log and status 2.
+    """
+    arguments = remove_ros_args(sys.argv)[1:]
+    if "--help" in arguments or "-h" in arguments:
+        sys.stdout.write(usage(name, table))
+        return SUCCESS
+    stop = _Stop()
+    try:
+        _initialise(arguments)
+        node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        done = _work(node, make(node, declare(node, table)), stop)
+        return SUCCESS if done or endless else INTERRUPTED
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except (RseaError, OSError) as error:
+        get_logger(name).fatal(" ".join(str(error).split()))
+        return BAD_INPUT
+    finally:
+        rclpy.try_shutdown()
+
+
+class _Stop:
+    """SIGINT and SIGTERM only ask: the node publishes its zeros before it goes."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._ask)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+
+    def interrupt(self) -> None:
+        """From now on SIGINT and SIGTERM raise KeyboardInterrupt."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
+
+
+def _initialise(arguments: Sequence[str]) -> None:
+    """Start ROS. Raises ParameterError for arguments that it cannot read."""
+    if arguments:
+        raise ParameterError(f"argument {arguments[0]!r}, expected --ros-args -p NAME:=VALUE (see --help)")
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise ParameterError(f"ROS arguments: {str(error).split(', at /')[0]}") from None
+
+
+def _work(node: Node, program: Program, stop: _Stop) -> bool:
+    """Spin until the program has finished or a signal asks to stop; return whether it had finished."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        done = False
+        while not (stop.asked or done):
+            executor.spin_once(timeout_sec=0.1)
+            done = program.finished()
+        stop.interrupt()
+        program.conclude()
+        return done
+    finally:
+        program.close()
+        executor.shutdown()

@@ -1,0 +1,123 @@
+"""identify: gathers a record from the topics and identifies the actuator, as `rsea identify` does."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters.contents import Contents
+from msg_adapters.reading import record_from
+from msg_adapters.ros import Trigger, message_type
+from msg_adapters.topics import AXES, ROLES, TYPES, TopicMap
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._health import OK, WARN, Health, Report
+from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
+from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._tap import Tap
+
+TABLE = (
+    Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
+    Parameter("out", "out/identify", "directory of the results"),
+    Parameter(
+        "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
+    ),
+    Parameter(
+        "quiet", 1.0, "finish so long after the last command, once nobody publishes any", "s", 0.1, 1e3
+    ),
+    Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+)
+
+
+class Identify:
+    """Taps into the contract's topics; the identification begins when the commands are over.
+
+    They are over when some have come, none has for `quiet` seconds, and torque_command has no publisher any
+    more (the replay or the excitation has ended), or when ~/finish is called.
+    """
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        self._node, self._values = node, values
+        self._rig = load_rig(values["rig"])
+        self._taps = {role: self._tap(role) for role in ROLES}
+        self._topics = TopicMap(**{role: tap.topic for role, tap in self._taps.items()}, axis=values["axis"])
+        self._contents = Contents()
+        self._commanded, self._asked, self._done = 0.0, False, False
+        self._service = node.create_service(Trigger, "~/finish", self._on_finish)
+        self._health = Health(node, self._report)
+        node.create_timer(1.0, self._tell)
+
+    def _tap(self, role: str) -> Tap:
+        qos = RECORD_RELIABLE if self._values["reliable"] else RECORD
+        return Tap(
+            self._node, message_type(TYPES[role]), role, qos, lambda *message: self._keep(role, *message)
+        )
+
+    def _keep(self, role: str, received: int, raw: bytes) -> None:
+        sink = self._contents.sink(self._topics.topic(role), TYPES[role])
+        assert sink is not None
+        sink.log_times.append(received)
+        sink.raw.append(raw)
+        if role == "torque_command":
+            self._commanded = time.monotonic()
+
+    def _on_finish(self, request: Any, response: Any) -> Any:
+        self._asked = True
+        response.success, response.message = True, f"identifying from {self._gathered()}"
+        return response
+
+    def finished(self) -> bool:
+        """Tell whether the commands are over."""
+        waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
+        over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
+        self._done = self._asked or over
+        return self._done
+
+    def conclude(self) -> None:
+        """Identify and write the results, or do nothing when stopped before."""
+        from rsea_ros.identification.identify import identify
+        from rsea_ros.report.results import write_results
+
+        if not self._done:
+            return
+        log = self._node.get_logger()
+        log.info(f"identifying from {self._gathered()}")
+        record = record_from(self._contents, self._topics.topic("torque_command"), self._topics)
+        result = identify([record], self._rig, self._progress)
+        report = write_results(result, [record], self._values["out"])
+        for p in result.parameters:
+            log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
+        log.info(f"report: {report}")
+
+    def _progress(self, step: str, share: float) -> None:
+        self._node.get_logger().info(f"{share:.0%} {step}")
+
+    def close(self) -> None:
+        """Leave nothing behind."""
+
+    def _gathered(self) -> str:
+        lost = sum(tap.lost for tap in self._taps.values())
+        return (
+            ", ".join(f"{tap.count} {role}" for role, tap in self._taps.items() if tap.count)
+            + f", {lost} lost"
+        )
+
+    def _tell(self) -> None:
+        self._node.get_logger().info(self._gathered() if self._commanded else "waiting for torque_command")
+
+    def _report(self) -> Report:
+        lost = sum(tap.lost for tap in self._taps.values())
+        counts = {role: tap.count for role, tap in self._taps.items()}
+        return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("identify", TABLE, Identify, endless=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,80 @@
+"""plant: a simulated bench in real time, for any rig."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from rclpy.node import Node
+
+from rsea_ros.hardware.simulated import SimulatedDevice
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._bench import Bench
+from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._health import Health
+from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._run import run_node
+
+TABLE = (
+    Parameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
+    Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0),
+    Parameter("seed", 0, "seed of the sensors' noise", "", 0, 2**31 - 1),
+    Parameter("noise", True, "whether the sensors have their noise and quantum"),
+    Parameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
+)
+
+
+class Plant:
+    """Simulates up to each deadline with the commands that took effect until then, and publishes.
+
+    The simulation ends at the instant that the stamp names; a command with a stamp in between acts from that
+    stamp on, so a bag of these topics tells what has happened, without a delay of its own.
+    """
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        rig = load_rig(values["rig"])
+        self._now = 0
+        self._device = SimulatedDevice(
+            rig,
+            values["rate"],
+            seed=values["seed"],
+            noise=values["noise"],
+            duration=values["duration"],
+            clock=lambda: self._now,
+        )
+        self._bench = Bench(node)
+        self._cycle = Cycle(values["rate"], self._step, catch_up=True)
+        self._health = Health(node, lambda: self._bench.report(self._cycle))
+        node.get_logger().info(f"rig {rig.name} at {values['rate']:g} Hz")
+        self._cycle.start()
+
+    def _step(self, stamp: int) -> None:
+        if not self._now:
+            self._now = stamp
+            self._device.open()
+        for instant, torque in self._bench.commands.take(stamp):
+            self._now = instant
+            self._device.write(torque)
+        self._now = stamp
+        self._bench.publish(self._device.read())
+
+    def finished(self) -> bool:
+        """Run until stopped."""
+        return not self._cycle.running()
+
+    def conclude(self) -> None:
+        """Leave nothing to do."""
+
+    def close(self) -> None:
+        """Stop the simulation, at zero torque."""
+        self._cycle.stop()
+        self._device.close()
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("plant", TABLE, Plant)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+"""record: writes what is published under the contract's topics into a bag."""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters import BagWriter
+from msg_adapters.ros import message_type
+from msg_adapters.topics import JOINT_STATE, WRENCH
+from rsea_ros.nodes._health import OK, WARN, Health, Report
+from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
+from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._tap import Tap
+
+TOPICS = {
+    "torque_command": JOINT_STATE,
+    "joint_states": JOINT_STATE,
+    "ft": WRENCH,
+    "torque_estimate": JOINT_STATE,
+    "desired_torque": JOINT_STATE,
+    "desired_position": JOINT_STATE,
+    "pure_torque": "std_msgs/msg/Bool",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+}
+RELIABLE = {"torque_command", "desired_torque"}
+
+TABLE = (
+    Parameter("out", "", "bag to write; empty: runs/ and the time"),
+    Parameter("storage", "mcap", "format of the bag", choices=("mcap", "sqlite3")),
+    Parameter("duration", 0.0, "length of the recording; 0: until stopped", "s", 0.0, 1e6),
+    Parameter("quiet", 0.0, "stop when torque_command has been silent for so long; 0: never", "s", 0.0, 1e4),
+)
+
+
+class Record:
+    """Taps on every topic, one bag. Log times are when a message was received."""
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        self._node = node
+        self._duration: float = values["duration"]
+        self._quiet: float = values["quiet"]
+        path = values["out"] or f"runs/{time.strftime('%Y%m%d-%H%M%S')}"
+        self._bag = BagWriter(path, values["storage"]).__enter__()
+        self._taps = {name: self._tap(name, kind) for name, kind in TOPICS.items()}
+        self._begin, self._commanded = time.monotonic(), 0.0
+        self._health = Health(node, self._report)
+        node.create_timer(2.0, self._tell)
+        node.get_logger().info(f"recording into {self._bag.path}")
+
+    def _tap(self, name: str, kind: str) -> Tap:
+        qos = RECORD_RELIABLE if name in RELIABLE else RECORD
+        return Tap(self._node, message_type(kind), name, qos, partial(self._write, name, kind))
+
+    def _write(self, name: str, kind: str, received: int, raw: bytes) -> None:
+        if name == "torque_command":
+            self._commanded = time.monotonic()
+        self._bag.write(self._taps[name].topic, kind, received, raw)
+
+    def finished(self) -> bool:
+        """Tell whether the duration is over, or the commands have ceased."""
+        now = time.monotonic()
+        ceased = self._commanded > 0.0 and now - self._commanded > self._quiet > 0.0
+        return ceased or now - self._begin > self._duration > 0.0
+
+    def conclude(self) -> None:
+        """Say what was recorded."""
+        self._tell()
+
+    def close(self) -> None:
+        """Complete the bag."""
+        self._bag.__exit__(*sys.exc_info())
+
+    def _counts(self) -> dict[str, int]:
+        return {name: tap.count for name, tap in self._taps.items() if tap.count}
+
+    def _lost(self) -> int:
+        return sum(tap.lost for tap in self._taps.values())
+
+    def _tell(self) -> None:
+        counts = ", ".join(f"{count} {name}" for name, count in self._counts().items())
+        self._node.get_logger().info(f"{counts or 'nothing yet'}; {self._lost()} lost")
+
+    def _report(self) -> Report:
+        lost = self._lost()
+        return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "recording", self._counts())
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("record", TABLE, Record)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""replay: publishes a bag again, with the stamps that its messages have, at any pace, and /clock."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterable
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from msg_adapters import iterate
+from msg_adapters.ros import Clock, clock_message, message_type
+from rsea_ros.errors import BagError, ParameterError
+from rsea_ros.nodes._cycle import SECOND, wait_until
+from rsea_ros.nodes._health import OK, Health, Report
+from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
+from rsea_ros.nodes._run import run_node
+
+TABLE = (
+    Parameter("bag", "", "bag to play, a directory or a file"),
+    Parameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "1", 0.01, 1000.0),
+    Parameter("start", 0.0, "begin so far into the bag", "s", 0.0, 1e6),
+    Parameter(
+        "subscribers", 1, "subscriptions to wait for on each of WAIT_FOR; 0: begin at once", "", 0, 100
+    ),
+    Parameter("clock", True, "whether to publish /clock"),
+)
+WAIT_FOR = ("torque_command", "joint_states", "ft")
+NEVER = {"/diagnostics", "/clock", "/rosout", "/parameter_events"}
+CLOCK_PERIOD = SECOND // 100
+HEARTBEAT = Duration(seconds=4)
+"""Longer than the middleware takes to learn that a reliable subscriber has everything."""
+
+
+class Replay:
+    """A thread that publishes serialised messages when they are due. It ends when all have arrived."""
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        if not values["bag"]:
+            raise ParameterError("parameter bag is empty, expected the path of a bag")
+        self._node, self._pace = node, values["rate"]
+        rows = list(iterate(values["bag"]))
+        begin = rows[0][2] + round(values["start"] * SECOND) if rows else 0
+        self._rows = [row for row in rows if row[2] >= begin and row[0] not in NEVER]
+        if not self._rows:
+            raise BagError(f"{values['bag']}: no message after {values['start']:g} s, expected some")
+        self._publishers = self._advertise({(topic, kind) for topic, kind, _, _ in self._rows})
+        self._clock = node.create_publisher(Clock, "/clock", COMMAND) if values["clock"] else None
+        self._wanted = values["subscribers"]
+        self._played, self._stop, self._done = 0, threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._health = Health(node, self._report)
+        node.create_timer(1.0, self._tell)
+        self._thread.start()
+
+    def _advertise(self, topics: Iterable[tuple[str, str]]) -> dict[str, Publisher[Any]]:
+        """Return a publisher for each topic whose type is installed."""
+        publishers = {}
+        for topic, kind in topics:
+            qos = LATCHED if topic.endswith("/pure_torque") else RECORD_RELIABLE
+            try:
+                publishers[topic] = self._node.create_publisher(message_type(kind), topic, qos)
+            except ParameterError as error:
+                self._node.get_logger().warning(f"{topic} is left out: {error}")
+        return publishers
+
+    def _awaited(self) -> bool:
+        """Tell whether subscribers are still missing."""
+        return any(
+            publisher.get_subscription_count() < self._wanted
+            for topic, publisher in self._publishers.items()
+            if topic.rpartition("/")[2] in WAIT_FOR
+        )
+
+    def _run(self) -> None:
+        while self._awaited():
+            if self._stop.wait(0.05):
+                return
+        begin, first, ticked = time.monotonic_ns(), self._rows[0][2], 0
+        for topic, _, logged, raw in self._rows:
+            if self._stop.is_set():
+                return
+            wait_until(begin + round((logged - first) / self._pace))
+            if self._clock and time.monotonic_ns() - ticked > CLOCK_PERIOD:
+                self._clock.publish(clock_message(logged))
+                ticked = time.monotonic_ns()
+            if topic in self._publishers:
+                self._publishers[topic].publish(raw)
+            self._played += 1
+        for publisher in self._publishers.values():
+            publisher.wait_for_all_acked(HEARTBEAT)
+        self._done.set()
+
+    def finished(self) -> bool:
+        """Tell whether everything is out and has arrived."""
+        return self._done.is_set()
+
+    def conclude(self) -> None:
+        """Say how much was played."""
+        self._tell()
+
+    def close(self) -> None:
+        """Stop playing."""
+        self._stop.set()
+        self._thread.join()
+
+    def _tell(self) -> None:
+        if self._played:
+            self._node.get_logger().info(
+                f"{self._played / len(self._rows):.0%} of {len(self._rows)} messages"
+            )
+        else:
+            wanted = f"{self._wanted} subscription(s) of {', '.join(WAIT_FOR)}; subscribers:=0 begins at once"
+            self._node.get_logger().info(f"waiting for {wanted}", throttle_duration_sec=5.0)
+
+    def _report(self) -> Report:
+        return Report(OK, "playing", {"played": self._played, "messages": len(self._rows)})
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("replay", TABLE, Replay, endless=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
