@@ -1,0 +1,108 @@
+"""The slow and obvious way: energies, states, held commands, and nothing of the step of `rsea_ros.model`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import expm
+
+from rsea_ros.model.rig import Rig
+
+MOVABLE = ("housing", "gear", "chassis", "distal")
+
+
+def coordinates(rig: Rig) -> np.ndarray:
+    """Return the angles of housing, gear output, chassis, distal side by free coordinate, shape (4, n)."""
+    names = ["gear"]
+    names += ["chassis"] if math.isfinite(rig["gear.stiffness"]) else []
+    names += [] if rig.rigid_spring else ["distal"]
+    follow = {"gear": "gear", "chassis": "chassis" if "chassis" in names else "gear", "housing": "housing"}
+    follow["distal"] = "distal" if "distal" in names else follow["chassis"]
+    names = ["housing", *names]
+    if "housing_end" in rig.clamped:
+        names.remove("housing")
+    if "spring_end" in rig.clamped:
+        names.remove(follow["distal"])
+    return np.array([[1.0 if follow[part] == name else 0.0 for name in names] for part in MOVABLE])
+
+
+def kinetic(rig: Rig, w: np.ndarray) -> float:
+    """Return the kinetic energy at speeds w of housing, gear output, chassis, distal side, J."""
+    ratio = rig["gear.ratio"]
+    carrier = w[0] + ratio * (w[1] - w[0])  # annulus on the housing
+    annulus = w[0] - (ratio - 1.0) * (w[1] - w[0])  # carrier on the housing
+    rotor = carrier if rig.train == "planetary" else annulus
+    energy = rig["rotor.reflected_inertia"] / ratio**2 * rotor**2 + rig["chassis.inertia"] * w[2] ** 2
+    return 0.5 * (energy + sum(_end(rig, end, "inertia") * w[i] ** 2 for i, end in _ENDS))
+
+
+def dissipation(rig: Rig, w: np.ndarray) -> float:
+    """Return half the power lost, W."""
+    inside = rig["rotor.reflected_damping"] * (w[1] - w[0]) ** 2 + rig["spring.damping"] * (w[2] - w[3]) ** 2
+    return 0.5 * (inside + sum(_end(rig, end, "damping") * w[i] ** 2 for i, end in _ENDS))
+
+
+def potential(rig: Rig, q: np.ndarray, *, small_angles: bool = False) -> float:
+    """Return the energy in springs and in gravity, J."""
+    energy = 0.0 if rig.rigid_spring else 0.5 * rig["spring.stiffness"] * (q[2] - q[3]) ** 2
+    if math.isfinite(rig["gear.stiffness"]):
+        energy += 0.5 * rig["gear.stiffness"] * (q[1] - q[2]) ** 2
+    for i, end in _ENDS:
+        rise = 0.5 * q[i] ** 2 if small_angles else 1.0 - math.cos(q[i])
+        energy += 0.5 * _end(rig, end, "stiffness") * q[i] ** 2 + _end(rig, end, "gravity") * rise
+    return energy
+
+
+_ENDS = ((0, "housing_end"), (3, "spring_end"))
+
+
+def _end(rig: Rig, end: str, key: str) -> float:
+    return 0.0 if end in rig.clamped else rig[f"{end}.{key}"]
+
+
+def quadratic(form, p: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Return A of form(P x) = 1/2 x' A x, by polarisation."""
+    n = p.shape[1]
+    basis = np.eye(n)
+    single = [form(p @ e) for e in basis]
+    return np.array(
+        [[form(p @ (basis[i] + basis[j])) - single[i] - single[j] for j in range(n)] for i in range(n)]
+    )
+
+
+def state_matrices(rig: Rig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return A, B (motor torque) and C (position, velocity, ft) of the small motions, from the energies."""
+    p = coordinates(rig)
+    mass = quadratic(lambda w: kinetic(rig, w), p)
+    damping = quadratic(lambda w: dissipation(rig, w), p)
+    stiffness = quadratic(lambda q: potential(rig, q, small_angles=True), p)
+    n = p.shape[1]
+    a, b, c = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), np.zeros((3, 2 * n))
+    a[:n, n:] = np.eye(n)
+    a[n:, :n], a[n:, n:] = -np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)
+    b[n:] = np.linalg.solve(mass, p[1] - p[0])
+    c[0, :n] = c[1, n:] = p[2] - p[0]
+    if not rig.rigid_spring:
+        c[2] = np.concatenate(
+            [rig["spring.stiffness"] * (p[2] - p[3]), rig["spring.damping"] * (p[2] - p[3])]
+        )
+    return a, b, c
+
+
+def respond(rig: Rig, stamps: np.ndarray, command: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return position, velocity, ft at the wanted times, shape (3, n): exact from event to event, no grid."""
+    a, b, c = state_matrices(rig)
+    n = len(b)
+    events = np.unique(np.concatenate([stamps, wanted[wanted > stamps[0]]]))
+    held = command[np.clip(np.searchsorted(stamps, events, side="right") - 1, 0, None)]
+    x, states, cache = np.zeros(n), {events[0]: np.zeros(n)}, {}
+    for now, then, u in zip(events[:-1], events[1:], held[:-1], strict=True):
+        span = round(then - now, 13)
+        if span not in cache:
+            block = np.zeros((n + 1, n + 1))
+            block[:n, :n], block[:n, n] = a * span, b * span
+            cache[span] = expm(block)
+        x = cache[span][:n, :n] @ x + cache[span][:n, n] * u
+        states[then] = x
+    return c @ np.array([states[max(t, events[0])] for t in wanted]).T

@@ -1,0 +1,90 @@
+"""The band of a pure torque source: exact edges against a dense search, and what the rotor's spin costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from control import TransferFunction
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.bandwidth import (
+    end_to_end,
+    flat_band,
+    inner_inertia,
+    pure_torque_bandwidth,
+    resonance_peak,
+)
+from rsea_ros.model.paper_formulas import EXACT_FACTOR, eq_6_distal_per_proximal, eq_7_bandwidth
+from rsea_ros.model.rig_file import load_rig
+
+PLATFORM, PROTOTYPE = load_rig("paper_high_impedance"), load_rig("prototype_knee")
+HZ = np.arange(0.001, 400.0, 0.001)
+
+
+@pytest.mark.parametrize("rig", [PLATFORM, PROTOTYPE], ids=lambda rig: rig.name)
+@pytest.mark.parametrize("sees", ["element", "spring_and_damper"])
+@pytest.mark.parametrize(("db", "deg"), [(3.0, 90.0), (3.0, 10.0), (1.0, 5.0), (0.2, 89.0)])
+def test_band_is_where_a_dense_search_first_leaves_it(rig, sees, db, deg):
+    function = end_to_end(rig, sees)
+    values = function(2j * np.pi * HZ)
+    off = np.abs(20 * np.log10(np.abs(values))) > db
+    if deg < 90.0:
+        off |= np.abs(np.degrees(np.angle(values))) > deg
+    assert flat_band(function, db, deg) == pytest.approx(HZ[np.argmax(off)], abs=0.0011)
+
+
+def test_undamped_band_at_sqrt_2_is_eq_7_with_the_exact_factor():
+    undamped = eq_6_distal_per_proximal(1530.456, 0.004, 0.0)
+    assert flat_band(undamped, 20 * math.log10(math.sqrt(2))) == pytest.approx(
+        eq_7_bandwidth(1530.456, 0.004, EXACT_FACTOR)
+    )
+
+
+def test_band_without_an_edge_is_infinite():
+    assert flat_band(TransferFunction([1.0], [1.0]), 3.0, 10.0) == math.inf
+
+
+@pytest.mark.parametrize(("db", "deg"), [(0.0, 10.0), (3.0, 0.0), (3.0, 91.0), (math.nan, 10.0)])
+def test_tolerances_that_are_none_are_refused(db, deg):
+    with pytest.raises(ParameterError, match="tolerances"):
+        flat_band(end_to_end(PLATFORM), db, deg)
+
+
+def test_peak_is_the_highest_point():
+    for function in (end_to_end(PLATFORM), end_to_end(PLATFORM, "element"), end_to_end(PROTOTYPE)):
+        gains = 20 * np.log10(np.abs(function(2j * np.pi * HZ)))
+        hz, db = resonance_peak(function)
+        assert hz == pytest.approx(HZ[np.argmax(gains)], abs=0.001)
+        assert db == pytest.approx(gains.max(), abs=1e-3)
+
+
+def test_a_falling_response_has_its_peak_at_rest():
+    assert resonance_peak(eq_6_distal_per_proximal(100.0, 0.01, 50.0)) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("rig", "inertia", "eq_7", "with_spin"),
+    [(PLATFORM, 5.898e-3, 53.20, 43.81), (PROTOTYPE, 8.117e-3, 55.83, 15.39)],
+    ids=["platform", "prototype"],
+)
+def test_what_the_rotors_spin_costs(rig, inertia, eq_7, with_spin):
+    """The numbers of docs/physics.md: Eq. (7) as printed, and with J_sc + J_m / N."""
+    k_s = rig["spring.stiffness"]
+    assert inner_inertia(rig) == pytest.approx(inertia, rel=1e-4)
+    assert inner_inertia(rig) == rig["chassis.inertia"] + rig["rotor.reflected_inertia"] / rig["gear.ratio"]
+    assert pure_torque_bandwidth(k_s, rig["chassis.inertia"]) == pytest.approx(eq_7, abs=5e-3)
+    assert pure_torque_bandwidth(k_s, inner_inertia(rig)) == pytest.approx(with_spin, abs=5e-3)
+
+
+def test_a_star_train_turns_the_rotor_backward():
+    star = replace(PLATFORM, train="star")
+    assert inner_inertia(star) == pytest.approx(0.004 - 0.953 * 501 / 502**2)
+
+
+def test_end_to_end_does_not_depend_on_the_motor_or_the_ends():
+    changed = load_rig("paper_moving_output").with_values({"rotor.reflected_damping": 1.0})
+    s = 2j * np.pi * HZ[::5000]
+    np.testing.assert_allclose(end_to_end(changed)(s), end_to_end(PLATFORM)(s), rtol=1e-9)

@@ -1,0 +1,174 @@
+"""Transfer functions: polynomials, state space and equations of motion agree; they contain the paper's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import slow
+from hypothesis import given, settings
+from random_rigs import RIG_NAMES, WITH_SPRING, rigs
+
+from rsea_ros.errors import RigError
+from rsea_ros.model import outputs, paper_formulas, transfer
+from rsea_ros.model.bandwidth import inner_inertia
+from rsea_ros.model.equations import PORTS
+from rsea_ros.model.lumped import lumped
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig_file import load_rig
+
+HZ = np.geomspace(0.05, 300.0, 60)
+S = 2j * np.pi * HZ
+K_S, J_SC, B_S = 1530.456, 0.0040, 3.0
+J_EFF, B_EFF = 0.953 + J_SC, 23.088 + B_S
+
+
+def read_outputs(rig):
+    """Return everything that can be read of a rig, by name."""
+    ends = {end: outputs.end_torque(rig, end) for end in ("housing_end", "spring_end")}
+    return {"position": outputs.position(), "deflection": outputs.deflection(), **ends}
+
+
+def agree(a, b, tolerance=1e-7):
+    np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(np.abs(b).max(), 1e-12))
+
+
+@settings(max_examples=40)
+@given(rigs(gravity=True))
+def test_polynomials_and_state_space_are_the_equations_of_motion(rig):
+    for output in read_outputs(rig).values():
+        for port in PORTS:
+            expected = frequency_response(rig, output, HZ, port)
+            agree(transfer.transfer(rig, output, port)(S), expected)
+            agree(transfer.state_space(rig, output, port)(S), expected)
+
+
+@settings(max_examples=40)
+@given(rigs(gravity=True))
+def test_response_is_that_of_the_energies(rig):
+    a, b, c = slow.state_matrices(rig)
+    states = np.array([np.linalg.solve(s * np.eye(len(a)) - a, b) for s in S]).T
+    agree(frequency_response(rig, outputs.position(), HZ), c[0] @ states)
+    if not rig.rigid_spring:
+        agree(frequency_response(rig, outputs.end_torque(rig, "spring_end"), HZ), c[2] @ states)
+
+
+@settings(max_examples=40)
+@given(rigs(gravity=True))
+def test_a_free_end_moves_by_the_torque_on_it(rig):
+    """Newton on the end alone: the torque that it has to hold is what turns it."""
+    for i, (end, sign) in enumerate((("housing_end", -1.0), ("spring_end", 1.0))):
+        if end in rig.clamped:
+            continue
+        angle = outputs.Output(np.zeros((3, 4)), np.zeros(5))
+        angle.c[0, 3 * i] = sign
+        impedance = rig[f"{end}.inertia"] * S**2 + rig[f"{end}.damping"] * S
+        impedance += rig[f"{end}.stiffness"] + rig[f"{end}.gravity"]
+        held = impedance * frequency_response(rig, angle, HZ)
+        agree(frequency_response(rig, outputs.end_torque(rig, end), HZ), held)
+
+
+def test_high_impedance_is_the_paper_but_for_the_rotors_spin():
+    rig = load_rig("paper_high_impedance")
+    j = inner_inertia(rig)
+    eq_5 = paper_formulas.eq_5_proximal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, j, B_S)
+    agree(
+        transfer.distal_per_motor(rig, "element")(S),
+        paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S),
+    )
+    agree(
+        transfer.proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S),
+        eq_5.num[0][0] @ [S**2, S, S**0],
+    )
+    agree(
+        transfer.distal_per_proximal(rig, "element")(S),
+        paper_formulas.eq_6_distal_per_proximal(K_S, j, B_S)(S),
+    )
+
+
+def test_eq_4_with_rotor_side_values_is_eq_1():
+    eq_4 = paper_formulas.eq_4_distal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, J_SC, B_S)
+    agree(eq_4(S), paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S))
+
+
+@pytest.mark.parametrize("train", ["planetary", "star"])
+def test_the_paper_is_the_limit_of_a_large_ratio(train):
+    """T_p - T_d = (J_sc + n J_r) q'': the exact T_p comes to Eq. (5) as 1 / N."""
+    base = replace(load_rig("paper_high_impedance"), train=train)
+    errors = []
+    for ratio in (50.0, 500.0, 5000.0, 50000.0):
+        exact = transfer.proximal_per_motor(base.with_values({"gear.ratio": ratio}))(S)
+        eq_5 = paper_formulas.eq_5_proximal_per_motor(
+            K_S, 0.953 / ratio**2, 23.088 / ratio**2, ratio, J_SC, B_S
+        )
+        errors.append(np.abs(exact - eq_5(S)).max())
+    assert errors[-1] < 1e-4
+    np.testing.assert_allclose(np.array(errors[:-1]) / errors[1:], 10.0, rtol=0.1)
+
+
+@pytest.mark.parametrize("name", RIG_NAMES)
+@pytest.mark.parametrize("train", ["planetary", "star"])
+def test_both_ends_together_take_the_change_of_angular_momentum(name, train):
+    """Independent of the end's rows: T_p - T_d is s^2 of chassis and rotor momentum, the ends left out."""
+    rig = replace(load_rig(name), train=train, proximal="housing_end")
+    ratio = rig["gear.ratio"]
+    n = ratio if train == "planetary" else 1 - ratio
+    momentum = outputs.Output(np.zeros((3, 4)), np.zeros(5))
+    momentum.c[2] = rig["rotor.reflected_inertia"] / ratio**2 * np.array([1 - n, n, 0, 0])
+    momentum.c[2, 2] += rig["chassis.inertia"]
+    difference = transfer.proximal_per_motor(rig)(S) - transfer.distal_per_motor(rig)(S)
+    agree(difference, frequency_response(rig, momentum, HZ))
+
+
+def test_lumped_model_is_eqs_1_to_3():
+    rig = lumped(load_rig("paper_high_impedance"))
+    for ours, printed in (
+        (
+            transfer.distal_per_motor(rig, "element"),
+            paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF),
+        ),
+        (
+            transfer.proximal_per_motor(rig),
+            paper_formulas.eq_2_lumped_proximal_per_motor(K_S, J_EFF, B_EFF, B_S),
+        ),
+        (
+            transfer.distal_per_proximal(rig, "element"),
+            paper_formulas.eq_3_lumped_distal_per_proximal(K_S, J_EFF, B_S),
+        ),
+    ):
+        agree(ours(S), printed(S))
+
+
+def test_lumping_does_not_change_the_high_impedance_test():
+    rig = load_rig("paper_high_impedance")
+    agree(transfer.distal_per_motor(lumped(rig))(S), transfer.distal_per_motor(rig)(S))
+
+
+@pytest.mark.parametrize("name", WITH_SPRING)
+def test_held_by_the_other_end_the_two_torques_change_places(name):
+    rig = load_rig(name)
+    other = replace(rig, proximal="spring_end")
+    agree(transfer.distal_per_motor(other)(S), transfer.proximal_per_motor(rig)(S))
+    agree(transfer.proximal_per_motor(other)(S), transfer.distal_per_motor(rig)(S))
+    agree(transfer.distal_per_proximal(other)(S), 1 / transfer.distal_per_proximal(rig)(S))
+
+
+def test_the_damper_turns_the_phase_of_what_the_sensor_sees():
+    """facts.md section 1: K_s or K_s + b_s s in the numerator, more than 20 degrees apart from 30 Hz on."""
+    rig = load_rig("paper_high_impedance")
+    sees = transfer.distal_per_motor(rig)(S) / transfer.distal_per_motor(rig, "element")(S)
+    agree(sees, 1 + B_S / K_S * S)
+    lag = np.degrees(np.angle(sees))
+    assert lag[HZ > 30].min() > 20 > lag[HZ < 29].max()
+
+
+def test_the_element_of_a_rigid_spring_is_refused():
+    with pytest.raises(RigError, match=r"bare_drive: spring.rigid = True, expected a spring"):
+        transfer.distal_per_motor(load_rig("bare_drive"), "element")
+
+
+def test_bare_drive_is_one_inertia():
+    """Encoder over motor torque: 1 / ((J_m + J_load) s^2 + b_m s)."""
+    function = transfer.position_per_motor(load_rig("bare_drive"))
+    np.testing.assert_allclose(function.den[0][0] / function.num[0][0][-1], [0.953 + 0.05, 23.088, 0.0])
