@@ -26,7 +26,7 @@ EFFECT = Effect(
         Parameter("offset", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),
         Parameter("viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0),
     ),
-    claims=Claims("position", "even", amplitude_exponent=None, confusable_with=("ft_bias",)),
+    claims=Claims("position", "even", amplitude_exponent=None),
     function=apply,
     reads=(GEAR_VELOCITY,),
     about="friction that differs between forward and backward",

@@ -57,9 +57,7 @@ EFFECT = Effect(
     name="backlash",
     port=Port.SPRING,
     parameters=(Parameter("gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012)),),
-    claims=Claims(
-        "position", "odd", amplitude_exponent=None, passive=True, confusable_with=("nonlinear_spring",)
-    ),
+    claims=Claims("position", "odd", amplitude_exponent=None, passive=True, confusable_with=("hard_stop",)),
     function=apply,
     states=6,
     reads=(DEFLECTION, DEFLECTION_RATE),

@@ -33,7 +33,9 @@ EFFECT = Effect(
     parameters=(
         Parameter("delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03)),
     ),
-    claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("current_loop_lag",)),
+    claims=Claims(
+        "velocity", "odd", amplitude_exponent=1.0, confusable_with=("current_loop_lag", "gear_compliance")
+    ),
     function=apply,
     states=1 + LENGTH,
     about="the command takes effect later than its stamp says",

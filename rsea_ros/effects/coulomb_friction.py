@@ -27,7 +27,7 @@ EFFECT = Effect(
         "odd",
         amplitude_exponent=0.0,
         passive=True,
-        confusable_with=("stribeck_friction", "load_dependent_friction"),
+        confusable_with=("stribeck_friction", "spring_hysteresis"),
     ),
     function=apply,
     states=1,

@@ -38,7 +38,9 @@ EFFECT = Effect(
             logarithmic=True,
         ),
     ),
-    claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("command_delay",)),
+    claims=Claims(
+        "velocity", "odd", amplitude_exponent=1.0, confusable_with=("command_delay", "gear_compliance")
+    ),
     function=apply,
     states=1,
     about="first-order lag of the motor's current",

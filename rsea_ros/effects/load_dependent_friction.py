@@ -27,7 +27,6 @@ EFFECT = Effect(
         "odd",
         amplitude_exponent=1.0,
         passive=True,
-        confusable_with=("coulomb_friction", "stribeck_friction", "spring_hysteresis"),
     ),
     function=apply,
     states=1,

@@ -44,7 +44,6 @@ EFFECT = Effect(
         "odd",
         amplitude_exponent=None,
         passive=True,
-        confusable_with=("coulomb_friction", "load_dependent_friction"),
     ),
     function=apply,
     states=3,

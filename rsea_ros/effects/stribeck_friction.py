@@ -36,7 +36,7 @@ EFFECT = Effect(
         "odd",
         amplitude_exponent=None,
         passive=True,
-        confusable_with=("coulomb_friction", "load_dependent_friction"),
+        confusable_with=("coulomb_friction", "spring_hysteresis"),
     ),
     function=apply,
     states=1,

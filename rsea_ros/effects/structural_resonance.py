@@ -48,7 +48,7 @@ EFFECT = Effect(
         Parameter("damping_ratio", "1", null=0.02, low=1e-3, high=0.5, typical=0.02, logarithmic=True),
         Parameter("participation", "1", null=0.0, low=-5.0, high=5.0, typical=0.3),
     ),
-    claims=Claims("ft", "odd", amplitude_exponent=1.0, confusable_with=("base_compliance",)),
+    claims=Claims("ft", "odd", amplitude_exponent=1.0),
     function=apply,
     states=4,
     about="a mode of the structure that the F/T sensor sees beside the spring",
