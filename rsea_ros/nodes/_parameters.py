@@ -97,5 +97,5 @@ def _described(parameter: Parameter) -> str:
 
 def usage(name: str, table: Sequence[Parameter]) -> str:
     """Return the help text of a node."""
-    rows = [f"  {p.name:<11} {_described(p)}; {p.expected()} (default {p.default!r})" for p in table]
+    rows = [f"  {p.name:<11} {p.description}; {p.expected()} (default {p.default!r})" for p in table]
     return "\n".join([f"usage: ros2 run rsea_ros {name} --ros-args -p NAME:=VALUE …", "", *rows, ""])

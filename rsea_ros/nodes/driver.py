@@ -36,7 +36,7 @@ TABLE = (
     Parameter("device", "simulated", "what to drive", choices=tuple(DEVICES)),
     Parameter("rate", 280.0, "cycles a second", "Hz", 10.0, 1000.0),
     Parameter("rig", "paper_high_impedance", "rig of the simulated device: a name of config/rigs, or a file"),
-    Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 2**31 - 1),
+    Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     Parameter("autostart", False, "whether to configure and activate at once"),
 )
 

@@ -29,7 +29,7 @@ TABLE = (
     Parameter("low", 0.01, "lowest frequency", "Hz", 1e-4, 500.0),
     Parameter("high", 140.0, "highest frequency, kept below 0.475 of the rate", "Hz", 1e-3, 500.0),
     Parameter("period", 10.0, "period of multisine and steps", "s", 0.01, 1e4),
-    Parameter("seed", 0, "seed of noise and phases", "", 0, 2**31 - 1),
+    Parameter("seed", 0, "seed of noise and phases", "", 0, 1_000_000_000),
     Parameter(
         "limit", 68.0, "largest torque; the whole excitation is checked before it starts", "N m", 0.0, 1e4
     ),

@@ -18,7 +18,7 @@ from rsea_ros.nodes._run import run_node
 TABLE = (
     Parameter("rig", "paper_high_impedance", "rig to simulate: a name of config/rigs, or a file"),
     Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0),
-    Parameter("seed", 0, "seed of the sensors' noise", "", 0, 2**31 - 1),
+    Parameter("seed", 0, "seed of the sensors' noise", "", 0, 1_000_000_000),
     Parameter("noise", True, "whether the sensors have their noise and quantum"),
     Parameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
 )

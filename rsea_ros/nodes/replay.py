@@ -23,10 +23,15 @@ from rsea_ros.nodes._run import run_node
 
 TABLE = (
     Parameter("bag", "", "bag to play, a directory or a file"),
-    Parameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "1", 0.01, 1000.0),
+    Parameter("rate", 1.0, "pace: 2 is twice as fast as recorded", "", 0.01, 1000.0),
     Parameter("start", 0.0, "begin so far into the bag", "s", 0.0, 1e6),
     Parameter(
-        "subscribers", 1, "subscriptions to wait for on each of WAIT_FOR; 0: begin at once", "", 0, 100
+        "subscribers",
+        1,
+        "subscriptions of each of the three topics to wait for; 0: begin at once",
+        "",
+        0,
+        100,
     ),
     Parameter("clock", True, "whether to publish /clock"),
 )
