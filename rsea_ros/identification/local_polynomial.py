@@ -1,0 +1,96 @@
+"""Local polynomial method: the response of short records, without a window and almost without leakage.
+
+In a narrow band around line k both the response and the transient are smooth, and the command is not:
+
+    Y(k + r) = (g_0 + g_1 r + g_2 r^2) U(k + r) + t_0 + t_1 r + t_2 r^2 + noise,   r = -n … n
+
+Least squares over the band gives G(k) = g_0, its variance from the residual, and the noise.
+(Schoukens, Vandersteen, Barbe, Pintelon, "Nonparametric preprocessing in system identification",
+European Journal of Control 15, 2009.)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import rfft
+
+from rsea_ros.identification.lines import Lines, detrended, widened
+from rsea_ros.identification.resample import Aligned, BoolArray
+from rsea_ros.identification.result import ComplexArray
+from rsea_ros.signals import FloatArray
+
+_UNKNOWNS = 6
+_TINY = 1e-300
+_ROUNDING = 1e-14
+"""Of the output's power: less noise than this cannot be told from rounding."""
+_NARROWEST = 8
+_RELATIVE_BAND = 0.03
+"""Half the band as a share of its frequency, where that is wider than _NARROWEST lines."""
+
+
+def local_polynomial(aligned: Aligned) -> Lines:
+    """Return the response of the longest stretch without a gap, at lines a quarter band apart."""
+    stretch = _longest(aligned.measured)
+    n = stretch.stop - stretch.start
+    u, y = (rfft(detrended(x[stretch])) / np.sqrt(n) for x in (aligned.command, aligned.output))
+    bands = _bands(len(u))
+    response, variance, noise, power = _estimates(u, y, bands)
+    freedom = np.array([2 * half + 1 - _UNKNOWNS for _, half in bands])
+    signal = np.abs(response) ** 2 * power
+    return Lines(
+        method="local polynomial",
+        frequency=np.array([centre for centre, _ in bands]) / (n * aligned.period),
+        response=response,
+        sd=widened(np.sqrt(variance), freedom),
+        coherence=signal / (signal + noise + 1e-300),
+        noise=np.sqrt(2.0 * noise / n),
+    )
+
+
+def _longest(measured: BoolArray) -> slice:
+    """Return the longest stretch that is true throughout."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], measured.astype(np.int8), [0]])))
+    longest = int(np.argmax(edges[1::2] - edges[::2]))
+    return slice(int(edges[2 * longest]), int(edges[2 * longest + 1]))
+
+
+def _bands(lines: int) -> list[tuple[int, int]]:
+    """Return centre and half-width of the bands, in lines; a quarter band apart."""
+    bands, centre = [], _NARROWEST // 2
+    while centre < lines - 1:
+        half = max(_NARROWEST, round(_RELATIVE_BAND * centre))
+        bands.append((centre, half))
+        centre += max(1, half // 2)
+    return bands
+
+
+def _estimates(
+    u: ComplexArray, y: ComplexArray, bands: list[tuple[int, int]]
+) -> tuple[ComplexArray, FloatArray, FloatArray, FloatArray]:
+    """Return response, its variance, noise power and command power of all bands."""
+    products = np.array([_products(u, y, centre, half) for centre, half in bands])
+    scale = np.sqrt(np.einsum("bii->bi", products).real[:, :-1]) + _TINY
+    inverse = np.linalg.pinv(products[:, :-1, :-1] / (scale[:, :, None] * scale[:, None]), hermitian=True)
+    wanted = products[:, :-1, -1] / scale
+    unknowns = np.einsum("bij,bj->bi", inverse, wanted)
+    total = products[:, -1, -1].real
+    residual = total - np.einsum("bi,bi->b", wanted.conj(), unknowns).real
+    lines = np.array([2 * half + 1 for _, half in bands])
+    noise = np.maximum(residual, _ROUNDING * total) / (lines - _UNKNOWNS)
+    return (
+        unknowns[:, 0] / scale[:, 0],
+        noise * inverse[:, 0, 0].real / scale[:, 0] ** 2,
+        noise,
+        scale[:, 0] ** 2 / lines,
+    )
+
+
+def _products(u: ComplexArray, y: ComplexArray, centre: int, half: int) -> ComplexArray:
+    """Return the inner products of all columns of a band and the output, shape (7, 7)."""
+    first = min(max(1, centre - half), len(u) - 2 * half - 1)
+    band = slice(first, first + 2 * half + 1)
+    r = (np.arange(first, band.stop) - centre) / half
+    powers = np.stack([np.ones(len(r)), r, r**2])
+    rows = np.concatenate([powers * u[band], powers, y[band][None]])
+    products: ComplexArray = rows.conj() @ rows.T
+    return products

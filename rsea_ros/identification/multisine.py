@@ -1,0 +1,109 @@
+"""Periodic excitation: every period is a repetition, so noise and distortion can be told apart.
+
+The spread between periods is noise. What the mean period has at lines that were not excited, beyond that
+noise, is nonlinear distortion: even at even lines, odd at odd ones.
+(Pintelon, Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., chapter 4.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import rfft
+
+from rsea_ros.identification.lines import Lines, widened
+from rsea_ros.identification.periodicity import Periods
+from rsea_ros.identification.resample import Aligned
+from rsea_ros.identification.result import ComplexArray
+from rsea_ros.signals import FloatArray
+
+IntArray = npt.NDArray[np.int64]
+
+_EXCITED = 1e-2
+_SMOOTHED = 9
+
+
+@dataclass(frozen=True)
+class Distortion:
+    """RMS of the output in a line, at the excited lines, shape (n,), in the channel's unit.
+
+    noise: of one period. even, odd: nonlinear distortion of the mean period, None where no such line was
+    left unexcited.
+    """
+
+    noise: FloatArray
+    even: FloatArray | None
+    odd: FloatArray | None
+
+    @property
+    def total(self) -> FloatArray | None:
+        """Even and odd together, None where neither can be told."""
+        known = [part**2 for part in (self.even, self.odd) if part is not None]
+        return np.sqrt(np.sum(known, axis=0)) if known else None
+
+
+def multisine(aligned: Aligned, periods: Periods) -> Lines:
+    """Return the response at the excited lines. The first period is left to settle."""
+    u, y = (_periods(x, periods) for x in (aligned.command, aligned.output))
+    whole = _periods(aligned.measured.astype(float), periods, spectrum=False).all(axis=1)
+    if np.count_nonzero(whole) >= 2:
+        u, y = u[whole], y[whole]
+    mean_u, mean_y, count = u.mean(axis=0), y.mean(axis=0), len(y)
+    excited = excited_lines(mean_u)
+    variance = np.sum(np.abs(y - mean_y) ** 2, axis=0) / (count - 1)
+    levels = _levels(mean_y, variance / count, excited, periods.length)
+    odd = 0.0 if levels.odd is None else levels.odd**2 * periods.length**2 / 2.0
+    spread = np.sqrt(variance[excited] / count + odd) / np.abs(mean_u[excited])
+    freedom = (count - 1) * (1.0 + odd / (variance[excited] / count + 1e-300))
+    power = np.abs(mean_y[excited]) ** 2
+    return Lines(
+        method="multisine",
+        frequency=excited / (periods.length * aligned.period),
+        response=mean_y[excited] / mean_u[excited],
+        sd=widened(spread, np.minimum(freedom, count - 1 + _SMOOTHED)),
+        coherence=power / (power + variance[excited] + 1e-300),
+        noise=levels.noise * np.sqrt(count),
+        distortion=levels.total,
+    )
+
+
+def excited_lines(mean_u: ComplexArray) -> IntArray:
+    """Return the lines that hold command: within 40 dB of the strongest, without the mean."""
+    size = np.abs(mean_u)
+    size[0] = 0.0
+    return np.flatnonzero(size > _EXCITED * size.max())
+
+
+def _periods(values: FloatArray, periods: Periods, spectrum: bool = True) -> ComplexArray:
+    """Return the spectra of all periods but the first, shape (count - 1, lines)."""
+    stop = periods.first + periods.count * periods.length
+    table = values[periods.first : stop].reshape(periods.count, periods.length)[1:]
+    return rfft(table, axis=1) if spectrum else table.astype(complex)
+
+
+def _levels(mean_y: ComplexArray, variance: FloatArray, excited: IntArray, length: int) -> Distortion:
+    """Return noise and distortion at the excited lines. variance: of the mean period."""
+    lines = np.arange(1, int(excited.max()) + 1)
+    silent = np.setdiff1d(lines, excited)
+    rms = np.sqrt(2.0) / length
+
+    def level(at: IntArray) -> FloatArray | None:
+        if len(at) < _SMOOTHED:
+            return None
+        beyond = _smooth(np.abs(mean_y[at]) ** 2 - variance[at])
+        result: FloatArray = rms * np.sqrt(np.maximum(np.interp(excited, at, beyond), 0.0))
+        return result
+
+    noise = np.interp(excited, lines, _smooth(variance[lines]))
+    return Distortion(rms * np.sqrt(noise), level(silent[silent % 2 == 0]), level(silent[silent % 2 == 1]))
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    """Return the running mean over _SMOOTHED lines."""
+    if len(values) < _SMOOTHED:
+        return np.full(len(values), values.mean())
+    padded = np.pad(values, _SMOOTHED // 2, mode="edge")
+    smooth: FloatArray = np.convolve(padded, np.full(_SMOOTHED, 1.0 / _SMOOTHED), mode="valid")
+    return smooth

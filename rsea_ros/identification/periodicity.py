@@ -1,0 +1,58 @@
+"""Whether a command repeats, and where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import find_peaks
+
+from rsea_ros.signals import FloatArray
+
+FEWEST_PERIODS = 3
+"""One settles, two tell noise from signal."""
+_SAME = 0.02
+_LIKELY = 0.5
+_TRIED = 12
+
+
+@dataclass(frozen=True)
+class Periods:
+    """A stretch of whole periods: first sample, samples a period, how many."""
+
+    first: int
+    length: int
+    count: int
+
+
+def find_periods(command: FloatArray) -> Periods | None:
+    """Return the longest stretch over which a command repeats at least FEWEST_PERIODS times, or None."""
+    candidates = (_stretch(command, lag) for lag in _likely_lags(command))
+    return next((p for p in candidates if p is not None and p.count >= FEWEST_PERIODS), None)
+
+
+def _likely_lags(command: FloatArray) -> list[int]:
+    """Return the shortest lags at which the autocorrelation peaks, samples."""
+    n = len(command)
+    centred = command - command.mean()
+    size = next_fast_len(2 * n, real=True)
+    correlation = irfft(np.abs(rfft(centred, size)) ** 2, size)[: n // FEWEST_PERIODS + 1]
+    if len(correlation) < 3 or correlation[0] <= 0.0:
+        return []
+    unbiased = correlation / correlation[0] * n / (n - np.arange(len(correlation)))
+    peaks, _ = find_peaks(np.append(unbiased, 0.0), height=_LIKELY, distance=2)
+    high = peaks[unbiased[peaks] > 0.9 * unbiased[peaks].max()] if len(peaks) else peaks
+    return [int(lag) for lag in high[:_TRIED]]
+
+
+def _stretch(command: FloatArray, lag: int) -> Periods | None:
+    """Return the longest stretch that repeats with this lag."""
+    same = np.abs(command[lag:] - command[:-lag]) <= _SAME * np.std(command)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    starts, stops = edges[::2], edges[1::2]
+    if len(starts) == 0:
+        return None
+    longest = int(np.argmax(stops - starts))
+    count = int((stops[longest] - starts[longest]) // lag + 1)
+    return Periods(int(stops[longest] + lag - count * lag), lag, count)

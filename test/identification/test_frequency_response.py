@@ -1,0 +1,147 @@
+"""Measured frequency responses against the equations of motion: no bias from hold, stamps or folding."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rsea_ros.errors import ChannelError, IdentificationError
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.result import ComplexArray, FrequencyResponse
+from rsea_ros.model import outputs
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.signals import Channel, FloatArray, Record
+
+RATE = 280.0
+SENSORS = ("ft", "position", "velocity")
+KINDS = {
+    "white_noise": (160.0, "Welch"),
+    "chirp": (160.0, "local polynomial"),
+    "multisine": (60.0, "multisine"),
+}
+
+
+def command_of(kind: str, duration: float, seed: int = 0) -> Channel:
+    u = excitation(kind, Settings(rate=RATE, duration=duration, seed=seed))
+    return Channel(np.arange(len(u)) / RATE, u)
+
+
+def sampled_at(rig: Rig, command: Channel, stamps: FloatArray) -> Record:
+    """Return a noise-free record whose sensors were read at `stamps`."""
+    asked = Record({"command": command, **{n: Channel(stamps, np.zeros(len(stamps))) for n in SENSORS}})
+    return asked.with_channels(**{n: Channel(stamps, y) for n, y in simulate(rig, asked).items()})
+
+
+def truth(rig: Rig, name: str, hz: FloatArray) -> ComplexArray:
+    output = outputs.distal(rig) if name == "ft" else outputs.position()
+    response = frequency_response(rig, output, hz)
+    return response * 2j * np.pi * hz if name == "velocity" else response
+
+
+def errors(rig: Rig, r: FrequencyResponse, low: float = 1.0, high: float = 100.0) -> tuple[float, float]:
+    """Return the largest error of gain, relative, and of phase, degrees."""
+    inside = (r.frequency >= low) & (r.frequency <= high)
+    quotient = (r.response / truth(rig, r.output, r.frequency))[inside]
+    return float(np.max(np.abs(np.abs(quotient) - 1.0))), float(np.max(np.abs(np.angle(quotient, deg=True))))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", SENSORS)
+def test_noise_free_record_gives_the_transfer_function(kind: str, name: str) -> None:
+    rig, (duration, method) = load_rig("paper_high_impedance"), KINDS[kind]
+    record = synthesize(rig, command_of(kind, duration), noise=False)
+    response = estimate_response(record, name)
+    gain, phase = errors(rig, response)
+    assert response.method == method
+    assert gain < 0.01
+    assert phase < 1.0
+
+
+@pytest.mark.parametrize("kind", ["chirp", "multisine"])
+def test_moving_output_with_its_antiresonance(kind: str) -> None:
+    rig = load_rig("paper_moving_output")
+    record = synthesize(rig, command_of(kind, KINDS[kind][0]), noise=False)
+    gain, phase = errors(rig, estimate_response(record, "ft"))
+    assert gain < 0.01
+    assert phase < 1.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("late", [0.5, -0.25])
+def test_stamps_of_the_sensor_do_not_matter(kind: str, late: float) -> None:
+    rig, duration = load_rig("paper_high_impedance"), KINDS[kind][0]
+    command = command_of(kind, duration)
+    same, moved = (
+        estimate_response(sampled_at(rig, command, command.t + (1.0 + d) / RATE), "ft") for d in (0.0, late)
+    )
+    inside = (same.frequency > 1.0) & (same.frequency < 100.0)
+    n = min(len(same.frequency), len(moved.frequency))
+    difference = np.abs(moved.response[:n] / same.response[:n] - 1.0)[inside[:n]]
+    assert float(np.max(difference)) < 2e-3
+
+
+def test_short_record_by_local_polynomials() -> None:
+    rig = load_rig("paper_high_impedance")
+    response = estimate_response(synthesize(rig, command_of("white_noise", 15.0), noise=False), "ft")
+    gain, phase = errors(rig, response)
+    assert response.method == "local polynomial"
+    assert gain < 0.01
+    assert phase < 1.0
+
+
+def test_delay_of_the_command_is_seen_as_phase() -> None:
+    rig = load_rig("paper_high_impedance")
+    late = rig.with_effects(EffectSetting("command_delay", {"delay": 1.5 / RATE}))
+    response = estimate_response(synthesize(late, command_of("multisine", 60.0), noise=False), "position")
+    lag = np.exp(-2j * np.pi * response.frequency * 1.5 / RATE)
+    quotient = response.response / truth(rig, "position", response.frequency) / lag
+    inside = response.frequency < 100.0
+    assert float(np.max(np.abs(quotient[inside] - 1.0))) < 0.01
+
+
+def test_jitter_and_missing_samples_leave_no_bias() -> None:
+    rig, command = load_rig("paper_high_impedance"), command_of("multisine", 60.0)
+    rng = np.random.default_rng(7)
+    stamps = command.t + (1.0 + 0.05 * rng.standard_normal(len(command))) / RATE
+    response = estimate_response(sampled_at(rig, command, stamps[rng.random(len(stamps)) > 0.002]), "ft")
+    error = response.response / truth(rig, "ft", response.frequency) - 1.0
+    inside = (response.frequency > 1.0) & (response.frequency < 100.0)
+    assert abs(error[inside].mean()) < 0.003
+    assert np.mean(np.abs(response.sd / np.abs(response.response))[inside]) < 0.02
+
+
+def test_sensor_faster_than_the_command() -> None:
+    rig, command = load_rig("paper_high_impedance"), command_of("chirp", 60.0)
+    stamps = np.arange(round(command.t[-1] * 1000.0)) / 1000.0
+    gain, phase = errors(rig, estimate_response(sampled_at(rig, command, stamps), "velocity"), low=2.0)
+    assert gain < 0.01
+    assert phase < 1.0
+
+
+def test_torque_per_position_is_spring_and_damper() -> None:
+    rig = load_rig("paper_high_impedance")
+    response = estimate_response(
+        synthesize(rig, command_of("chirp", 160.0), noise=False), "ft", input="position"
+    )
+    wanted = rig["spring.stiffness"] + 2j * np.pi * response.frequency * rig["spring.damping"]
+    inside = (response.frequency > 1.0) & (response.frequency < 100.0)
+    assert response.input == "position"
+    assert float(np.max(np.abs(response.response / wanted - 1.0)[inside])) < 0.01
+
+
+def test_motor_torque_follows_the_command() -> None:
+    record = synthesize(load_rig("paper_high_impedance"), command_of("white_noise", 60.0), noise=False)
+    response = estimate_response(record, "motor_torque")
+    assert float(np.max(np.abs(response.response - 1.0))) < 1e-9
+
+
+def test_missing_channel_and_short_record_are_said() -> None:
+    record = synthesize(load_rig("bare_drive"), command_of("white_noise", 15.0))
+    with pytest.raises(ChannelError, match="no channel 'ft'"):
+        estimate_response(record, "ft")
+    with pytest.raises(IdentificationError, match="usable samples, expected at least 32"):
+        estimate_response(record.between(0.0, 0.05), "position")
