@@ -1,0 +1,119 @@
+"""Real node processes, and a listener in this one, on the worker's own ROS domain."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+ROOT = Path(__file__).resolve().parents[2]
+TIMEOUT = 60.0
+"""Seconds for what normally takes one; a cold start compiles the simulation on a busy machine."""
+
+
+class Process:
+    """A node of the package, started with parameters."""
+
+    def __init__(self, name, log, parameters, remaps):
+        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={_text(value)}")]
+        words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
+        self._log = log
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
+        with log.open("wb") as sink:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", f"rsea_ros.nodes.{name}", "--ros-args", *words],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=sink,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def output(self):
+        """What it has written so far, as lines."""
+        return self._log.read_text().splitlines()
+
+    def running(self):
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def wait(self):
+        """Wait for its end and return its status."""
+        return self._process.wait(TIMEOUT)
+
+    def stop(self, number=signal.SIGINT):
+        """Send a signal and return the exit status."""
+        if self.running():
+            self._process.send_signal(number)
+        return self.wait()
+
+    def kill(self):
+        """End it without asking."""
+        self._process.kill()
+        self._process.wait()
+
+
+def _text(value):
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory):
+    """A function that starts a node; what still runs after the module is killed."""
+    started = []
+
+    def begin(name, remaps=(), **parameters):
+        log = tmp_path_factory.mktemp(name) / "output.log"
+        started.append(Process(name, log, parameters, dict(remaps)))
+        return started[-1]
+
+    yield begin
+    for process in started:
+        process.kill()
+
+
+class Listener:
+    """A node in this process; it spins while it waits for something to be true."""
+
+    def __init__(self):
+        rclpy.init()
+        self.node = rclpy.create_node("listener")
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+
+    def until(self, condition):
+        """Spin until the condition holds, and return what it returned."""
+        deadline = time.monotonic() + TIMEOUT
+        while not (result := condition()):
+            assert time.monotonic() < deadline, "waited in vain"
+            self._executor.spin_once(timeout_sec=0.1)
+        return result
+
+    def hear(self, kind, topic, qos):
+        """Return a list that fills with the messages of a topic."""
+        heard = []
+        self.node.create_subscription(kind, topic, heard.append, qos)
+        return heard
+
+    def close(self):
+        """Take the node away."""
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown()
+
+
+@pytest.fixture(scope="module")
+def listener():
+    """One listener for a module's tests."""
+    node = Listener()
+    yield node
+    node.close()

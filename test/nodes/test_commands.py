@@ -1,0 +1,82 @@
+"""Commands take effect at their stamps, whenever they arrive before."""
+
+import math
+
+from rsea_ros.nodes._commands import HORIZON, MILLISECOND, WATCHDOG, CommandQueue
+
+NOW = 1_700_000_000_000_000_000
+
+
+def _queue(*commands, now=NOW):
+    queue = CommandQueue()
+    for stamp, torque in commands:
+        queue.add(stamp, torque, now)
+    return queue
+
+
+def test_a_command_waits_for_its_stamp():
+    queue = _queue((NOW + 10, 1.0), (NOW + 20, 2.0))
+    assert queue.take(NOW + 9) == []
+    assert queue.take(NOW + 10) == [(NOW + 10, 1.0)]
+    assert queue.take(NOW + 30) == [(NOW + 20, 2.0)]
+    assert queue.torque == 2.0
+
+
+def test_commands_are_taken_in_the_order_of_their_stamps():
+    queue = _queue((NOW + 20, 2.0), (NOW + 10, 1.0))
+    assert queue.take(NOW + 30) == [(NOW + 10, 1.0), (NOW + 20, 2.0)]
+
+
+def test_a_late_command_takes_effect_at_once_and_is_counted():
+    queue = _queue()
+    queue.take(NOW + 100)
+    queue.add(NOW + 50, 3.0, NOW + 101)
+    assert queue.take(NOW + 200) == [(NOW + 100, 3.0)]
+    assert queue.late == 1
+
+
+def test_a_command_that_arrives_after_its_stamp_but_before_the_cycle_is_not_late():
+    queue = _queue()
+    queue.take(NOW)
+    queue.add(NOW + 50, 3.0, NOW + 90)
+    assert queue.take(NOW + 100) == [(NOW + 50, 3.0)]
+    assert queue.late == 0
+
+
+def test_a_command_without_a_stamp_of_now_takes_effect_on_arrival():
+    for stamp in (0, NOW - HORIZON - 1, NOW + HORIZON + 1):
+        queue = _queue((stamp, 4.0))
+        assert queue.take(NOW) == [(NOW, 4.0)]
+        assert queue.unstamped == 1
+
+
+def test_not_a_number_is_refused():
+    queue = _queue((NOW, math.nan), (NOW, math.inf))
+    assert queue.take(NOW) == []
+    assert queue.refused == 2
+
+
+def test_the_watchdog_zeroes_the_torque_once():
+    queue = _queue((NOW, 5.0))
+    queue.take(NOW)
+    assert queue.take(NOW + WATCHDOG) == []
+    end = NOW + WATCHDOG + 1
+    assert queue.take(end) == [(end, 0.0)]
+    assert queue.take(end + MILLISECOND) == []
+    assert queue.torque == 0.0 and queue.expired == 1
+    assert queue.age(end) is None
+
+
+def test_zero_commands_do_not_trip_the_watchdog():
+    queue = _queue((NOW, 0.0))
+    queue.take(NOW)
+    assert queue.take(NOW + 2 * WATCHDOG) == []
+    assert queue.expired == 0
+
+
+def test_cleared_is_zero_and_empty():
+    queue = _queue((NOW, 5.0), (NOW + 10, 6.0))
+    queue.take(NOW)
+    queue.clear()
+    assert queue.torque == 0.0
+    assert queue.take(NOW + 20) == []

@@ -1,0 +1,69 @@
+"""The cycle's stamps are its deadlines, whatever holds it up."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from rsea_ros.nodes._cycle import SECOND, Cycle
+
+RATE = 200.0
+PERIOD = SECOND / RATE
+
+
+def _stamps(count, held_up_at, catch_up):
+    """Run `count` cycles, one of which takes ten periods."""
+    stamps, done = [], threading.Event()
+
+    def work(stamp):
+        if len(stamps) < count:
+            stamps.append(stamp)
+        if len(stamps) == held_up_at:
+            time.sleep(10.0 / RATE)
+        if len(stamps) == count:
+            done.set()
+
+    cycle = Cycle(RATE, work, catch_up=catch_up)
+    cycle.start()
+    assert done.wait(30.0)
+    cycle.stop()
+    return np.array(stamps), cycle.timing()
+
+
+def test_a_bench_that_was_held_up_catches_up_without_a_gap():
+    stamps, timing = _stamps(60, 20, catch_up=True)
+    assert stamps - stamps[0] == pytest.approx(np.arange(60) * PERIOD, abs=1.0)
+    assert timing.missed >= 9
+
+
+def test_a_driver_that_was_held_up_leaves_cycles_out_and_stays_on_the_grid():
+    stamps, timing = _stamps(60, 20, catch_up=False)
+    cycles = (stamps - stamps[0]) / PERIOD
+    assert cycles == pytest.approx(np.round(cycles), abs=1e-6)
+    assert np.all(np.diff(np.round(cycles)) >= 1)
+    assert np.max(np.diff(cycles)) >= 9.5
+    assert timing.missed >= 1
+
+
+def test_the_first_stamp_is_the_one_asked_for():
+    stamps, done = [], threading.Event()
+
+    def work(stamp):
+        stamps.append(stamp)
+        done.set()
+
+    first = time.time_ns() + 20_000_000
+    cycle = Cycle(RATE, work, catch_up=True)
+    cycle.start(first)
+    assert done.wait(30.0)
+    cycle.stop()
+    assert stamps[0] == first
+
+
+def test_what_the_work_raises_is_raised_to_whoever_asks():
+    cycle = Cycle(RATE, lambda stamp: 1 / 0, catch_up=True)
+    cycle.start()
+    cycle._thread.join(30.0)
+    with pytest.raises(ZeroDivisionError):
+        cycle.running()

@@ -1,0 +1,73 @@
+"""Parameters: what does not fit is refused in one line with status 2."""
+
+import importlib
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.nodes._parameters import Parameter
+
+CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
+NODES = ("driver", "excite", "identify", "plant", "record", "replay")
+RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
+COUNT = Parameter("count", 3, "how many", "", 0, 10)
+KIND = Parameter("kind", "a", "which", choices=("a", "b"))
+FLAG = Parameter("flag", False, "whether")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "message"),
+    [
+        (RATE, 1001.0, "rate = 1001.0, expected a number from 10 to 1000 Hz"),
+        (RATE, 9.9, "rate = 9.9"),
+        (RATE, math.nan, "rate = nan"),
+        (RATE, "fast", "rate = 'fast'"),
+        (RATE, True, "rate = True"),
+        (COUNT, 2.0, "count = 2.0, expected a whole number from 0 to 10"),
+        (COUNT, 11, "count = 11"),
+        (KIND, "c", "kind = 'c', expected one of a, b"),
+        (KIND, 1, "kind = 1"),
+        (FLAG, 1, "flag = 1, expected true or false"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_refused(parameter, value, message):
+    with pytest.raises(ParameterError, match=message):
+        parameter.checked(value)
+
+
+def test_a_value_that_fits_comes_in_its_type():
+    assert RATE.checked(280) == 280.0 and isinstance(RATE.checked(280), float)
+    assert (RATE.checked(10.0), RATE.checked(1000.0), COUNT.checked(0)) == (10.0, 1000.0, 0)
+    assert KIND.checked("b") == "b" and FLAG.checked(True) is True
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_parameter_file_and_table_agree(name):
+    document = yaml.safe_load((CONFIG / f"{name}.yaml").read_text())
+    table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
+    assert document["/**"]["ros__parameters"] == {p.name: p.default for p in table}
+    for parameter in table:
+        assert parameter.checked(parameter.default) == parameter.default
+        assert parameter.description
+
+
+WRONG = {
+    "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
+    "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
+    "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
+    "record": ({"out": "/dev/null/bag"}, "/dev/null"),
+    "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
+    "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
+}
+
+
+def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(start):
+    processes = {name: start(name, **parameters) for name, (parameters, _) in WRONG.items()}
+    for name, process in processes.items():
+        assert process.wait() == 2, name
+        assert len(process.output) == 1, process.output
+        assert WRONG[name][1] in process.output[0]
+        assert "FATAL" in process.output[0]

@@ -1,0 +1,133 @@
+"""The plant over topics: stamps on its grid, commands acting from theirs, zero when they cease."""
+
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from msg_adapters.ros import (
+    DiagnosticArray,
+    JointState,
+    WrenchStamped,
+    joint_state_of,
+    stamp_of,
+    time_of,
+    torque_command_message,
+)
+from rsea_ros.nodes._commands import WATCHDOG
+from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+RATE = 250.0
+PERIOD = SECOND / RATE
+
+
+class Bench:
+    """The plant's topics as seen from outside."""
+
+    def __init__(self, start, listener):
+        self.process = start("plant", rate=RATE, noise=False)
+        self.listener = listener
+        self.states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
+        self.wrenches = listener.hear(WrenchStamped, "/rsea/ft", MEASUREMENT)
+        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.commands = listener.node.create_publisher(JointState, "/rsea/torque_command", COMMAND)
+        listener.until(lambda: self.states and self.commands.get_subscription_count())
+
+    def after(self, stamp, count=1):
+        """Wait for measurements after a stamp and return (stamp, motor torque) of all since it."""
+        newer = [joint_state_of(m) for m in self.states if stamp_of(m.header.stamp) > stamp]
+        if len(newer) < count:
+            want = len(self.states) + count
+            self.listener.until(lambda: len(self.states) >= want)
+            return self.after(stamp, count)
+        return [(s[0], s[3]) for s in newer]
+
+    def rest(self):
+        """Wait until the watchdog has zeroed what another test commanded."""
+        self.listener.until(lambda: self.states[-1].effort[0] == 0.0)
+
+    def now(self):
+        """Stamp of the newest measurement, ns."""
+        return stamp_of(self.states[-1].header.stamp)
+
+
+@pytest.fixture(scope="module")
+def bench(start, listener):
+    """One plant for all tests of this module."""
+    return Bench(start, listener)
+
+
+def test_stamps_are_evenly_spaced_instants_that_are_over(bench):
+    bench.listener.until(lambda: len(bench.states) >= 200)
+    stamps = np.array([stamp_of(m.header.stamp) for m in bench.states])
+    cycles = (stamps - stamps[0]) / PERIOD
+    assert cycles == pytest.approx(np.round(cycles), abs=1e-6)
+    assert np.all(np.diff(np.round(cycles)) == 1)
+    assert stamps[-1] < time.time_ns()
+
+
+def test_ft_has_the_stamps_of_the_states(bench):
+    bench.listener.until(lambda: len(bench.wrenches) >= 50)
+    bench.after(stamp_of(bench.wrenches[-1].header.stamp))
+    stamps = {stamp_of(m.header.stamp) for m in bench.states}
+    assert {stamp_of(m.header.stamp) for m in bench.wrenches[1:]} <= stamps
+    assert all(m.wrench.force.x == 0.0 for m in bench.wrenches)
+
+
+def test_a_command_acts_from_its_stamp_on(bench):
+    bench.rest()
+    effect = bench.now() + round(8 * PERIOD)
+    bench.commands.publish(torque_command_message(effect, 12.0))
+    seen = bench.after(effect - round(4 * PERIOD), 8)
+    assert all(torque == (12.0 if stamp > effect + 1 else 0.0) for stamp, torque in seen[:8])
+
+
+def test_a_command_without_a_stamp_acts_on_arrival(bench):
+    bench.rest()
+    before = bench.now()
+    message = torque_command_message(0, -7.0)
+    message.header.stamp = time_of(0)
+    bench.commands.publish(message)
+    bench.listener.until(lambda: bench.states[-1].effort[0] == -7.0)
+    assert bench.now() > before
+
+
+def test_the_watchdog_zeroes_the_torque_when_commands_cease(bench):
+    bench.rest()
+    effect = bench.now() + round(5 * PERIOD)
+    bench.commands.publish(torque_command_message(effect, 9.0))
+    bench.listener.until(lambda: bench.states[-1].effort[0] == 9.0)
+    bench.rest()
+    held = [stamp for stamp, torque in bench.after(effect) if torque == 9.0]
+    assert held[-1] - effect == pytest.approx(WATCHDOG, abs=2 * PERIOD)
+
+
+def test_impossible_commands_change_nothing_and_are_told(bench):
+    bench.rest()
+    two = torque_command_message(0, 5.0)
+    two.name, two.effort = ["a", "b"], [5.0, 5.0]
+    bench.commands.publish(two)
+    bench.commands.publish(torque_command_message(0, float("nan")))
+    count = len(bench.states)
+    told = bench.listener.until(lambda: _values(bench.health[-1]).get("refused_commands") == "1")
+    assert told and all(m.effort[0] == 0.0 for m in bench.states[count:])
+    assert any("2 joints (a, b), expected one" in line for line in bench.process.output)
+
+
+def test_diagnostics_tell_period_and_command_age(bench):
+    values = _values(bench.listener.until(lambda: bench.health)[-1])
+    assert {"period_mean_ms", "period_p99_ms", "period_max_ms", "missed_cycles", "command_age_ms"} <= set(
+        values
+    )
+    assert float(values["period_mean_ms"]) > 0.0
+
+
+def test_sigterm_ends_it_with_status_0(bench):
+    assert bench.process.stop(signal.SIGTERM) == 0
+
+
+def _values(message):
+    """Key and value of a node's status."""
+    return {pair.key: pair.value for pair in message.status[0].values}
