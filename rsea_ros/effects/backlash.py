@@ -5,6 +5,7 @@
 y is the chassis, which has its own inertia, d the gear output, both against the distal side. The flanks
 only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
 feels J_sc e'' + b_s e' + K_s e beside the torque of the nominal spring, the F/T sensor all but the first.
+What a step gave is made good in the next one, so an impact just at its end, not foreseen, loses no momentum.
 Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft with play), with inertia.
 """
 
@@ -24,7 +25,7 @@ from rsea_ros.effects.signal_table import (
     Port,
 )
 
-Y, V, SIDE, D, W, STARTED = range(6)
+Y, V, SIDE, D, W, GIVEN, OWED, STARTED = range(8)
 FASTEST = 0.1
 """Smallest inertia of the chassis, in K_s h^2: a faster one the step cannot show."""
 
@@ -43,14 +44,17 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     if s[COMMIT] == 0.0:
         w = 2.0 * w - x[W]
     y, v, side, area = over_step(x[Y], x[V], x[SIDE], half, x[D], x[W], d, w, h, k, b, j)
-    if s[COMMIT] == 1.0:
+    _, _, whole = path(x[D], x[W], d, w, h, h)
+    spring = (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h
+    inertia = j * ((v - x[V]) - (w - x[W])) / h + x[OWED]
+    if s[COMMIT] == 0.0:
+        x[GIVEN] = spring + inertia
+        s[SPRING_TORQUE] += spring + inertia
+        s[DISTAL_TORQUE] -= inertia
+    else:
+        x[OWED] = spring + inertia - x[GIVEN]
         x[Y], x[V], x[SIDE], x[D], x[W] = y, v, side, d, w
         s[SPRING_TORQUE] += k * (y - d) + b * (v - w)
-        return
-    _, _, whole = path(x[D], x[W], d, w, h, h)
-    inertia = j * ((v - x[V]) - (w - x[W])) / h
-    s[SPRING_TORQUE] += (k * (area - whole) + b * ((y - x[Y]) - (d - x[D]))) / h + inertia
-    s[DISTAL_TORQUE] -= inertia
 
 
 EFFECT = Effect(
@@ -59,7 +63,7 @@ EFFECT = Effect(
     parameters=(Parameter("gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012)),),
     claims=Claims("position", "odd", amplitude_exponent=None, passive=True, confusable_with=("hard_stop",)),
     function=apply,
-    states=6,
+    states=8,
     reads=(DEFLECTION, DEFLECTION_RATE),
     about="play between the gear output and the spring",
     equation="T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2",

@@ -111,7 +111,8 @@ def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] =
 
 def _constants(rig: Rig) -> tuple[float, float, float, float]:
     k_s = 0.0 if rig.rigid_spring else rig["spring.stiffness"]
-    return k_s, rig["spring.damping"], rig["rotor.reflected_damping"], rig["chassis.inertia"]
+    j_sc = rig["chassis.inertia"] if math.isinf(rig["gear.stiffness"]) else 0.0
+    return k_s, rig["spring.damping"], rig["rotor.reflected_damping"], j_sc
 
 
 def _calls(
