@@ -94,6 +94,8 @@ def initial_state(rig: Rig, output: tuple[float, float]) -> FloatArray:
     """
     m = mechanics(rig)
     row = np.array(_DIFFERENCES[st.OUTPUT_ANGLE]) @ m.placement
+    if not (any(output) and row.any()):
+        return np.zeros(2 * m.order)
     stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
     least = [np.linalg.solve(energy, row) for energy in (stiff, m.mass)]
     return np.concatenate([value * x / (row @ x) for value, x in zip(output, least, strict=True)])

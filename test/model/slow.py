@@ -96,13 +96,11 @@ def respond(rig: Rig, stamps: np.ndarray, command: np.ndarray, wanted: np.ndarra
     n = len(b)
     events = np.unique(np.concatenate([stamps, wanted[wanted > stamps[0]]]))
     held = command[np.clip(np.searchsorted(stamps, events, side="right") - 1, 0, None)]
-    x, states, cache = np.zeros(n), {events[0]: np.zeros(n)}, {}
-    for now, then, u in zip(events[:-1], events[1:], held[:-1], strict=True):
-        span = round(then - now, 13)
-        if span not in cache:
-            block = np.zeros((n + 1, n + 1))
-            block[:n, :n], block[:n, n] = a * span, b * span
-            cache[span] = expm(block)
-        x = cache[span][:n, :n] @ x + cache[span][:n, n] * u
+    spans, which = np.unique(np.round(np.diff(events), 13), return_inverse=True)
+    blocks = np.zeros((len(spans), n + 1, n + 1))
+    blocks[:, :n, :n], blocks[:, :n, n] = a * spans[:, None, None], b * spans[:, None]
+    steps, x, states = expm(blocks), np.zeros(n), {events[0]: np.zeros(n)}
+    for then, i, u in zip(events[1:], which, held, strict=False):
+        x = steps[i, :n, :n] @ x + steps[i, :n, n] * u
         states[then] = x
     return c @ np.array([states[max(t, events[0])] for t in wanted]).T

@@ -1,0 +1,144 @@
+"""What a record's stamps mean: commands held from theirs, channels read at theirs, on the grid or not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import slow
+from random_rigs import WITH_SPRING
+
+from rsea_ros.errors import ChannelError, IdentificationError
+from rsea_ros.model.drive import LONGEST_STEP, drive_from, steps_per_sample
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.signals import Channel, Record
+
+RATE = 280.0
+SIGNALS = ("position", "velocity", "ft")
+
+
+def record_of(stamps, command, wanted):
+    """Return a record with blank measurements at the wanted stamps."""
+    blank = {n: Channel(wanted.copy(), np.zeros(len(wanted))) for n in SIGNALS}
+    return Record({"command": Channel(stamps, command), **blank}, source="bag")
+
+
+def white(n, seed=0):
+    return np.clip(15 * np.random.default_rng(seed).standard_normal(n), -40, 40)
+
+
+def errors_in_noise(rig, record):
+    """Return RMS and largest error of each channel against the exact response, in its sensor's noise."""
+    command, wanted = record["command"], record["ft"].t
+    exact = slow.respond(rig, command.t, command.y, wanted)
+    ours = simulate(rig, record)
+    noise = np.array([rig.sensors[n].noise for n in SIGNALS])
+    errors = np.abs(np.array([ours[n] for n in SIGNALS]) - exact) / noise[:, None]
+    return np.sqrt(np.mean(errors**2, axis=1)), errors.max(axis=1)
+
+
+@pytest.mark.parametrize("name", WITH_SPRING)
+@pytest.mark.parametrize("shift", [0.0, 0.5, 0.31])
+def test_any_offset_of_the_sensors_is_exact(name, shift):
+    """Half a sample and any other fraction: under a tenth of the noise, at every sample."""
+    stamps = np.arange(400) / RATE
+    record = record_of(stamps, white(400), stamps + (1 + shift) / RATE)
+    assert errors_in_noise(load_rig(name), record)[1].max() < 0.1
+
+
+@pytest.mark.parametrize("name", WITH_SPRING)
+def test_jittered_stamps_cost_a_fifth_of_the_noise(name):
+    """Commands and sensors late by 0.3 ms at random, each on its own; white commands of 15 N m."""
+    rng = np.random.default_rng(4)
+    late = [np.round(np.arange(300) / RATE + 3e-4 * rng.standard_normal(300), 5) for _ in range(2)]
+    stamps, wanted = np.sort(late[0]) - np.min(late[0]), np.sort(late[1])[10:]
+    record = record_of(stamps, white(300), wanted)
+    rms, largest = errors_in_noise(load_rig(name), record)
+    assert rms.max() < 0.2 and largest.max() < 1.0
+
+
+def test_stamps_rounded_to_microseconds_are_on_the_grid():
+    stamps = np.round(np.arange(400) / RATE, 7)
+    drive = drive_from(record_of(stamps, white(400), stamps + np.round(1 / RATE, 7)))
+    np.testing.assert_array_equal(drive.at["ft"], 8.0 * np.arange(1, 401))
+    np.testing.assert_array_equal(drive.command[:3200], np.repeat(white(400), 8))
+    assert not drive.impulse["ft"].any()
+
+
+def test_a_command_that_did_not_come_is_held_on():
+    """A dropped command message: the last one goes on acting."""
+    stamps, command = np.arange(400) / RATE, white(400)
+    kept = np.delete(np.arange(400), [100, 101, 250])
+    wanted = stamps + 1 / RATE
+    filled = command.copy()
+    filled[[100, 101, 250]] = command[[99, 99, 249]]
+    rig = load_rig("paper_high_impedance")
+    dropped = simulate(rig, record_of(stamps[kept], command[kept], wanted))
+    whole = simulate(rig, record_of(stamps, filled, wanted))
+    for channel in SIGNALS:
+        np.testing.assert_allclose(dropped[channel], whole[channel], atol=1e-9 * np.abs(whole[channel]).max())
+
+
+def test_sensors_at_other_rates_are_read_at_their_own_stamps():
+    stamps = np.arange(400) / RATE
+    slow_ft = np.arange(5, 1300) / 1000.0
+    channels = {"command": Channel(stamps, white(400)), "ft": Channel(slow_ft, np.zeros(len(slow_ft)))}
+    rig = load_rig("paper_high_impedance")
+    ours = simulate(rig, Record(channels))["ft"]
+    exact = slow.respond(rig, stamps, white(400), slow_ft)[2]
+    assert np.abs(ours - exact).max() < 0.1 * rig.sensors["ft"].noise
+
+
+def test_the_first_and_the_last_state_go_on_outside_the_record():
+    stamps = np.arange(50) / RATE
+    wanted = np.array([-1.0, 0.0, 50 / RATE])
+    rig = load_rig("paper_high_impedance")
+    ours = simulate(rig, record_of(stamps, white(50), wanted))["position"]
+    assert ours[0] == ours[1] == 0.0
+    assert ours[2] == pytest.approx(slow.respond(rig, stamps, white(50), wanted[2:])[0, 0], rel=1e-9)
+
+
+def test_an_encoder_that_starts_elsewhere_leaves_the_spring_alone():
+    """Housing turned by 0.2 rad at the start: the pendulum's 1.4 N m on the spring, not 300 N m."""
+    rig = load_rig("paper_moving_output")
+    stamps = np.arange(50) / RATE
+    blank = {n: Channel(stamps.copy(), np.zeros(50)) for n in ("velocity", "ft")}
+    record = Record(
+        {
+            "command": Channel(stamps, np.zeros(50)),
+            "position": Channel(stamps.copy(), np.full(50, 0.2)),
+            **blank,
+        }
+    )
+    ours = simulate(rig, record)
+    assert ours["position"][0] == pytest.approx(0.2)
+    assert abs(ours["ft"][0]) == pytest.approx(1.4, rel=0.02)
+
+
+def test_a_measured_current_is_the_held_command():
+    rig = load_rig("paper_high_impedance")
+    command = Channel(np.arange(50) / RATE, white(50))
+    np.testing.assert_array_equal(synthesize(rig, command, noise=False)["motor_torque"].y, command.y)
+
+
+@pytest.mark.parametrize("rate", [50.0, 280.0, 1000.0, 5000.0])
+def test_step_is_a_whole_fraction_of_the_period(rate):
+    n = steps_per_sample(1 / rate)
+    assert 1 / rate / n <= LONGEST_STEP < 1 / rate / max(n - 1, 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (Channel(np.arange(3.0), np.zeros(3)), r"bag: command has 3 samples, expected at least 10"),
+        (Channel(np.zeros(20), np.zeros(20)), r"command: median stamp interval 0 s, expected > 0 s"),
+    ],
+)
+def test_commands_that_cannot_drive_are_refused(command, message):
+    with pytest.raises(IdentificationError, match=message):
+        drive_from(Record({"command": command}, source="bag"))
+
+
+def test_a_record_without_a_command_is_refused():
+    with pytest.raises(ChannelError, match="no channel 'command'"):
+        drive_from(Record({"ft": Channel(np.arange(20.0), np.zeros(20))}, source="bag"))

@@ -1,0 +1,88 @@
+"""A position loop in the simulation, against scipy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import slow
+from scipy.linalg import expm
+
+from rsea_ros.errors import ChannelError
+from rsea_ros.model.rig import Controller
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate
+from rsea_ros.signals import Channel, Record
+
+RATE = 1000.0
+T = np.arange(1500) / RATE
+STAMPS = T + 1 / RATE
+
+
+def reference(t):
+    return 0.3 * (1 - np.cos(2 * np.pi * t))
+
+
+def record_of(outside):
+    """Return a record whose command has `outside` beside the measured motor torque."""
+    motor = np.sin(T)
+    blank = {n: Channel(STAMPS.copy(), np.zeros(len(T))) for n in ("position", "velocity")}
+    return Record(
+        {
+            "command": Channel(T, motor + outside),
+            "motor_torque": Channel(T.copy(), motor),
+            "reference": Channel(T.copy(), reference(T)),
+            **blank,
+        },
+        source="bag",
+    )
+
+
+def by_scipy(rig, controller, outside):
+    """Integrate with the loop's command held over a third of a millisecond, the step of the simulation."""
+    a, b, c = slow.state_matrices(rig)
+    n, step = len(b), 1 / RATE / 3
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n] = a * step, b * step
+    phi, x, states = expm(block), np.zeros(n), []
+    for k in range(3 * len(T)):
+        wanted = np.interp(k * step, T, reference(T))
+        u = controller.k_v * (controller.k_p * (wanted - c[0] @ x) - c[1] @ x)
+        x = phi[:n, :n] @ x + phi[:n, n] * (np.clip(u, -controller.limit, controller.limit) + outside[k // 3])
+        states.append(x)
+    return c[:2] @ np.array(states[2::3]).T
+
+
+@pytest.mark.parametrize(
+    ("controller", "outside"),
+    [
+        (Controller(k_p=8.0, k_v=20.0), np.zeros(len(T))),
+        (Controller(k_p=8.0, k_v=20.0), np.where(T > 0.5, 3.0, 0.0)),
+        (Controller(k_p=30.0, k_v=40.0, limit=12.0), np.zeros(len(T))),
+    ],
+    ids=["tracking", "disturbed", "limited"],
+)
+def test_closed_loop_is_that_of_scipy(controller, outside):
+    rig = replace(load_rig("bare_drive"), controller=controller)
+    ours = simulate(rig, record_of(outside))
+    for channel, expected in zip(("position", "velocity"), by_scipy(rig, controller, outside), strict=True):
+        np.testing.assert_allclose(ours[channel], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_without_a_controller_the_reference_does_nothing():
+    record = record_of(np.zeros(len(T)))
+    open_loop = simulate(load_rig("bare_drive"), record)
+    channels = {n: c for n, c in record.channels.items() if n != "reference"}
+    np.testing.assert_array_equal(
+        open_loop["position"],
+        simulate(load_rig("bare_drive"), replace(record, channels=channels))["position"],
+    )
+
+
+def test_a_loop_needs_the_motor_torque():
+    record = record_of(np.zeros(len(T)))
+    channels = {n: c for n, c in record.channels.items() if n != "motor_torque"}
+    rig = replace(load_rig("bare_drive"), controller=Controller(8.0, 20.0))
+    with pytest.raises(ChannelError, match="bag: no channel 'motor_torque'"):
+        simulate(rig, replace(record, channels=channels))

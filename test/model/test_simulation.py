@@ -1,0 +1,172 @@
+"""The simulation against independent ways to the same numbers, on rigs of every structure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import slow
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_rigs import RIG_NAMES, WITH_SPRING, rigs
+from scipy.linalg import expm
+from scipy.signal import lsim
+
+from rsea_ros.model import outputs
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import build, run, simulate, synthesize
+from rsea_ros.signals import Channel, Record
+
+RATE = 1120.0
+SIGNALS = ("position", "velocity", "ft")
+
+
+def uniform(command, rate=RATE, delay=0.0):
+    """Return a record of a command on a uniform grid, with blank measurements at the end of each hold."""
+    t = np.arange(len(command)) / rate
+    stamps = t + 1 / rate + delay
+    blank = {n: Channel(stamps.copy(), np.zeros(len(t))) for n in (*SIGNALS, "motor_torque")}
+    return Record({"command": Channel(t, command), **blank}, source="test")
+
+
+def signals_of(rig):
+    return SIGNALS[:2] if rig.rigid_spring else SIGNALS
+
+
+@settings(max_examples=20)
+@given(rigs(), st.integers(0, 1000))
+def test_a_linear_rig_is_exact(rig, seed):
+    """Relative error below 1e-6, against scipy.signal.lsim with held input and the matrix exponential."""
+    command = 20 * np.random.default_rng(seed).standard_normal(600)
+    ours = simulate(rig, uniform(command))
+    a, b, c = slow.state_matrices(rig)
+    t = np.arange(601) / RATE
+    _, by_lsim, _ = lsim((a, b[:, None], c, np.zeros((3, 1))), np.append(command, 0.0), t, interp=False)
+    block = np.zeros((len(b) + 1, len(b) + 1))
+    block[:-1, :-1], block[:-1, -1] = a / RATE, b / RATE
+    phi, x, by_expm = expm(block), np.zeros(len(b)), []
+    for u in command:
+        x = phi[:-1, :-1] @ x + phi[:-1, -1] * u
+        by_expm.append(c @ x)
+    for i, name in enumerate(SIGNALS[: len(signals_of(rig))]):
+        for expected in (by_lsim[1:, i], np.array(by_expm)[:, i]):
+            np.testing.assert_allclose(ours[name], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+LINES = np.array([3, 7, 19, 31, 53, 97])
+PERIOD = 2240  # samples: lines are 0.5 Hz apart
+
+
+def multisine(rig, seed):
+    """Return a command of LINES, long enough that what it starts with has died away in its last period."""
+    phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(LINES))
+    one = np.cos(2 * np.pi * np.outer(np.arange(PERIOD) / PERIOD, LINES) + phase).sum(axis=1)
+    decay = -np.linalg.eigvals(slow.state_matrices(rig)[0]).real
+    slowest = decay[decay > 1e-6].min()
+    return np.tile(one, 2 + int(20.0 / slowest * RATE / PERIOD))
+
+
+def held_response(rig, output, hz):
+    """Return the response of samples to held samples: the aliases of H(f) times the hold's, summed."""
+    k = np.arange(-400, 401)[:, None] * RATE
+    f = (hz + k).ravel()
+    s = 2j * np.pi * f
+    hold = (1 - np.exp(-s / RATE)) / (s / RATE)
+    return (frequency_response(rig, output, f) * hold).reshape(len(k), -1).sum(axis=0)
+
+
+@settings(max_examples=20)
+@given(rigs(), st.integers(0, 1000))
+def test_simulated_record_has_the_frequency_response_of_the_equations(rig, seed):
+    command = multisine(rig, seed)
+    measured = simulate(rig, uniform(command))
+    hz = LINES * RATE / PERIOD
+    late = np.exp(2j * np.pi * hz / RATE)  # the measurement is at the end of the hold
+    asked = np.fft.rfft(command[-PERIOD:])[LINES]
+    for name in set(signals_of(rig)) - {"velocity"}:
+        output = outputs.position() if name == "position" else outputs.end_torque(rig, "spring_end")
+        expected = held_response(rig, output, hz) * late
+        simulated = np.fft.rfft(measured[name][-PERIOD:])[LINES] / asked
+        np.testing.assert_allclose(simulated, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+@settings(max_examples=15)
+@given(rigs(gravity=True), st.integers(0, 1000), st.floats(0.01, 2.0))
+def test_a_passive_rig_never_gains_energy(rig, seed, amplitude):
+    """Free motion from any state, no command: kinetic and potential energy, gravity included, only fall."""
+    machine = build(rig, 4e-4, 1.0)
+    n = len(machine.x) // 2
+    p = slow.coordinates(rig)
+    machine.x[:] = np.random.default_rng(seed).standard_normal(2 * n) * amplitude
+    energy, out = [], np.empty((1, 4))
+    for _ in range(1500):
+        energy.append(slow.kinetic(rig, p @ machine.x[n:]) + slow.potential(rig, p @ machine.x[:n]))
+        run(machine, np.zeros(1), out)
+    assert np.diff(energy).max() <= 1e-9 * energy[0]
+
+
+@pytest.mark.parametrize("name", RIG_NAMES)
+def test_the_step_is_fine_enough(name):
+    """Halving it changes no output by more than a tenth of its sensor's noise."""
+    rig = load_rig(name)
+    scale = 1.0 if name != "pendulum" else 0.1
+    t = np.arange(2800) / 280.0
+    noise = np.random.default_rng(0).standard_normal(len(t))
+    record = uniform(scale * (20 * np.sin(2 * np.pi * 0.2 * t * np.exp(0.6 * t)) + 10 * noise), 280.0)
+    coarse, fine = (simulate(rig, record, refine=refine) for refine in (1, 2))
+    for channel, values in coarse.items():
+        change = np.abs(values - fine[channel]).max()
+        assert change <= 0.1 * rig.sensors[channel].noise, f"{channel}: {change:g}"
+
+
+def test_a_large_swing_of_the_pendulum_is_that_of_scipy():
+    from scipy.integrate import solve_ivp
+
+    rig = load_rig("pendulum")
+    inertia, damping = (
+        rig["rotor.reflected_inertia"] + rig["spring_end.inertia"],
+        rig["rotor.reflected_damping"],
+    )
+    command = np.full(560, 2.5)
+    ours = simulate(rig, uniform(command, 280.0))
+    exact = solve_ivp(
+        lambda t, x: [x[1], (2.5 - damping * x[1] - rig["spring_end.gravity"] * np.sin(x[0])) / inertia],
+        (0, 2.0),
+        [0.0, 0.0],
+        t_eval=np.arange(1, 561) / 280.0,
+        rtol=1e-11,
+        atol=1e-12,
+    ).y
+    assert exact[0].max() > 1.0
+    for channel, values in (("position", exact[0]), ("velocity", exact[1])):
+        assert np.abs(ours[channel] - values).max() < 0.1 * rig.sensors[channel].noise
+
+
+@pytest.mark.parametrize("name", WITH_SPRING)
+def test_two_simulations_are_the_same_to_the_bit(name):
+    rig = load_rig(name)
+    command = Channel(np.arange(100) / 280.0, np.random.default_rng(0).standard_normal(100))
+    first, second = (synthesize(rig, command, seed=3) for _ in range(2))
+    for channel in SIGNALS:
+        np.testing.assert_array_equal(first[channel].y, second[channel].y)
+
+
+def test_sensors_round_and_are_noisy_as_the_rig_says():
+    rig = load_rig("paper_high_impedance")
+    command = Channel(np.arange(20000) / 280.0, np.zeros(20000))
+    record = synthesize(rig, command, seed=1)
+    for channel, sensor in rig.sensors.items():
+        y = record[channel].y
+        expected = np.hypot(sensor.noise, sensor.quantum / np.sqrt(12))
+        if sensor.quantum:
+            np.testing.assert_allclose(y / sensor.quantum, np.rint(y / sensor.quantum), atol=1e-6)
+            expected = (
+                np.std(np.rint(np.random.default_rng(2).normal(0, sensor.noise, 20000) / sensor.quantum))
+                * sensor.quantum
+            )
+        assert np.std(y) == pytest.approx(expected, rel=0.05)
+
+
+def test_a_rig_without_a_spring_has_no_torque_to_measure():
+    command = Channel(np.arange(50) / 280.0, np.zeros(50))
+    assert "ft" not in synthesize(load_rig("bare_drive"), command)
