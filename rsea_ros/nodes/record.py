@@ -33,7 +33,9 @@ RELIABLE = {"torque_command", "desired_torque"}
 TABLE = (
     Parameter("out", "", "bag to write; empty: runs/ and the time"),
     Parameter("storage", "mcap", "format of the bag", choices=("mcap", "sqlite3")),
-    Parameter("duration", 0.0, "length of the recording; 0: until stopped", "s", 0.0, 1e6),
+    Parameter(
+        "duration", 0.0, "length of the recording from the first message on; 0: until stopped", "s", 0.0, 1e6
+    ),
     Parameter("quiet", 0.0, "stop when torque_command has been silent for so long; 0: never", "s", 0.0, 1e4),
 )
 
@@ -48,7 +50,7 @@ class Record:
         path = values["out"] or f"runs/{time.strftime('%Y%m%d-%H%M%S')}"
         self._bag = BagWriter(path, values["storage"]).__enter__()
         self._taps = {name: self._tap(name, kind) for name, kind in TOPICS.items()}
-        self._begin, self._commanded = time.monotonic(), 0.0
+        self._begin = self._commanded = 0.0
         self._health = Health(node, self._report)
         node.create_timer(2.0, self._tell)
         node.get_logger().info(f"recording into {self._bag.path}")
@@ -58,15 +60,18 @@ class Record:
         return Tap(self._node, message_type(kind), name, qos, partial(self._write, name, kind))
 
     def _write(self, name: str, kind: str, received: int, raw: bytes) -> None:
+        now = time.monotonic()
         if name == "torque_command":
-            self._commanded = time.monotonic()
+            self._commanded = now
+        if name != "/diagnostics":
+            self._begin = self._begin or now
         self._bag.write(self._taps[name].topic, kind, received, raw)
 
     def finished(self) -> bool:
         """Tell whether the duration is over, or the commands have ceased."""
         now = time.monotonic()
         ceased = self._commanded > 0.0 and now - self._commanded > self._quiet > 0.0
-        return ceased or now - self._begin > self._duration > 0.0
+        return ceased or (self._begin > 0.0 and now - self._begin > self._duration > 0.0)
 
     def conclude(self) -> None:
         """Say what was recorded."""

@@ -38,6 +38,8 @@ TABLE = (
 WAIT_FOR = ("torque_command", "joint_states", "ft")
 NEVER = {"/diagnostics", "/clock", "/rosout", "/parameter_events"}
 CLOCK_PERIOD = SECOND // 100
+SETTLE = SECOND // 2
+"""A publisher knows of a subscriber before that knows of it."""
 HEARTBEAT = Duration(seconds=4)
 """Longer than the middleware takes to learn that a reliable subscriber has everything."""
 
@@ -86,7 +88,7 @@ class Replay:
         while self._awaited():
             if self._stop.wait(0.05):
                 return
-        begin, first, ticked = time.monotonic_ns(), self._rows[0][2], 0
+        begin, first, ticked = time.monotonic_ns() + SETTLE, self._rows[0][2], 0
         for topic, _, logged, raw in self._rows:
             if self._stop.is_set():
                 return

@@ -89,6 +89,7 @@ class Listener:
         self.node = rclpy.create_node("listener")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
+        self._subscriptions = []
 
     def until(self, condition):
         """Spin until the condition holds, and return what it returned."""
@@ -101,8 +102,14 @@ class Listener:
     def hear(self, kind, topic, qos):
         """Return a list that fills with the messages of a topic."""
         heard = []
-        self.node.create_subscription(kind, topic, heard.append, qos)
+        self._subscriptions.append(self.node.create_subscription(kind, topic, heard.append, qos))
         return heard
+
+    def forget(self):
+        """Hear nothing any more."""
+        for subscription in self._subscriptions:
+            self.node.destroy_subscription(subscription)
+        self._subscriptions = []
 
     def close(self):
         """Take the node away."""

@@ -1,0 +1,157 @@
+"""The driver's lifecycle, and its torque on every way out of it."""
+
+import signal
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.lifecycle import LifecycleNode
+
+from msg_adapters.ros import JointState, torque_command_message
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import State
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+
+class Remote:
+    """The driver process as seen from outside."""
+
+    def __init__(self, start, listener):
+        self.process = start("driver", rate=200.0)
+        self.listener = listener
+        self.states = listener.hear(JointState, "/rsea/joint_states", MEASUREMENT)
+        self.commands = listener.node.create_publisher(JointState, "/rsea/torque_command", COMMAND)
+        self._change = listener.node.create_client(ChangeState, "/rsea/driver/change_state")
+        self._get = listener.node.create_client(GetState, "/rsea/driver/get_state")
+        listener.until(lambda: self._change.service_is_ready() and self._get.service_is_ready())
+
+    def change(self, transition):
+        """Ask for a transition; return whether it succeeded, and the state after it."""
+        future = self._change.call_async(ChangeState.Request(transition=Transition(id=transition)))
+        self.listener.until(future.done)
+        state = self._get.call_async(GetState.Request())
+        self.listener.until(state.done)
+        return future.result().success, state.result().current_state.label
+
+    def push(self, torque, condition):
+        """Command a torque at every measurement until the condition holds."""
+
+        def pushed():
+            self.commands.publish(torque_command_message(0, torque))
+            return condition()
+
+        self.listener.until(pushed)
+
+    def torque(self):
+        """Motor torque of the newest measurement, N m."""
+        return self.states[-1].effort[0] if self.states else None
+
+
+@pytest.fixture(scope="module")
+def remote(start, listener):
+    """One driver for the tests of this module, in their order."""
+    return Remote(start, listener)
+
+
+def test_configured_it_measures_and_lets_no_command_through(remote):
+    assert remote.change(Transition.TRANSITION_CONFIGURE) == (True, "inactive")
+    remote.listener.until(lambda: len(remote.states) > 10)
+    count = len(remote.states)
+    remote.push(10.0, lambda: len(remote.states) > count + 40)
+    assert all(abs(m.effort[0]) < 1.0 for m in remote.states[count:])
+
+
+def test_active_it_follows_commands_and_deactivated_the_torque_is_zero(remote):
+    assert remote.change(Transition.TRANSITION_ACTIVATE) == (True, "active")
+    remote.push(10.0, lambda: remote.torque() > 9.0)
+    assert remote.change(Transition.TRANSITION_DEACTIVATE) == (True, "inactive")
+    remote.push(10.0, lambda: abs(remote.torque()) < 1.0)
+    count = len(remote.states)
+    remote.push(10.0, lambda: len(remote.states) > count + 40)
+    assert all(abs(m.effort[0]) < 1.0 for m in remote.states[count:])
+
+
+def test_cleaned_up_it_is_silent_and_can_be_configured_again(remote):
+    assert remote.change(Transition.TRANSITION_CLEANUP) == (True, "unconfigured")
+    topic = "/rsea/joint_states"
+    remote.listener.until(lambda: not remote.listener.node.count_publishers(topic))
+    assert remote.change(Transition.TRANSITION_CONFIGURE) == (True, "inactive")
+    remote.listener.until(lambda: remote.listener.node.count_publishers(topic))
+
+
+def test_a_signal_closes_the_device_at_zero_torque(remote):
+    remote.change(Transition.TRANSITION_ACTIVATE)
+    remote.push(10.0, lambda: remote.torque() > 9.0)
+    assert remote.process.stop(signal.SIGTERM) == 0
+    assert "torque zero, device closed" in remote.process.output[-1]
+
+
+class Spy:
+    """A device that keeps what is written to it; `fault` is raised by the next reading."""
+
+    def __init__(self):
+        self.written, self.opened, self.fault = [], False, None
+
+    def open(self):
+        self.opened = True
+
+    def read(self):
+        if self.fault is not None:
+            raise self.fault
+        return State(0, 0.0, 0.0, 0.0)
+
+    def write(self, torque):
+        self.written.append(torque)
+
+    def close(self):
+        if self.opened:
+            self.written.append(0.0)
+        self.opened = False
+
+
+@pytest.fixture
+def spied(listener, monkeypatch):
+    """An active driver in this process that has written 5 N m to a spy."""
+    spy = Spy()
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spy})
+    node = LifecycleNode("spied", namespace="spied")
+    program = driver.Driver(node, {"device": "simulated", "rate": 200.0, "autostart": True})
+    listener._executor.add_node(node)
+    publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
+
+    def pushed():
+        publisher.publish(torque_command_message(0, 5.0))
+        return 5.0 in spy.written
+
+    listener.until(pushed)
+    yield spy, program, node
+    program.close()
+    listener._executor.remove_node(node)
+    node.destroy_node()
+
+
+@pytest.mark.parametrize("way", ["trigger_deactivate", "trigger_shutdown"])
+def test_every_transition_out_of_active_writes_zero(spied, way):
+    spy, _, node = spied
+    getattr(node, way)()
+    assert spy.written[-1] == 0.0
+
+
+def test_closing_writes_zero_and_lets_go(spied):
+    spy, program, _ = spied
+    program.close()
+    assert spy.written[-1] == 0.0 and not spy.opened
+
+
+def test_a_fault_of_the_device_closes_it_at_zero_torque_and_can_be_configured_away(spied, listener):
+    spy, program, node = spied
+    spy.fault = DeviceError("no answer from ID 1 within 5 ms")
+    listener.until(lambda: not spy.opened)
+    assert spy.written[-1] == 0.0
+    program.finished()
+    assert node._state_machine.current_state[1] == "unconfigured"
+    assert program._report()[1] == "no answer from ID 1 within 5 ms"
+    spy.fault = None
+    node.trigger_configure()
+    assert node._state_machine.current_state[1] == "inactive" and spy.opened
