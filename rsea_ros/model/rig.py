@@ -191,4 +191,8 @@ def _check_structure(rig: Rig) -> None:
         raise RigError(
             f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
         )
-    rig["rotor.reflected_inertia"], rig["rotor.reflected_damping"]
+    for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
+        rig[name]
+    for end in END_NAMES:
+        if rig.end_is_free(end):
+            rig[f"{end}.inertia"]

@@ -1,0 +1,189 @@
+"""Rig and the mapping that its YAML file holds, every key, type, unit and range checked.
+
+A value is written `{value: 0.953, unit: kg m^2, spread: 0.3, source: Table 2}`; the unit must be the one of
+`rig.FIELDS`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from rsea_ros.errors import RigError
+from rsea_ros.model.checked import mapping, number, only_keys, switch, text
+from rsea_ros.model.rig import (
+    END_NAMES,
+    FIELDS,
+    Controller,
+    EffectSetting,
+    Field,
+    Quantity,
+    Rig,
+    Sensor,
+    check_value,
+)
+from rsea_ros.signals import UNITS
+
+_GROUPS = sorted({name.split(".")[0] for name in FIELDS})
+_TOP = {"name", "about", "source", "known", "proximal", "sensors", "controller", "effects", *_GROUPS}
+_SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
+
+
+def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
+    """Build a rig from the parsed YAML. Raises RigError naming the field."""
+    only_keys(document, _TOP, "rig")
+    groups = {g: mapping(document.get(g, {}), g) for g in _GROUPS}
+    quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
+    clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
+    effects = _effects(document.get("effects", []))
+    return Rig(
+        name=text(document.get("name", default_name), "name"),
+        about=text(document.get("about", ""), "about"),
+        source=text(document.get("source", ""), "source"),
+        quantities=quantities,
+        clamped=clamped,
+        rigid_spring=switch(groups["spring"], "spring.rigid"),
+        train=groups["gear"].get("train", "planetary"),
+        sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
+        known=_known(
+            document.get("known", []),
+            [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
+        ),
+        proximal=text(document.get("proximal", "housing_end"), "proximal"),
+        controller=_controller(document.get("controller")),
+        effects=effects,
+    )
+
+
+def rig_to_document(rig: Rig) -> dict[str, Any]:
+    """Return the rig as the mapping that its YAML file holds."""
+    document: dict[str, Any] = {
+        "name": rig.name,
+        "about": rig.about,
+        "source": rig.source,
+        "proximal": rig.proximal,
+    }
+    for name, quantity in rig.quantities.items():
+        group, key = name.split(".")
+        document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
+    for end in rig.clamped:
+        document.setdefault(end, {})["clamped"] = True
+    document.setdefault("gear", {})["train"] = rig.train
+    if rig.rigid_spring:
+        document.setdefault("spring", {})["rigid"] = True
+    document["known"] = sorted(rig.known)
+    document["sensors"] = {
+        n: {"noise": s.noise, "quantum": s.quantum, "unit": UNITS[n]} for n, s in rig.sensors.items()
+    }
+    if rig.controller:
+        document["controller"] = {
+            "k_p": rig.controller.k_p,
+            "k_v": rig.controller.k_v,
+            "limit": rig.controller.limit,
+        }
+    document["effects"] = [
+        {"name": e.name, "parameters": {k: float(v) for k, v in e.parameters.items()}} for e in rig.effects
+    ]
+    return document
+
+
+def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
+    body: dict[str, Any] = {"value": float(quantity.value), "unit": FIELDS[name].unit}
+    if quantity.spread:
+        body["spread"] = float(quantity.spread)
+    if quantity.source:
+        body["source"] = quantity.source
+    if quantity.ci95:
+        body["ci95"] = [float(v) for v in quantity.ci95]
+    return body
+
+
+def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
+    switches = _SWITCHES.get(group, set())
+    allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
+    only_keys(body, allowed | switches, group)
+    return [
+        (f"{group}.{key}", _quantity(f"{group}.{key}", item))
+        for key, item in body.items()
+        if key not in switches
+    ]
+
+
+def _quantity(name: str, item: Any) -> Quantity:
+    field: Field = FIELDS[name]
+    body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
+    only_keys(body, {"value", "unit", "spread", "source", "ci95"}, name)
+    if body.get("unit") != field.unit:
+        raise RigError(f"{name}.unit = {body.get('unit')!r}, expected {field.unit!r}")
+    value = number(body.get("value"), name, field.unit)
+    check_value(name, value, where="value")
+    spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
+    if not 0.0 <= spread < 10.0:
+        raise RigError(f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10")
+    ci95 = _interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
+    return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
+
+
+def _interval(item: Any, name: str, unit: str) -> tuple[float, float]:
+    if not isinstance(item, list) or len(item) != 2:
+        raise RigError(f"{name} = {item!r}, expected [low, high] in {unit}")
+    low, high = (number(v, name, unit) for v in item)
+    return low, high
+
+
+def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
+    only_keys(body, set(UNITS), "sensors")
+    sensors = {}
+    for name, item in body.items():
+        fields = mapping(item, f"sensors.{name}")
+        only_keys(fields, {"noise", "quantum", "unit", "source"}, f"sensors.{name}")
+        if fields.get("unit") != UNITS[name]:
+            raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
+        noise, quantum = (
+            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
+        )
+        if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
+            raise RigError(
+                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
+            )
+        sensors[name] = Sensor(noise, quantum)
+    return sensors
+
+
+def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
+    if not isinstance(items, list):
+        raise RigError(f"known = {items!r}, expected a list of field names")
+    for item in items:
+        if item not in stated:
+            raise RigError(f"known: {item!r}, expected a value that this rig states: {', '.join(stated)}")
+    return frozenset(items)
+
+
+def _controller(item: Any) -> Controller | None:
+    if item is None:
+        return None
+    body = mapping(item, "controller")
+    only_keys(body, {"k_p", "k_v", "limit", "source"}, "controller")
+    k_p = number(body.get("k_p"), "controller.k_p", "1/s")
+    k_v = number(body.get("k_v"), "controller.k_v", "N m s/rad")
+    limit = number(body.get("limit", math.inf), "controller.limit", "N m")
+    for key, value, unit in (("k_p", k_p, "1/s"), ("k_v", k_v, "N m s/rad")):
+        if not 0.0 <= value < math.inf:
+            raise RigError(f"controller.{key} = {value:g} {unit}, expected a finite value >= 0 {unit}")
+    if limit <= 0.0:
+        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m")
+    return Controller(k_p, k_v, limit)
+
+
+def _effects(items: Any) -> tuple[EffectSetting, ...]:
+    if not isinstance(items, list):
+        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}")
+    settings = []
+    for i, item in enumerate(items):
+        body = mapping(item, f"effects[{i}]")
+        only_keys(body, {"name", "parameters", "ci95"}, f"effects[{i}]")
+        parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
+        values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
+        settings.append(EffectSetting(text(body.get("name", ""), f"effects[{i}].name"), values))
+    return tuple(settings)

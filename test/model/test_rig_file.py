@@ -1,0 +1,222 @@
+"""Rig files: what is written is read back; nonsense is one line with file, field, value and expectation."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from random_rigs import RIG_NAMES, rigs
+
+from rsea_ros.errors import RigError
+from rsea_ros.model.rig import Controller, EffectSetting, Quantity
+from rsea_ros.model.rig_file import (
+    load_rig,
+    rig_folders,
+    rig_from_document,
+    rig_path,
+    rig_to_document,
+    save_rig,
+)
+
+BASE = yaml.safe_load(rig_path("paper_high_impedance").read_text())
+MOVING = yaml.safe_load(rig_path("paper_moving_output").read_text())
+
+
+@pytest.mark.parametrize("name", RIG_NAMES)
+def test_shipped_rigs_survive_a_round_trip(name, tmp_path):
+    rig = load_rig(name)
+    save_rig(rig, tmp_path / "model.yaml")
+    assert load_rig(tmp_path / "model.yaml") == rig
+    assert [p.name for p in tmp_path.iterdir()] == ["model.yaml"]
+
+
+def test_every_shipped_rig_is_tested():
+    shipped = {path.stem for folder in rig_folders()[:1] for path in folder.glob("*.yaml")}
+    assert set(RIG_NAMES) <= shipped
+    for name in shipped:
+        assert load_rig(name).name == name
+
+
+def test_everything_that_a_rig_can_hold_survives(tmp_path):
+    rig = replace(
+        load_rig("bare_drive"),
+        controller=Controller(k_p=8.0, k_v=20.0, limit=40.0),
+        effects=(EffectSetting("coulomb_friction", {"torque": 2.5}),),
+        train="star",
+    )
+    fitted = Quantity(0.9501, 0.02, "fit", (0.94, 0.96))
+    rig = replace(rig, quantities={**rig.quantities, "rotor.reflected_inertia": fitted})
+    save_rig(rig, tmp_path / "model.yaml")
+    assert load_rig(tmp_path / "model.yaml") == rig
+
+
+@settings(max_examples=30)
+@given(rigs(gravity=True))
+def test_any_rig_survives_its_document(rig):
+    assert rig_from_document(yaml.safe_load(yaml.safe_dump(rig_to_document(rig)))) == rig
+
+
+def changed(path, value, base=BASE):
+    """Return a shipped document with one entry changed; DELETE takes it away."""
+    document = copy.deepcopy(base)
+    *folders, last = path
+    place = document
+    for key in folders:
+        place = place.setdefault(key, {})
+    if value is DELETE:
+        del place[last]
+    else:
+        place[last] = value
+    return document
+
+
+DELETE = object()
+INERTIA = ("rotor", "reflected_inertia")
+
+NONSENSE = [
+    (
+        (*INERTIA, "value"),
+        -0.953,
+        "rotor.reflected_inertia = -0.953 kg m^2, expected a finite value > 0 kg m^2",
+    ),
+    ((*INERTIA, "value"), 0, "rotor.reflected_inertia = 0 kg m^2, expected a finite value > 0"),
+    ((*INERTIA, "value"), float("nan"), "rotor.reflected_inertia = nan, expected a number (kg m^2)"),
+    ((*INERTIA, "value"), float("inf"), "rotor.reflected_inertia = inf kg m^2, expected a finite value"),
+    ((*INERTIA, "value"), "heavy", "rotor.reflected_inertia = 'heavy', expected a number (kg m^2)"),
+    ((*INERTIA, "value"), True, "rotor.reflected_inertia = True, expected a number (kg m^2)"),
+    ((*INERTIA, "value"), DELETE, "rotor.reflected_inertia = None, expected a number (kg m^2)"),
+    ((*INERTIA, "value"), 10**400, "rotor.reflected_inertia = "),
+    ((*INERTIA, "unit"), "g cm^2", "rotor.reflected_inertia.unit = 'g cm^2', expected 'kg m^2'"),
+    ((*INERTIA, "unit"), DELETE, "rotor.reflected_inertia.unit = None, expected 'kg m^2'"),
+    (
+        (*INERTIA, "spread"),
+        -0.1,
+        "rotor.reflected_inertia.spread = -0.1, expected a relative one-sigma spread",
+    ),
+    ((*INERTIA, "spread"), float("inf"), "rotor.reflected_inertia.spread = inf, expected a relative"),
+    ((*INERTIA, "colour"), "red", "rotor.reflected_inertia: unknown key 'colour', expected one of ci95"),
+    ((*INERTIA, "source"), 7, "rotor.reflected_inertia.source = 7, expected text"),
+    ((*INERTIA, "ci95"), [0.9], "rotor.reflected_inertia.ci95 = [0.9], expected [low, high] in kg m^2"),
+    ((*INERTIA, "ci95"), 0.9, "rotor.reflected_inertia.ci95 = 0.9, expected [low, high] in kg m^2"),
+    ((*INERTIA, "ci95"), ["a", "b"], "rotor.reflected_inertia.ci95 = 'a', expected a number (kg m^2)"),
+    (INERTIA, 0.953, "rotor.reflected_inertia = 0.953, expected {value: …, unit: kg m^2}"),
+    (INERTIA, None, "rotor.reflected_inertia = None, expected {value: …, unit: kg m^2}"),
+    (INERTIA, DELETE, "rotor.reflected_inertia is missing, expected a value in kg m^2"),
+    (
+        ("rotor", "mass"),
+        {},
+        "rotor: unknown key 'mass', expected one of reflected_damping, reflected_inertia",
+    ),
+    (("rotor",), None, "rotor = None, expected a mapping"),
+    (("rotor",), [1], "rotor = [1], expected a mapping"),
+    (("wheels",), {}, "rig: unknown key 'wheels', expected one of about"),
+    ((7,), {}, "rig: unknown key 7, expected one of about"),
+    (("gear", "ratio", "value"), 0.5, "gear.ratio = 0.5 1, expected a finite value >= 1"),
+    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, lumped"),
+    (("gear", "train"), ["star"], "gear.train = ['star'], expected"),
+    (
+        ("spring", "stiffness"),
+        DELETE,
+        "spring.stiffness is missing, expected a value in N m/rad or `rigid: true`",
+    ),
+    (("spring", "rigid"), "yes", "spring.rigid = 'yes', expected true or false"),
+    (("spring", "rigid"), True, "spring rigid and spring_end clamped, expected one of them"),
+    (("spring_end", "clamped"), 1, "spring_end.clamped = 1, expected true or false"),
+    (("spring_end", "clamped"), False, "spring_end.inertia is missing, expected a value in kg m^2"),
+    (("proximal",), "left", "proximal = 'left', expected one of housing_end, spring_end"),
+    (("name",), 5, "name = 5, expected text"),
+    (("known",), "gear.ratio", "known = 'gear.ratio', expected a list of field names"),
+    (
+        ("known",),
+        ["spring_end.inertia"],
+        "known: 'spring_end.inertia', expected a value that this rig states",
+    ),
+    (("known",), [["gear.ratio"]], "known: ['gear.ratio'], expected a value that this rig states"),
+    (("sensors", "sound"), {}, "sensors: unknown key 'sound', expected one of command"),
+    (("sensors",), None, "sensors = None, expected a mapping"),
+    (("sensors", "ft", "unit"), "lbf ft", "sensors.ft.unit = 'lbf ft', expected 'N m'"),
+    (("sensors", "ft", "noise"), -1, "sensors.ft = -1, 0 N m, expected finite values >= 0"),
+    (("sensors", "ft", "noise"), "low", "sensors.ft.noise = 'low', expected a number (N m)"),
+    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of noise"),
+    (("controller",), 3, "controller = 3, expected a mapping"),
+    (("controller",), {"k_v": 1.0}, "controller.k_p = None, expected a number (1/s)"),
+    (
+        ("controller",),
+        {"k_p": 1.0, "k_v": -1.0},
+        "controller.k_v = -1 N m s/rad, expected a finite value >= 0",
+    ),
+    (("controller",), {"k_p": 1, "k_v": 1, "limit": -5}, "controller.limit = -5 N m, expected a value > 0"),
+    (("controller",), {"k_p": 1.0, "k_v": 1.0, "k_i": 1.0}, "controller: unknown key 'k_i'"),
+    (("effects",), {"name": "x"}, "effects = {'name': 'x'}, expected a list"),
+    (("effects",), [3], "effects[0] = 3, expected a mapping"),
+    (("effects",), [{"name": 4}], "effects[0].name = 4, expected text"),
+    (
+        ("effects",),
+        [{"name": "coulomb_friction", "parameters": {"torque": "big"}}],
+        "effects[0].torque = 'big'",
+    ),
+    (("effects",), [{"name": "coulomb_friction", "size": 3}], "effects[0]: unknown key 'size'"),
+]
+
+
+@pytest.mark.parametrize(("path", "value", "message"), NONSENSE, ids=lambda item: str(item)[:40])
+def test_nonsense_is_one_line_that_names_it(path, value, message, tmp_path):
+    file = tmp_path / "bad.yaml"
+    file.write_text(yaml.safe_dump(changed(path, value)))
+    with pytest.raises(RigError) as error:
+        load_rig(file)
+    text = str(error.value)
+    assert text.startswith(f"{file}: ") and message in text and "\n" not in text
+
+
+def test_a_known_field_must_be_stated(tmp_path):
+    file = tmp_path / "bad.yaml"
+    file.write_text(yaml.safe_dump(changed(("known",), ["spring_end.inertia"], MOVING)))
+    with pytest.raises(
+        RigError, match=r"known: 'spring_end.inertia', expected a value that this rig states: "
+    ):
+        load_rig(file)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "holds NoneType, expected a mapping with the keys of a rig"),
+        (b"- 1\n", "holds list, expected a mapping"),
+        (b"name: [", "not YAML: "),
+        (b"\xff\xfe\x00", "not YAML: "),
+        (b"name: !!python/object:os.system {}", "not YAML: "),
+    ],
+    ids=["empty", "list", "broken", "binary", "object"],
+)
+def test_files_that_are_no_rig(content, message, tmp_path):
+    file = tmp_path / "bad.yaml"
+    file.write_bytes(content)
+    with pytest.raises(RigError) as error:
+        load_rig(file)
+    assert str(error.value).startswith(f"{file}: {message}") and "\n" not in str(error.value)
+
+
+def test_files_that_are_not_there(tmp_path):
+    with pytest.raises(RigError, match=r"none\.yaml: no such file, expected a rig in YAML"):
+        load_rig(tmp_path / "none.yaml")
+    with pytest.raises(RigError, match=r"rig 'none' not found, expected a YAML file or one of .*bare_drive"):
+        load_rig("none")
+
+
+def test_a_folder_is_no_rig(tmp_path, monkeypatch):
+    (tmp_path / "pendulum").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert load_rig("pendulum").name == "pendulum"
+    (tmp_path / "folder.yaml").mkdir()
+    with pytest.raises(RigError, match=r": Is a directory, expected a rig in YAML that can be read"):
+        load_rig(tmp_path / "folder.yaml")
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
+    with pytest.raises(RigError, match=r"model\.yaml: .*, expected a place that can be written"):
+        save_rig(load_rig("pendulum"), tmp_path / "none" / "model.yaml")
+    assert not list(tmp_path.iterdir())
