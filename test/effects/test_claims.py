@@ -1,0 +1,108 @@
+"""What the effects say about themselves, held against the simulation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_bench import NOISE, RIG, command, difference, drive, record_of, rms, simulate
+from scipy.optimize import least_squares
+
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Effect
+from rsea_ros.model.drive import Drive, drive_from
+
+every_effect = pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
+PASSIVE = [e for e in catalogue().values() if e.claims.passive]
+PAIRS = [(e, rival) for e in catalogue().values() for rival in e.claims.confusable_with]
+NOMINAL = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
+
+
+def change(effect: Effect, driven: Drive) -> np.ndarray:
+    """Return what the effect changes at its typical size, in units of the noise."""
+    return difference(simulate(driven, effect.name, effect.typical), simulate(driven))
+
+
+@every_effect
+def test_it_shows_most_in_its_channel(effect: Effect):
+    driven = drive(duration=10.0)
+    nominal, extended = simulate(driven), simulate(driven, effect.name, effect.typical)
+    shows = {n: rms(extended[n] - nominal[n]) / noise for n, noise in NOISE.items()}
+    assert shows[effect.claims.channel] == max(shows.values()), shows
+
+
+@every_effect
+def test_parity(effect: Effect):
+    forward, backward = (change(effect, drive(amplitude=a)) for a in (20.0, -20.0))
+    odd, even = rms(forward - backward) / 2, rms(forward + backward) / 2
+    share = even / (odd + even)
+    low, high = {"odd": (0.0, 1e-6), "even": (0.9, 1.0), "neither": (0.1, 0.9)}[effect.claims.parity]
+    assert low <= share <= high
+
+
+@every_effect
+def test_growth_with_the_amplitude(effect: Effect):
+    sizes = [rms(change(effect, drive(amplitude=a))) for a in (6.0, 12.0, 24.0)]
+    exponents = np.diff(np.log2(np.maximum(sizes, 1e-6)))
+    if effect.claims.amplitude_exponent is None:
+        assert np.ptp(exponents) > 0.1 or abs(exponents[0] - np.rint(exponents[0])) > 0.1
+    else:
+        assert np.abs(exponents - effect.claims.amplitude_exponent).max() < 0.25
+
+
+@pytest.mark.parametrize("effect", PASSIVE, ids=lambda e: e.name)
+def test_a_passive_effect_only_takes_energy(effect: Effect):
+    rig = RIG.with_values({"rotor.reflected_damping": 0.0, "spring.damping": 0.0})
+    silence = replace(command(280.0, 5.0), y=np.zeros(1400))
+    thrown = drive_from(record_of(silence, start=(0.0, 0.6)))
+    free = simulate(thrown, rig=rig)
+    inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
+    at_start = inertia * 0.6**2 / 2
+    energy = inertia * free["velocity"] ** 2 / 2 + rig["spring.stiffness"] * free["position"] ** 2 / 2
+    np.testing.assert_allclose(energy, at_start, rtol=1e-9)
+    motion = simulate(thrown, effect.name, effect.typical, rig)
+    deflection = np.minimum(abs(motion["position"]), abs(motion["ft"]) / rig["spring.stiffness"])
+    energy = inertia * motion["velocity"] ** 2 / 2 + rig["spring.stiffness"] * deflection**2 / 2
+    assert energy.max() < at_start * (1 + 5e-4)
+
+
+@pytest.mark.parametrize(("effect", "rival"), PAIRS, ids=lambda v: v if isinstance(v, str) else v.name)
+def test_a_rival_explains_most_of_what_a_refit_leaves(effect: Effect, rival: str):
+    driven = drive(duration=4.0)
+    measured = simulate(driven, effect.name, effect.typical)
+    left, explained = (_misfit(driven, measured, other) for other in (None, catalogue()[rival]))
+    assert explained < left / 2
+
+
+def _misfit(driven: Drive, measured: dict[str, np.ndarray], other: Effect | None) -> float:
+    """Return the least sum of squares of the nominal rig, or of that with another effect, refitted."""
+    nominal = np.array([RIG[n] for n in NOMINAL])
+    parameters = other.parameters if other else ()
+    low = np.concatenate([0.3 * nominal, [p.low for p in parameters]])
+    high = np.concatenate([3.0 * nominal, [p.high for p in parameters]])
+    scale = np.concatenate([nominal, [abs(p.typical) for p in parameters]])
+
+    def residual(theta: np.ndarray) -> np.ndarray:
+        rig = RIG.with_values(dict(zip(NOMINAL, theta[:4], strict=True)))
+        setting = {p.name: float(v) for p, v in zip(parameters, theta[4:], strict=True)}
+        name = other.name if other else ""
+        return difference(simulate(driven, name, setting if other else None, rig), measured)
+
+    starts = [np.concatenate([nominal, values]) for values in _starts(other)]
+    best = min(starts, key=lambda theta: rms(residual(theta)))
+    fit = least_squares(residual, np.clip(best, low, high), bounds=(low, high), x_scale=scale,
+                        diff_step=1e-4, max_nfev=20)  # fmt: skip
+    return float(2 * fit.cost)
+
+
+def _starts(other: Effect | None) -> list[list[float]]:
+    """Return where a fit may begin: typical sizes, the starts of each parameter, and the other sign."""
+    if other is None:
+        return [[]]
+    typical = list(other.typical.values())
+    starts = [typical]
+    for i, p in enumerate(other.parameters):
+        choices = [*p.starts, *([-p.typical] if p.low < 0.0 else [])]
+        starts += [[*typical[:i], value, *typical[i + 1 :]] for value in choices]
+    return starts

@@ -1,0 +1,42 @@
+"""The equation of every effect, against a second implementation of it that a general solver integrates."""
+
+from __future__ import annotations
+
+import independent
+import numpy as np
+import pytest
+from effect_bench import RIG, SIGNALS, command, record_of, rms, simulate
+
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Effect
+from rsea_ros.model.drive import drive_from
+
+TOLERANCE = {"ft": 6e-3, "position": 1.2e-6, "velocity": 8e-5}
+"""A fifth of the sensors' noise."""
+
+
+def test_every_effect_has_an_independent_equation():
+    assert set(independent.LAWS) == set(catalogue())
+
+
+def test_the_two_benches_are_the_same():
+    ours = (RIG["rotor.reflected_inertia"], RIG["chassis.inertia"], RIG["rotor.reflected_damping"],
+            RIG["spring.stiffness"], RIG["spring.damping"], RIG["gear.ratio"])  # fmt: skip
+    theirs = (independent.J_M, independent.J_SC, independent.B_M,
+              independent.K_S, independent.B_S, independent.RATIO)  # fmt: skip
+    assert ours == theirs
+
+
+@pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
+def test_simulation_obeys_the_equation(effect: Effect):
+    commanded = command(rate=280.0, duration=independent.DURATION)
+    simulated = simulate(drive_from(record_of(commanded)), effect.name, effect.typical)
+    nominal = simulate(drive_from(record_of(commanded)))
+    true = independent.solve(effect.name, effect.typical, commanded.y, commanded.t[1])
+    changed = [n for n in SIGNALS if not np.array_equal(simulated[n], nominal[n])]
+    assert changed
+    for name in SIGNALS:
+        error = rms(simulated[name] - true[name])
+        assert error < TOLERANCE[name], (name, error)
+        if name in changed:
+            assert error < 0.005 * rms(true[name] - nominal[name]), (name, error)
