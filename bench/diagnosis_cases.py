@@ -1,0 +1,169 @@
+"""Records with a known cause, for measuring the diagnosis: made by the second bench, not by the model.
+
+`plan(seed)` lists what there is; `Plan.make()` simulates one case, so that a run needs only one in memory.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
+
+from independent.bench import Bench, drawn_bench, record_run
+from independent.faults import FAULTS
+from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
+from independent.severities import SEVERITIES, SIZES, drawn_parameters
+
+from rsea_ros.signals import Record
+
+PAIRS = (
+    ("coulomb_friction", "structural_resonance"),
+    ("coulomb_friction", "backlash"),
+    ("coulomb_friction", "command_delay"),
+    ("coulomb_friction", "nonlinear_spring"),
+    ("coulomb_friction", "torque_ripple"),
+    ("coulomb_friction", "ft_drift"),
+    ("coulomb_friction", "mains_interference"),
+    ("coulomb_friction", "stiffness_drift"),
+    ("backlash", "structural_resonance"),
+    ("backlash", "current_loop_lag"),
+    ("backlash", "ft_bias"),
+    ("nonlinear_spring", "command_delay"),
+    ("nonlinear_spring", "mains_interference"),
+    ("nonlinear_spring", "damping_drift"),
+    ("torque_constant_error", "structural_resonance"),
+    ("torque_constant_error", "command_delay"),
+    ("torque_saturation", "ft_bias"),
+    ("torque_saturation", "structural_resonance"),
+    ("load_dependent_friction", "mains_interference"),
+    ("load_dependent_friction", "current_loop_lag"),
+    ("asymmetric_friction", "structural_resonance"),
+    ("torque_ripple", "ft_sensor_lag"),
+    ("hard_stop", "ft_drift"),
+    ("damping_drift", "structural_resonance"),
+)
+"""Two effects that different parts of the data show."""
+
+READINGS = (
+    ("asymmetric_friction", {"offset": 1.5, "viscous_difference": 2.0}, {"even_offset": 0.75, "even_b": 1.0}),
+    ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 1.0}),
+    ("backlash", {"gap": 2.0e-3}, {"encoder_on_chassis": 1.0}),
+    ("gear_compliance", {"stiffness": 8.0e3}, {"encoder_on_chassis": 1.0}),
+)
+"""Effect, its size, and values of the bench that make another sentence of the contract's row of it."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One record, what is hidden in it, and another record of the same bench with another seed."""
+
+    name: str
+    record: Record
+    truth_causes: tuple[str, ...]
+    truth_parameters: Mapping[str, Mapping[str, float]]
+    fresh_record: Record
+    group: str = "single"
+    mimics: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a case is made from; group: single, pair, clean, off_catalogue, faulty or reading."""
+
+    name: str
+    group: str
+    seed: int
+    excitation: str = "chirp_noise"
+    hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    values: Mapping[str, float] = field(default_factory=dict)
+    off: tuple[str, float] | None = None
+    faults: tuple[str, ...] = ()
+    duration: float = 60.0
+
+    def bench(self) -> Bench:
+        """Return the bench that this case is measured on."""
+        bench = drawn_bench(np.random.default_rng(self.seed))
+        for effect, parameters in self.hidden.items():
+            bench = hide(bench, effect, parameters)
+        if self.off:
+            bench = hide_off_catalogue(bench, *self.off)
+        return bench.having(**self.values)
+
+    def make(self) -> Case:
+        """Simulate the case: its record with the faults put in, and a fresh record without."""
+        bench = self.bench()
+        record = record_run(bench, self.seed + 1, self.excitation, self.duration)
+        fresh = record_run(bench, self.seed + 2, self.excitation, self.duration)
+        rng = np.random.default_rng(self.seed + 3)
+        for fault in self.faults:
+            record = FAULTS[fault](record, rng)
+        mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
+        causes = tuple(self.hidden)
+        return Case(self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults)
+
+
+def plan(seed: int = 2024) -> tuple[Plan, ...]:
+    """Return all cases that a seed makes, each with a seed of its own."""
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings)
+    rng = np.random.default_rng(seed)
+    return tuple(case for maker in makers for case in maker(rng))
+
+
+def _excitation(k: int) -> str:
+    return ("chirp_noise", "multisine")[k % 2]
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(1, 2**31)) * 8
+
+
+def _singles(rng: np.random.Generator) -> Iterator[Plan]:
+    for effect in SIZES:
+        for severity in SEVERITIES:
+            for excitation in ("chirp_noise", "multisine"):
+                hidden = {effect: drawn_parameters(effect, severity, rng)}
+                name = f"{effect}-{severity}-{excitation}"
+                yield Plan(name, "single", _seed(rng), excitation, hidden)
+
+
+def _pairs(rng: np.random.Generator) -> Iterator[Plan]:
+    for k, pair in enumerate(PAIRS):
+        severity = SEVERITIES[1 + k % 2]
+        hidden = {effect: drawn_parameters(effect, severity, rng) for effect in pair}
+        yield Plan("+".join(pair), "pair", _seed(rng), _excitation(k // 2), hidden)
+
+
+def _clean(rng: np.random.Generator) -> Iterator[Plan]:
+    for k in range(24):
+        yield Plan(f"clean-{k:02d}", "clean", _seed(rng), _excitation(k))
+
+
+def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
+    for k, effect in enumerate(OFF_CATALOGUE):
+        for factor in (0.7, 1.4):
+            off = (effect, factor * rng.uniform(0.9, 1.1))
+            yield Plan(f"off-{effect}-{factor}", "off_catalogue", _seed(rng), _excitation(k), off=off)
+
+
+def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
+    """Every fault on a bench with nothing wrong, and on one with an effect to be found in spite of it."""
+    for k, fault in enumerate(FAULTS):
+        yield Plan(f"fault-{fault}", "faulty", _seed(rng), _excitation(k), faults=(fault,))
+        if fault != "missing_topic":
+            hidden = {"coulomb_friction": drawn_parameters("coulomb_friction", "medium", rng)}
+            name = f"fault-{fault}-coulomb_friction"
+            yield Plan(name, "faulty", _seed(rng), _excitation(k), hidden, faults=(fault,))
+
+
+def _readings(rng: np.random.Generator) -> Iterator[Plan]:
+    """The contract's rows read otherwise; asked values don't hold for these, the matrix shows them."""
+    for effect, parameters, values in READINGS:
+        for excitation in ("chirp_noise", "multisine"):
+            name = f"reading-{effect}-{excitation}"
+            yield Plan(name, "reading", _seed(rng), excitation, {effect: parameters}, values)

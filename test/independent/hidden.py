@@ -1,0 +1,104 @@
+"""What can be hidden in the second bench, by name: the contract's effects, and things outside its table."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import numpy as np
+
+CATALOGUE = MappingProxyType(
+    {
+        "torque_constant_error": {"gain": "torque_gain"},
+        "coulomb_friction": {"torque": "coulomb"},
+        "stribeck_friction": {
+            "coulomb_torque": "coulomb",
+            "stribeck_torque": "stribeck",
+            "stribeck_velocity": "stribeck_v",
+        },
+        "asymmetric_friction": {"offset": "one_sided", "viscous_difference": "one_sided_b"},
+        "load_dependent_friction": {"coefficient": "load_friction"},
+        "backlash": {"gap": "gap"},
+        "nonlinear_spring": {"cubic": "cubic"},
+        "spring_hysteresis": {"torque": "bouc_wen", "angle": "bouc_wen_angle"},
+        "structural_resonance": {
+            "frequency": "resonance_omega",
+            "damping_ratio": "resonance_zeta",
+            "participation": "resonance",
+        },
+        "command_delay": {"delay": "delay"},
+        "current_loop_lag": {"time_constant": "current_tau"},
+        "ft_sensor_lag": {"time_constant": "ft_tau"},
+        "torque_ripple": {
+            "amplitude": "ripple",
+            "cycles_per_revolution": "ripple_cycles",
+            "phase": "ripple_phase",
+        },
+        "torque_saturation": {"limit": "saturation"},
+        "ft_drift": {"drift": "ft_drift"},
+        "ft_bias": {"bias": "ft_bias"},
+        "ft_gain_error": {"gain": "ft_gain"},
+        "mains_interference": {"amplitude": "hum", "frequency": "hum_frequency"},
+        "base_compliance": {"stiffness": "base_k", "inertia": "base_j"},
+        "stiffness_drift": {"relative_change": "stiffness_drift"},
+        "damping_drift": {"relative_change": "damping_drift"},
+        "hard_stop": {"angle": "stop_angle", "stiffness": "stop_k"},
+        "gear_compliance": {"stiffness": "gear_k"},
+    }
+)
+"""Effect of the contract: its parameters, and the values of the bench that they are."""
+
+MAIN_PARAMETER = {name: next(iter(parameters)) for name, parameters in CATALOGUE.items()}
+"""The parameter that says how large an effect is, or where: the first of the contract's row."""
+
+OFF_CATALOGUE = MappingProxyType(
+    {
+        "quadratic_drag": ({"quadratic_drag": 12.0}, ("damping_drift",)),
+        "friction_by_angle": (
+            {"angle_friction": 4.0, "angle_period": 0.015},
+            ("coulomb_friction", "stribeck_friction", "load_dependent_friction", "asymmetric_friction"),
+        ),
+        "command_deadband": ({"deadband": 4.0}, ("coulomb_friction",)),
+        "command_rate_limit": ({"rate_limit": 2500.0}, ("current_loop_lag", "torque_saturation")),
+        "torque_constant_fade": ({"torque_fade": -0.2}, ("torque_constant_error", "ft_gain_error")),
+        "quadratic_ft": ({"ft_quadratic": 0.004}, ()),
+        "coarse_ft": ({"ft_quantum": 1.0}, ()),
+        "output_cogging": ({"cogging": 1.2, "cogging_period": 0.011}, ("torque_ripple",)),
+        "impacts": ({"impact_torque": 25.0, "impact_rate": 1.5}, ()),
+        "ft_random_walk": ({"ft_walk": 0.12}, ("ft_drift", "ft_bias")),
+        "lugre_friction": (
+            {
+                "bristle_k": 2500.0,
+                "bristle_b": 5.0,
+                "lugre_coulomb": 2.0,
+                "lugre_stribeck": 1.0,
+                "stribeck_v": 0.03,
+            },
+            ("coulomb_friction", "stribeck_friction", "spring_hysteresis", "load_dependent_friction"),
+        ),
+        "encoder_eccentricity": ({"eccentricity": 8.0e-5, "eccentricity_cycles": 1.0}, ()),
+        "ft_thermal": ({"ft_thermal": 1.0, "ft_thermal_tau": 8.0}, ("ft_drift", "ft_bias")),
+        "ft_crosstalk": ({"ft_crosstalk": 0.35}, ()),
+        "current_overshoot": (
+            {"current_omega": 2.0 * np.pi * 45.0, "current_zeta": 0.25},
+            ("current_loop_lag", "command_delay"),
+        ),
+        "lopsided_spring": ({"quadratic": 8.0}, ("nonlinear_spring",)),
+    }
+)
+"""Effect outside the table: values of the bench at medium size, and effects that it can be taken for."""
+
+
+def hide(bench, effect, parameters):
+    """Return the bench with an effect of the contract, parameters in the contract's units."""
+    fields = CATALOGUE[effect]
+    values = {fields[name]: value for name, value in parameters.items()}
+    if "resonance_omega" in values:
+        values["resonance_omega"] *= 2.0 * np.pi
+    return bench.having(**values)
+
+
+def hide_off_catalogue(bench, effect, factor=1.0):
+    """Return the bench with an effect outside the table; `factor` scales its size (the first value)."""
+    values, _ = OFF_CATALOGUE[effect]
+    size = next(iter(values))
+    return bench.having(**{**values, size: values[size] * factor})
