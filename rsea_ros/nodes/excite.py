@@ -25,7 +25,7 @@ TABLE = (
     ),
     Parameter("noise", 10.0, "standard deviation of the noise on top of the chirp", "N m", 0.0, 1e4),
     Parameter("duration", 160.0, "length without the ramps of a multisine", "s", 0.1, 1e5),
-    Parameter("rate", 280.0, "commands a second", "Hz", 10.0, 1000.0),
+    Parameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
     Parameter("low", 0.01, "lowest frequency", "Hz", 1e-4, 500.0),
     Parameter("high", 140.0, "highest frequency, kept below 0.475 of the rate", "Hz", 1e-3, 500.0),
     Parameter("period", 10.0, "period of multisine and steps", "s", 0.01, 1e4),
@@ -34,12 +34,12 @@ TABLE = (
         "limit", 68.0, "largest torque; the whole excitation is checked before it starts", "N m", 0.0, 1e4
     ),
     Parameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
-    Parameter("lead", 0.01, "how long before it takes effect a command is published", "s", 0.0, 0.09),
+    Parameter("lead", 0.05, "how long before it takes effect a command is published", "s", 0.0, 0.1),
     Parameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
 )
 SETTLE = SECOND // 2
-CLOSING_ZEROS = 20
-MARGIN = SECOND // 1000
+CLOSING_ZEROS = 3
+MARGIN = SECOND // 100
 """A command that has less than this left until it takes effect is left out: its stamp would not be true."""
 
 
@@ -98,9 +98,9 @@ class Excite:
     def close(self) -> None:
         """Command zero torque after the last command, and wait until that has arrived."""
         self._cycle.stop()
-        for k in range(1, 1 + CLOSING_ZEROS if self._started else 1):
-            stamp = max(self._stamp, time.time_ns()) + round(k * SECOND / self._rate)
-            self._publisher.publish(torque_command_message(stamp, 0.0))
+        last = max(self._stamp, time.time_ns())
+        for k in range(1, CLOSING_ZEROS + 1 if self._started else 1):
+            self._publisher.publish(torque_command_message(last + round(k * SECOND / self._rate), 0.0))
         self._publisher.wait_for_all_acked(Duration(seconds=0, nanoseconds=SECOND // 5))
         self._node.get_logger().info(f"torque zero after {self._next} commands, {self._left_out} left out")
 

@@ -87,7 +87,7 @@ class Identify:
         log.info(f"identifying from {self._gathered()}")
         record = record_from(self._contents, self._topics.topic("torque_command"), self._topics)
         result = identify([record], self._rig, self._progress)
-        report = write_results(result, [record], self._values["out"])
+        report = write_results(result, self._values["out"])
         for p in result.parameters:
             log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")

@@ -33,6 +33,7 @@ class Plant:
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         rig = load_rig(values["rig"])
+        self._log = node.get_logger()
         self._now = 0
         self._device = SimulatedDevice(
             rig,
@@ -45,7 +46,7 @@ class Plant:
         self._bench = Bench(node)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
         self._health = Health(node, lambda: self._bench.report(self._cycle))
-        node.get_logger().info(f"rig {rig.name} at {values['rate']:g} Hz")
+        self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
         self._cycle.start()
 
     def _step(self, stamp: int) -> None:
@@ -66,9 +67,12 @@ class Plant:
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Stop the simulation, at zero torque."""
+        """Stop the simulation, at zero torque; warn when a bag of it would not tell the truth."""
         self._cycle.stop()
         self._device.close()
+        if self._bench.commands.late:
+            late = f"{self._bench.commands.late} commands came after the instant of their stamp"
+            self._log.warning(f"{late} and acted later than a bag says")
 
 
 def main() -> int:

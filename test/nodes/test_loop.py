@@ -23,7 +23,7 @@ def bag(start, tmp_path_factory):
     path = tmp_path_factory.mktemp("loop") / "bag"
     plant = start("plant", rig=RIG, seed=3)
     record = start("record", out=path)
-    excite = start("excite", duration=DURATION, subscribers=2, seed=7, lead=0.05)
+    excite = start("excite", duration=DURATION, subscribers=2, seed=7)
     assert excite.wait() == 0, excite.output
     assert record.stop() == 0, record.output
     assert plant.stop() == 0, plant.output

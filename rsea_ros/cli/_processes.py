@@ -1,0 +1,108 @@
+"""Nodes as processes of their own on a private ROS domain, each with its log."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+
+from rsea_ros.errors import RseaError
+
+ROOT = Path(__file__).resolve().parents[2]
+POLL = 0.1
+PATIENCE = 10.0
+"""Seconds that a node gets to close after SIGINT."""
+
+
+class Processes:
+    """Start nodes, wait for them, and leave none behind."""
+
+    def __init__(self, logs: Path, domain: int) -> None:
+        logs.mkdir(parents=True, exist_ok=True)
+        self._logs = logs
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+        self._environment = {
+            **os.environ,
+            "ROS_DOMAIN_ID": str(domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": str(logs / "ros"),
+            "RCUTILS_COLORIZED_OUTPUT": "0",
+            "PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])),
+        }
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop(*self._running)
+
+    def log(self, node: str) -> Path:
+        """Return where a node's output goes."""
+        return self._logs / f"{node}.log"
+
+    def start(self, node: str, parameters: Mapping[str, object]) -> None:
+        """Start a node; Ctrl-C on the terminal reaches only this process, which stops the node itself."""
+        options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]
+        with self.log(node).open("wb") as log:
+            self._running[node] = subprocess.Popen(
+                [sys.executable, "-m", f"rsea_ros.nodes.{node}", "--ros-args", *options],
+                env=self._environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )  # fmt: skip
+
+    def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
+        """Wait until a node has ended, telling the share that it last logged as a percentage.
+
+        Raises RseaError when it fails, when another one ends before it, and after `timeout` seconds.
+        """
+        deadline = time.monotonic() + timeout
+        while self._running[node].poll() is None:
+            for other in [name for name, process in self._running.items() if process.poll() is not None]:
+                if other != node:
+                    raise self._failure(other, "ended too early")
+            if time.monotonic() > deadline:
+                raise self._failure(node, f"did not end within {timeout:g} s")
+            progress(self._share(node))
+            time.sleep(POLL)
+        if self._running[node].returncode != 0:
+            raise self._failure(node, "failed")
+        del self._running[node]
+        progress(1.0)
+
+    def stop(self, *nodes: str) -> None:
+        """Ask nodes to end (SIGINT) and wait for it; kill what does not."""
+        processes = [self._running.pop(node) for node in nodes]
+        for process in processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in processes:
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def _share(self, node: str) -> float:
+        found = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
+        return int(found[-1]) / 100.0 if found else 0.0
+
+    def _failure(self, node: str, what: str) -> RseaError:
+        """Return an error with the last words of a node."""
+        lines = self.log(node).read_text(errors="replace").splitlines()
+        last = re.sub(r"^\[\w+\] \[[\d.]+\] \[[^]]*\]: ", "", lines[-1]) if lines else "no output"
+        return RseaError(f"{node} {what}: {last} (log: {self.log(node)})")
+
+
+def _text(value: object) -> str:
+    """Return a parameter as ROS reads it on a command line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, (str, Path)) else str(value)

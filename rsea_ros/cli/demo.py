@@ -1,0 +1,124 @@
+"""`rsea demo`: the main job on a simulated bench, through real topics between real processes."""
+
+from __future__ import annotations
+
+import argparse
+import random
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from msg_adapters.bags import read_contents
+from rsea_ros.cli._processes import Processes
+from rsea_ros.cli._progress import progress
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig, save_rig
+
+HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
+RIG = "paper_high_impedance"
+SHORT, FULL = 20.0, 160.0
+SPREAD = 0.1
+PACE = 10.0
+START_UP = 60.0
+"""Seconds that a node may take beside its work: a cold start compiles the simulation."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("--full", action="store_true", help="the paper's 160 s of excitation instead of 20 s")
+    parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of true values, excitation and noise (default 1)"
+    )
+    parser.add_argument("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Play the loop, then print identified beside true values and the path of the report."""
+    out = args.out or Path("out") / time.strftime("demo-%Y%m%d-%H%M%S")
+    if (out / "bag").exists():
+        raise ParameterError(f"--out {out}: holds a bag already, expected a new directory")
+    domain = random.randint(1, 101) if args.domain is None else args.domain
+    duration = FULL if args.full else SHORT
+    out.mkdir(parents=True, exist_ok=True)
+    bench = bench_of(load_rig(RIG), args.seed)
+    save_rig(bench, out / "bench.yaml")
+    print(f"{RIG}, its true values up to {100.0 * SPREAD:g} % off, which only the plant knows")
+    with Processes(out / "log", domain) as nodes:
+        measure(nodes, out, duration, args.seed)
+        evaluate(nodes, out, duration)
+    print(table(load_rig(RIG), bench, load_rig(out / "model.yaml")))
+    print(losses(out))
+    print(f"report: {out / 'report.html'}")
+    return 0
+
+
+def bench_of(rig: Rig, seed: int) -> Rig:
+    """Return a rig whose free values are off by up to SPREAD, at random."""
+    rng = np.random.default_rng(seed)
+    return rig.with_values({n: rig[n] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0)) for n in rig.free()})
+
+
+@contextmanager
+def stage(title: str) -> Iterator[Callable[[float], None]]:
+    """Say what begins; what it yields is told the share done, 0 to 1."""
+    print(title, flush=True)
+    with progress(title.partition(":")[0]) as tell:
+        yield lambda share: tell("", share)
+
+
+def measure(nodes: Processes, out: Path, duration: float, seed: int) -> None:
+    """Play the paper's excitation to the plant and record it."""
+    with stage(f"plant, excite, record: chirp and noise for {duration:g} s") as tell:
+        nodes.start("plant", {"rig": out / "bench.yaml", "seed": seed})
+        nodes.start("record", {"out": out / "bag"})
+        nodes.start("excite", {"duration": duration, "seed": seed, "subscribers": 2})
+        nodes.wait("excite", duration + START_UP, tell)
+        nodes.stop("record", "plant")
+
+
+def evaluate(nodes: Processes, out: Path, duration: float) -> None:
+    """Play the bag to the identification."""
+    with stage(f"replay, identify: the bag {PACE:g} times as fast") as tell:
+        nodes.start("identify", {"rig": RIG, "out": out, "reliable": True})
+        nodes.start("replay", {"bag": out / "bag", "rate": PACE})
+        nodes.wait("replay", duration / PACE + START_UP, tell)
+    with stage("identify: parameters with confidence, report") as tell:
+        nodes.wait("identify", START_UP, tell)
+
+
+def table(start: Rig, true: Rig, found: Rig) -> str:
+    """Return identified values with their 95 % interval beside the true ones, as text."""
+    rows = [("", "true", "identified", "95 % interval", "start", "unit")]
+    for name in start.free():
+        quantity = found.quantities[name]
+        low, high = quantity.ci95 or (float("nan"), float("nan"))
+        interval = f"{low:.5g} to {high:.5g}"
+        rows.append(
+            (
+                name,
+                f"{true[name]:.5g}",
+                f"{quantity.value:.5g}",
+                interval,
+                f"{start[name]:.5g}",
+                found.unit(name),
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)
+
+
+def losses(out: Path) -> str:
+    """Say how many of the bag's messages have reached the identification."""
+    wanted = ("torque_command", "joint_states", "ft")
+    topics = read_contents(out / "bag").topics
+    sent = sum(len(topics[f"/rsea/{name}"].raw) for name in wanted)
+    log = (out / "log" / "identify.log").read_text()
+    got = [re.findall(rf"(\d+) {name}\b", log) for name in wanted]
+    arrived = sum(int(counts[-1]) for counts in got if counts)
+    return f"{sent} messages recorded and replayed, {sent - arrived} lost"

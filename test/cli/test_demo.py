@@ -1,0 +1,94 @@
+"""The main job, as a newcomer runs it: real processes, real topics, true values found."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.cli._processes import Processes
+from rsea_ros.errors import RseaError
+from rsea_ros.model.rig_file import load_rig
+
+ROOT = Path(__file__).resolve().parents[2]
+DOMAIN = int(os.environ["ROS_DOMAIN_ID"])
+
+
+def _demo(out):
+    command = [sys.executable, "-m", "rsea_ros", "demo", "--out", str(out), "--domain", str(DOMAIN)]
+    return subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+def _left_running(out):
+    """Node processes that name the demo's directory on their command line."""
+    lines = [
+        p.read_bytes() for p in Path("/proc").glob("[0-9]*/cmdline") if p.parent.name != str(os.getpid())
+    ]
+    return [line for line in lines if b"rsea_ros.nodes" in line and str(out).encode() in line]
+
+
+def test_the_demo_finds_the_true_values_and_names_its_report(tmp_path):
+    out = tmp_path / "demo"
+    process = _demo(out)
+    printed, errors = process.communicate(timeout=180)
+    assert process.returncode == 0, errors
+    assert printed.splitlines()[-1] == f"report: {out / 'report.html'}"
+    assert (out / "report.html").exists() and (out / "identification.json").exists()
+    assert re.search(r"^1\d{4} messages recorded and replayed, 0 lost$", printed, re.MULTILINE)
+    true, found, start = (
+        load_rig(r) for r in (out / "bench.yaml", out / "model.yaml", "paper_high_impedance")
+    )
+    for name in start.free():
+        low, high = found.quantities[name].ci95
+        assert name in printed
+        assert true[name] != start[name]
+        assert abs(found[name] - true[name]) < high - low
+        assert high - low < 0.1 * true[name]
+    assert not _left_running(out)
+
+
+def test_ctrl_c_leaves_no_process_and_no_half_written_bag(tmp_path):
+    out = tmp_path / "demo"
+    process = _demo(out)
+    deadline = time.monotonic() + 60.0
+    while not (out / "log" / "excite.log").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.splitlines() == ["rsea demo: interrupted"]
+    assert not _left_running(out)
+    assert not list(out.glob("*.partial*"))
+
+
+def test_a_node_that_fails_is_told_in_one_line_with_its_log(tmp_path):
+    with Processes(tmp_path, DOMAIN) as nodes:
+        nodes.start("replay", {"bag": "no/such/bag"})
+        with pytest.raises(
+            RseaError, match=r"replay failed: no/such/bag: no such bag \(log: .*replay\.log\)"
+        ):
+            nodes.wait("replay", 60.0)
+
+
+def test_a_node_that_fails_beside_the_awaited_one_is_told_too(tmp_path):
+    with Processes(tmp_path, DOMAIN) as nodes:
+        nodes.start("plant", {"rate": 1})
+        nodes.start("record", {"out": tmp_path / "bag"})
+        with pytest.raises(RseaError, match=r"plant ended too early: parameter rate = 1.0, expected"):
+            nodes.wait("record", 60.0)
+    assert not _left_running(tmp_path)
+
+
+def test_a_used_directory_is_refused(tmp_path):
+    (tmp_path / "demo" / "bag").mkdir(parents=True)
+    process = _demo(tmp_path / "demo")
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert re.fullmatch(r"rsea demo: --out .*/demo: holds a bag already, expected a new directory\n", errors)
