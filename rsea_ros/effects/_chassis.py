@@ -14,7 +14,7 @@ import math
 from numba import njit
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def swing(y, v, t, k, b, j):  # type: ignore[no-untyped-def]
     """Return y and v after a time t of free motion: exact, under- and overdamped."""
     decay = 0.5 * b / j
@@ -29,7 +29,7 @@ def swing(y, v, t, k, b, j):  # type: ignore[no-untyped-def]
     return y * (c + decay * n) + v * n, v * (c - decay * n) - y * (k / j) * n
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
     """Return angle, speed and integral of the angle of the gear at a time t of the step."""
     mean = (d_1 - d_0) / h
@@ -39,7 +39,7 @@ def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
     return angle, speed, t * (d_0 + t * (w_0 / 2.0 + t * (square / 3.0 + t * cube / 4.0)))
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
     """Return when in the step the flank stops pushing: 0 when it does not touch, h when it goes on."""
     if side == 0.0:
@@ -52,7 +52,7 @@ def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-unty
     return h * c_0 / (c_0 - c_1) if c_0 > 0.0 else 0.0
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def impact(side, half, y, v, start, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
     """Return when a chassis free since `start` meets the flank that it is behind at h, by regula falsi."""
     low, high = start, h
@@ -76,7 +76,7 @@ def impact(side, half, y, v, start, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ig
     return t
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def over_step(y_0, v_0, side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
     """Return y, v, the flank (-1, 0, 1) at the end of a step, and the integral of y over it."""
     leaves = release(side, half, d_0, w_0, d_1, w_1, h, k, b, j)

@@ -34,7 +34,7 @@ def catalogue() -> Mapping[str, Effect]:
 
 
 def effect_named(name: str) -> Effect:
-    """Return one effect, loading only its file. Raises ParameterError when the catalogue has none of that name."""
+    """Return one effect, loading only its file. Raises ParameterError when the catalogue lacks the name."""
     if name in _own_names():
         return importlib.import_module(f"rsea_ros.effects.{name}").EFFECT  # type: ignore[no-any-return]
     effects = catalogue()
@@ -58,7 +58,7 @@ def _extra_files(paths: str) -> Iterable[Path]:
 def _load(path: str) -> ModuleType:
     spec = importlib.util.spec_from_file_location(Path(path).stem, path)
     if spec is None or spec.loader is None or not Path(path).exists():
-        raise ParameterError(f"{EXTRA_PATH}: {path}: no such effect file, expected a Python file with an EFFECT")
+        raise ParameterError(f"{EXTRA_PATH}: {path}: no such file, expected a Python file with an EFFECT")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if not isinstance(getattr(module, "EFFECT", None), Effect):

@@ -16,7 +16,7 @@ from numba import cfunc, types
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 
-_POINTER = types.CPointer(types.float64)
+_POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
 
 Parity = Literal["odd", "even", "neither"]
@@ -103,12 +103,13 @@ class Effect:
     def vector(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
         """Return parameters in order. Raises ParameterError for a missing, unknown or non-finite one."""
         names = [p.name for p in self.parameters]
+        expected = f"expected {', '.join(names)}"
         for name in parameters:
             if name not in names:
-                raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, expected {', '.join(names)}")
+                raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, {expected}")
         for name in names:
             if name not in parameters:
-                raise ParameterError(f"effect {self.name}: parameter {name!r} is missing, expected {', '.join(names)}")
+                raise ParameterError(f"effect {self.name}: parameter {name!r} is missing, {expected}")
             if math.isnan(parameters[name]):
                 raise ParameterError(f"effect {self.name}: {name} = nan, expected a number")
         return tuple(float(parameters[name]) for name in names)

@@ -34,7 +34,7 @@ EFFECT = Effect(
     claims=Claims(
         "velocity",
         "odd",
-        amplitude_exponent=0.0,
+        amplitude_exponent=None,
         passive=True,
         confusable_with=("coulomb_friction", "spring_hysteresis"),
     ),

@@ -22,7 +22,7 @@ Law = Callable[[float, np.ndarray, float, Mapping[str, float]], tuple[list[float
 
 def sign(w: float) -> float:
     """Return the sign, with the creep that the project's friction has at rest."""
-    return w / math.hypot(w, CREEP)
+    return math.tanh(w / CREEP)
 
 
 def motion(x, u, friction=0.0, spring=0.0):

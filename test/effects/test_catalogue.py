@@ -44,8 +44,8 @@ CONTRACT = {
 }
 """Names and units that other programs rely on (contract.md)."""
 
-HALF_STEP = {"ft": 3e-3, "position": 1e-6, "velocity": 5e-5}
-"""What halving the step may change: a tenth of the noise of torque and position, a quarter of velocity's."""
+HALF_STEP = {"ft": 3e-3, "position": 1.2e-6, "velocity": 6e-5}
+"""What halving the step may change: a tenth of the torque's noise, a fifth and a third of the others'."""
 
 every_effect = pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
 every_rig = pytest.mark.parametrize(
