@@ -30,7 +30,8 @@ class Drive:
     N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
     each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
-    initial: position (rad) and velocity (rad/s) at the start.
+    initial: position (rad) and velocity (rad/s) at the start. origin, whole: when the drive begins in its
+    record and how long that is, s; they differ from 0 and `duration` when the drive is a piece of one.
     """
 
     step: float
@@ -41,6 +42,13 @@ class Drive:
     reference: FloatArray
     angle: FloatArray
     initial: tuple[float, float]
+    origin: float = 0.0
+    whole: float = math.nan
+
+    @property
+    def drift_time(self) -> float:
+        """Time over which drifts come to their full size, s."""
+        return self.duration if math.isnan(self.whole) else self.whole
 
     @property
     def duration(self) -> float:
@@ -116,13 +124,16 @@ def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:
 
 def _beside_mean(knots: FloatArray, y: FloatArray, means: FloatArray, at: FloatArray) -> FloatArray:
     """Return the integral of the held signal less that of its means, at instants; all in steps."""
+    off_grid = at != np.rint(at)
+    if not off_grid.any() or (knots == np.rint(knots)).all():
+        return np.zeros(len(at))
     last = float(len(means))
-    held = np.concatenate([[0.0], np.cumsum(y * np.diff(knots, append=max(last, knots[-1])))])
+    end = max(last, float(knots[-1]))
+    held = np.concatenate([[0.0], np.cumsum(y * np.diff(knots, append=end))])
     stepped = np.concatenate([[0.0], np.cumsum(means)])
-    at = np.clip(at, 0.0, last)
-    knots = np.append(knots, max(last, knots[-1]))
-    beside: FloatArray = np.interp(at, knots, held) - np.interp(at, np.arange(last + 1.0), stepped)
-    return np.where(at == np.rint(at), 0.0, beside)
+    inside = np.clip(at, 0.0, last)
+    beside = np.interp(inside, np.append(knots, end), held) - np.interp(inside, np.arange(last + 1), stepped)
+    return np.where(off_grid, beside, 0.0)
 
 
 @njit(cache=True, nogil=True)

@@ -79,6 +79,19 @@ def test_what_the_rotors_spin_costs(rig, inertia, eq_7, with_spin):
     assert pure_torque_bandwidth(k_s, inner_inertia(rig)) == pytest.approx(with_spin, abs=5e-3)
 
 
+def test_exact_bands_of_the_physics_page():
+    bands = [flat_band(end_to_end(rig, "element")) for rig in (PLATFORM, PROTOTYPE)]
+    assert bands == pytest.approx([103.1, 15.4], abs=0.05)
+    bands = [flat_band(end_to_end(rig), 3.0, 10.0) for rig in (PLATFORM, PROTOTYPE)]
+    assert bands == pytest.approx([45.5, 15.4], abs=0.05)
+    printed = [
+        eq_6_distal_per_proximal(1530.456, 0.004, 3.0),
+        eq_6_distal_per_proximal(260.0, 6.169e-4, 0.02),
+    ]
+    assert [flat_band(function) for function in printed] == pytest.approx([112.1, 55.9], abs=0.05)
+    assert flat_band(printed[0], 3.0, 10.0) == pytest.approx(14.0, abs=0.05)
+
+
 def test_a_star_train_turns_the_rotor_backward():
     star = replace(PLATFORM, train="star")
     assert inner_inertia(star) == pytest.approx(0.004 - 0.953 * 501 / 502**2)
