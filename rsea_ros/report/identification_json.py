@@ -1,0 +1,57 @@
+"""identification.json: what an identification says, for programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rsea_ros.identification.result import Identification, ParameterEstimate
+
+SCHEMA = 1
+
+
+def identification_json(identification: Identification) -> dict[str, Any]:
+    """Return the contents of identification.json. No number in it is infinite or NaN: such are null."""
+    i = identification
+    return {
+        "schema": SCHEMA,
+        "rig": i.rig.name,
+        "data": {"bags": list(i.sources), "duration_s": finite(i.duration), "rate_hz": finite(i.rate)},
+        "parameters": {p.name: parameter(p) for p in i.parameters},
+        "correlation": {
+            "names": [p.name for p in i.parameters],
+            "matrix": [[finite(v) for v in row] for row in i.correlation],
+        },
+        "residual_rms": numbers(i.residual_rms),
+        "noise_rms": numbers(i.noise_rms),
+        "fit_percent": numbers(i.fit_percent),
+        "responses": [
+            {"input": r.input, "output": r.output, "method": r.method, "lines": len(r.frequency),
+             "from_hz": finite(r.frequency[0]), "to_hz": finite(r.frequency[-1])}
+            for r in i.responses if len(r.frequency)
+        ],
+        "statements": list(i.statements),
+        "notes": list(i.notes),
+    }  # fmt: skip
+
+
+def parameter(p: ParameterEstimate) -> dict[str, Any]:
+    """Return a parameter as it stands in the result files."""
+    return {
+        "value": finite(p.value),
+        "unit": p.unit,
+        "ci95": [finite(v) for v in p.ci95],
+        "start": finite(p.start),
+        "told_by_data": finite(p.told_by_data),
+    }
+
+
+def numbers(values: Mapping[str, float]) -> dict[str, float | None]:
+    """Return finite numbers by name, None for others."""
+    return {name: finite(value) for name, value in values.items()}
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON can hold it: None when it is infinite or NaN."""
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,153 @@
+"""The report of an identification, as one HTML file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.identification.result import Identification, Overlay
+from rsea_ros.report import words
+from rsea_ros.report.bode import bode_figure
+from rsea_ros.report.figure import Figure
+from rsea_ros.report.overlay import Simulated, overlay_figure
+from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragraph, section
+from rsea_ros.report.palette import AFTER, MEASURED
+from rsea_ros.report.parameters import clock_sentence, parameter_table
+from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
+from rsea_ros.signals import UNITS
+
+AT_NOISE = 1.1
+"""A residual up to this many times the noise is the noise."""
+_ORDER = ("ft", "position", "velocity")
+
+
+def identification_report(identification: Identification) -> str:
+    """Return the report as HTML that opens without a network."""
+    blocks: list[Block] = [
+        key_numbers(_keys(identification)),
+        _next(identification),
+        _parameters(identification),
+    ]
+    responses = identification.responses
+    models = identification.models or (None,) * len(responses)
+    blocks += [bode_figure(r, m) for r, m in zip(responses, models, strict=True)]
+    for overlay in _shown(identification):
+        blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
+    blocks.append(_untold(identification))
+    return page(verdict(identification), _kicker(identification), blocks, _footer(identification))
+
+
+def verdict(identification: Identification) -> str:
+    """Return the result in a sentence: whether the residual is the noise, else how far above it stands."""
+    above = _above_noise(identification)
+    if not above:
+        return "The fitted model explains the record down to the sensor noise"
+    worst = max(above, key=lambda n: above[n])
+    return (
+        f"The fitted model leaves {words.number(above[worst], 2)} times the noise on the "
+        f"{words.channel(worst)}: something is missing in it"
+    )
+
+
+def main_channel(identification: Identification) -> str:
+    """Return the channel that the reader looks at first."""
+    present = [n for n in _ORDER if n in identification.residual_rms]
+    return present[0] if present else next(iter(identification.residual_rms), "")
+
+
+def _ratios(identification: Identification) -> dict[str, float]:
+    noise = identification.noise_rms
+    return {n: v / noise[n] for n, v in identification.residual_rms.items() if noise.get(n, 0.0) > 0.0}
+
+
+def _above_noise(identification: Identification) -> dict[str, float]:
+    """Return how many times the noise the residual is, of the channels where it is more than that."""
+    ratios = _ratios(identification)
+    judged = {n: r for n, r in ratios.items() if n in _ORDER} or ratios
+    return {n: r for n, r in judged.items() if r > AT_NOISE}
+
+
+def _next(identification: Identification) -> str:
+    """Return what to do about a residual above the noise."""
+    if not _above_noise(identification):
+        return ""
+    bags = " ".join(identification.sources)
+    command = code(f"rsea diagnose {bags}")
+    return f'<p class="next">What it is, and how much it would gain: {command}</p>'
+
+
+def _keys(identification: Identification) -> list[tuple[str, str]]:
+    n = main_channel(identification)
+    if not n:
+        return []
+    unit, name = UNITS[n], words.channel(n)
+    return [
+        (f"{identification.fit_percent[n]:.2f} %", f"of the {name} explained"),
+        (words.quantity(identification.residual_rms[n], unit, 3), "residual, RMS"),
+        (words.quantity(identification.noise_rms[n], unit, 3), "sensor noise, RMS"),
+        (f"{identification.duration:.0f} s", f"of data at {identification.rate:.0f} Hz"),
+    ]
+
+
+def _kicker(identification: Identification) -> str:
+    about = identification.rig.about or identification.rig.name.replace("_", " ")
+    return f"Identification of {identification.rig.name} · {about}"
+
+
+def _parameters(identification: Identification) -> str:
+    clock = clock_sentence(identification.parameters)
+    return section(
+        _parameter_finding(identification),
+        parameter_table(identification.parameters),
+        f'<p class="caption under">{clock}</p>' if clock else "",
+        caption="Grey: what the rig stated, with its 95 % range. Blue: the result and its 95 % interval.",
+    )
+
+
+def _parameter_finding(identification: Identification) -> str:
+    physical = [p for p in identification.parameters if not p.name.startswith("clock.")]
+    told = [p for p in physical if p.told_by_data >= 0.9]
+    if len(told) == len(physical):
+        return f"The data tell all {len(physical)} parameters"
+    return f"The data tell {len(told)} of {len(physical)} parameters; the others rest on the rig's priors"
+
+
+def _shown(identification: Identification) -> list[Overlay]:
+    """Return the overlays worth a figure, the first one first; the motor torque only echoes the command."""
+    by_name = {o.channel: o for o in identification.overlays}
+    return [by_name[n] for n in _ORDER if n in by_name] or list(identification.overlays)
+
+
+def _over_time(identification: Identification, overlay: Overlay) -> Figure:
+    unit, n = UNITS[overlay.channel], overlay.channel
+    title = (
+        f"{words.channel(n)} over time: {identification.fit_percent[n]:.2f} % explained, "
+        f"{words.quantity(identification.residual_rms[n], unit)} RMS left"
+    )
+    simulated = Simulated("simulated", AFTER, overlay.simulated)
+    return overlay_figure(words.sentence(title), n, overlay.t, overlay.measured, [simulated])
+
+
+def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
+    n = overlay.channel
+    rate = float((len(overlay.t) - 1) / (overlay.t[-1] - overlay.t[0]))
+    frequency, values = density(overlay.measured - overlay.simulated, rate)
+    noise = identification.noise_rms[n] / float(np.sqrt(rate / 2.0))
+    title = finding(frequency, values, noise, words.channel(n))
+    _, measured = density(overlay.measured, rate)
+    curves = [Curve("measured", MEASURED, measured), Curve("residual", AFTER, values)]
+    return residual_figure(title, n, frequency, curves, noise)
+
+
+def _untold(identification: Identification) -> str:
+    title = "What these data cannot tell"
+    body = (
+        bullets(identification.statements)
+        if identification.statements
+        else paragraph("Nothing that was asked for.")
+    )
+    return section(title, body)
+
+
+def _footer(identification: Identification) -> list[str]:
+    sources = f"Data: {', '.join(identification.sources)}"
+    return [sources, *identification.notes, "rsea identify. All values in SI."]

@@ -1,0 +1,104 @@
+"""The frame of every report: one HTML file that needs no network, made of blocks from top to bottom."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+
+from rsea_ros.errors import RseaError
+from rsea_ros.report.figure import Figure
+
+_HERE = Path(__file__).parent
+
+Block = Figure | str
+"""A figure, or finished HTML."""
+
+
+def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
+    """Return the document. title: the verdict in a sentence. kicker: what it is about, above the title."""
+    body = "\n".join(_block(block, i) for i, block in enumerate(blocks))
+    foot = "".join(f"<p>{escape(line)}</p>" for line in footer)
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{escape(title)}</title>
+<link rel="icon" href="data:,">
+<style>{_asset("page.css")}</style>
+</head>
+<body>
+<main>
+<header><p class="kicker">{escape(kicker)}</p><h1>{escape(title)}</h1></header>
+{body}
+<footer>{foot}</footer>
+</main>
+<script>{_plotly()}</script>
+<script>{_asset("page.js")}</script>
+</body>
+</html>
+"""
+
+
+def section(title: str, *blocks: str, caption: str = "") -> str:
+    """Return a section of finished HTML under a heading; titles and captions are plain text."""
+    under = f'<p class="caption">{escape(caption)}</p>' if caption else ""
+    return f"<section><h2>{escape(title)}</h2>{under}{''.join(blocks)}</section>"
+
+
+def key_numbers(items: Sequence[tuple[str, str]]) -> str:
+    """Return large numbers in a row: (number, what it is)."""
+    cells = "".join(f"<div><b>{escape(value)}</b><span>{escape(what)}</span></div>" for value, what in items)
+    return f'<div class="keys">{cells}</div>'
+
+
+def bullets(items: Sequence[str]) -> str:
+    """Return a list of plain sentences."""
+    return f"<ul>{''.join(f'<li>{escape(item)}</li>' for item in items)}</ul>"
+
+
+def equation(text: str) -> str:
+    """Return an equation in plain text, set apart."""
+    return f'<div class="equation">{escape(text)}</div>'
+
+
+def code(text: str) -> str:
+    """Return text to be typed as it stands."""
+    return f"<code>{escape(text)}</code>"
+
+
+def paragraph(text: str) -> str:
+    """Return plain text as a paragraph."""
+    return f"<p>{escape(text)}</p>"
+
+
+def _block(block: Block, index: int) -> str:
+    if isinstance(block, str):
+        return block
+    name = f"figure-{index}"
+    values = json.dumps(asdict(block), allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace(
+        "</", "<\\/"
+    )
+    drawing = (
+        f'<div class="figure" id="{name}" style="height:{block.height}px" role="img" '
+        f'aria-label="{escape(block.title)}"></div>'
+        f'<script type="application/json" id="{name}-data">{values}</script>'
+    )
+    return section(block.title, drawing, caption=block.caption)
+
+
+def _asset(name: str) -> str:
+    return (_HERE / name).read_text(encoding="utf-8")
+
+
+def _plotly() -> str:
+    """Return plotly.js as the plotly package carries it, without importing the package."""
+    spec = find_spec("plotly")
+    if spec is None or not spec.submodule_search_locations:
+        raise RseaError("report: package plotly is missing, expected it installed for its plotly.min.js")
+    script = Path(spec.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
+    return script.read_text(encoding="utf-8").replace("</script", "<\\/script")

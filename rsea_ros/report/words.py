@@ -1,0 +1,98 @@
+"""Names, units and numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+CHANNELS = {
+    "command": "commanded motor torque",
+    "motor_torque": "motor torque",
+    "position": "position",
+    "velocity": "velocity",
+    "ft": "F/T torque",
+    "reference": "reference position",
+}
+
+PARAMETERS = {
+    "rotor.reflected_inertia": "Rotor inertia, reflected",
+    "rotor.reflected_damping": "Rotor damping, reflected",
+    "gear.ratio": "Gear ratio",
+    "gear.stiffness": "Gear stiffness",
+    "chassis.inertia": "Spring chassis inertia",
+    "spring.stiffness": "Spring stiffness",
+    "spring.damping": "Spring damping",
+}
+
+SYMBOLS = {
+    "rotor.reflected_inertia": "J_m",
+    "rotor.reflected_damping": "b_m",
+    "gear.ratio": "N",
+    "chassis.inertia": "J_sc",
+    "spring.stiffness": "K_s",
+    "spring.damping": "b_s",
+}
+"""As in the paper; what stands after _ is an index."""
+
+_PIECES = {"housing_end": "Housing", "spring_end": "Spring end", "clock": "Clock"}
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def parameter(name: str) -> str:
+    """Return the plain name of a parameter, `housing_end.inertia` as `Housing: inertia`."""
+    group, _, key = name.partition(".")
+    plain = key.replace("_", " ")
+    return PARAMETERS.get(name, f"{_PIECES.get(group, group.replace('_', ' ').capitalize())}: {plain}")
+
+
+def channel(name: str) -> str:
+    """Return the plain name of a channel."""
+    return CHANNELS.get(name, name)
+
+
+def unit(name: str) -> str:
+    """Return a unit with its signs, `kg m^2` as `kg·m²`; the unit of a bare number is empty."""
+    return "" if name == "1" else name.replace("^2", "²").replace(" ", "·")
+
+
+def sentence(text: str) -> str:
+    """Return text that begins with a capital."""
+    return text[:1].upper() + text[1:]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a value with so many significant digits, without an exponent where it can be helped."""
+    if not math.isfinite(value):
+        return "∞" if value > 0.0 else "−∞" if value < 0.0 else "–"
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(value)))
+    if -4 <= exponent < 6:
+        text = f"{value:.{max(0, digits - 1 - exponent)}f}"
+        return text.replace("-", "−")
+    return f"{value:.{digits - 1}e}".replace("-", "−")
+
+
+def quantity(value: float, of: str, digits: int = 3) -> str:
+    """Return a value with its unit, small ones with a prefix: 6.1e-6 rad as `6.10 µrad`."""
+    simple = of and " " not in of.split("/")[0] and of != "1"
+    if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
+        return f"{number(value, digits)} {unit(of)}".strip()
+    factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
+    return f"{number(value / factor, digits)} {prefix}{unit(of)}"
+
+
+def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
+    """Return value and half-width of its interval as text, to two significant digits of the half-width."""
+    half = 0.5 * (high - low)
+    if not (math.isfinite(half) and half > 0.0):
+        return number(value, 4), ""
+    decimals = 1 - math.floor(math.log10(half))
+    if not -3 < decimals < 9:
+        return number(value, 6), number(half, 2)
+    shown = max(0, decimals)
+    return f"{round(value, decimals):.{shown}f}".replace("-", "−"), f"{round(half, decimals):.{shown}f}"
+
+
+def listed(items: list[str]) -> str:
+    """Return items as `a, b and c`."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -1,0 +1,74 @@
+"""The report as a browser sees it, and as a file."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.identification.result import Identification
+from rsea_ros.report.identification_page import identification_report, verdict
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--enable-logging=stderr", "--virtual-time-budget=20000", "--window-size=1200,4000",
+)  # fmt: skip
+FIGURES = 8
+"""Two Bode figures, then time and spectrum of three channels."""
+ZOOM = """<script>setTimeout(() => {
+  const all = [...document.querySelectorAll(".figure")];
+  const node = all.find((n) => n.layout.xaxis.title.text.startsWith("time"));
+  Plotly.relayout(node, {"xaxis.range[0]": 40, "xaxis.range[1]": 41}).then(() => setTimeout(() => {
+    document.body.dataset.zoomed = node.data[0].x.length;
+  }, 500));
+}, 3000);</script></body>"""
+
+
+def opened(html: str, folder: Path) -> tuple[str, str]:
+    """Return the document after its scripts have run, and what the browser logged."""
+    if CHROMIUM is None:
+        pytest.skip("chromium not installed: apt-get install chromium")
+    path = folder / "report.html"
+    path.write_text(html, encoding="utf-8")
+    done = subprocess.run(
+        [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    return done.stdout, done.stderr
+
+
+def test_browser_draws_every_figure_without_an_error(identification: Identification, tmp_path: Path) -> None:
+    document, log = opened(identification_report(identification).replace("</body>", ZOOM), tmp_path)
+    assert "CONSOLE" not in log
+    assert document.count('data-drawn="yes"') == FIGURES
+    assert len(re.findall(r'class="main-svg"', document)) >= FIGURES
+    zoomed = re.search(r'data-zoomed="(\d+)"', document)
+    assert zoomed is not None
+    assert 280 <= int(zoomed.group(1)) <= 284, "a second of record is drawn with all its samples"
+
+
+def test_report_needs_no_network_and_stays_small(identification: Identification) -> None:
+    html = identification_report(identification)
+    own = html[: html.index("plotly.js v")]
+    assert not re.search(r'(src|href)="(?!data:)', own)
+    assert "url(" not in own
+    assert len(html.encode()) < 8_000_000
+
+
+def test_text_of_others_is_escaped(identification: Identification) -> None:
+    html = identification_report(identification)
+    assert "bench &amp; &lt;friends&gt;" in html
+    assert "<friends>" not in html
+
+
+def test_verdict_names_the_channel_that_is_above_its_noise(identification: Identification) -> None:
+    assert verdict(identification) == "The fitted model explains the record down to the sensor noise"
+    poor = replace(identification, noise_rms={**identification.noise_rms, "ft": 0.01})
+    assert verdict(poor).startswith("The fitted model leaves 3.0 times the noise on the F/T torque")
+    assert "rsea diagnose runs/bench" in identification_report(poor)
