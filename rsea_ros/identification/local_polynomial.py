@@ -56,7 +56,7 @@ def _longest(measured: BoolArray) -> slice:
 
 def _bands(lines: int) -> list[tuple[int, int]]:
     """Return centre and half-width of the bands, in lines; a quarter band apart."""
-    bands, centre = [], _NARROWEST // 2
+    bands, centre = [], _NARROWEST
     while centre < lines - 1:
         half = max(_NARROWEST, round(_RELATIVE_BAND * centre))
         bands.append((centre, half))
