@@ -66,7 +66,7 @@ class Case:
     record: Record
     truth_causes: tuple[str, ...]
     truth_parameters: Mapping[str, Mapping[str, float]]
-    fresh_record: Record
+    fresh_record: Record | None
     group: str = "single"
     mimics: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
