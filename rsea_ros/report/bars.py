@@ -65,7 +65,15 @@ def bar_figure(
         caption=caption,
         data=[trace],
         layout=layout(
-            xaxis=axis(axis_title, rangemode="tozero", zeroline=True, zerolinecolor=faint(MEASURED, 0.6)),
+            xaxis=axis(
+                axis_title,
+                showgrid=False,
+                showticklabels=False,
+                ticks="",
+                rangemode="tozero",
+                zeroline=True,
+                zerolinecolor=faint(MEASURED, 0.6),
+            ),
             yaxis=axis("", showgrid=False, ticks=""),
             annotations=names,
             hovermode=False,

@@ -39,8 +39,10 @@ def residual_figure(
     data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
     data += [line(f, d, c.name, c.colour, 1.8, hovertemplate="%{y:.3g}") for c, f, d in drawn]
     reach = _range([*(d for _, _, d in drawn), floor])
-    items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for c, _, d in drawn]
+    top = max(range(len(drawn)), key=lambda i: float(drawn[i][2].max()))
+    items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for i, (c, _, d) in enumerate(drawn) if i != top]
     names = _apart([*items, ("noise floor", QUIET, noise)], gap=_LABEL * (reach[1] - reach[0]))
+    names.append(_at_peak(*drawn[top]))
     return Figure(
         title=title,
         caption=caption,
@@ -92,7 +94,14 @@ def _range(values: Sequence[FloatArray]) -> list[float]:
     exponents = np.log10(np.maximum(np.concatenate(values), 1e-300))
     low, high = float(exponents.min()), float(exponents.max())
     lacking = max(0.0, 2.0 - (high - low)) / 2.0
-    return [low - lacking - 0.1, high + lacking + 0.1]
+    return [low - lacking - 0.1, high + lacking + 0.3]
+
+
+def _at_peak(curve: Curve, frequency: FloatArray, values: FloatArray) -> Json:
+    """Return the label of the highest curve, above its peak; lower ones have theirs at their right end."""
+    k = int(np.argmax(values))
+    x, y = float(np.log10(frequency[k])), float(np.log10(values[k]))
+    return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor="center", yanchor="bottom", yshift=4)
 
 
 def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:
