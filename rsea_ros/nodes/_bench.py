@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 
 from msg_adapters.ros import JointState, WrenchStamped, effort_of, joint_state_message, wrench_message
@@ -15,6 +16,21 @@ from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 
+class Polled(CallbackGroup):
+    """Subscriptions that no executor serves: the cycle takes what has arrived when it needs it."""
+
+    def can_execute(self, entity: object) -> bool:
+        """Return False: never by an executor."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Return False: never by an executor."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """Do nothing."""
+
+
 class Bench:
     """Publishes readings, and puts what comes on `torque_command` into a queue."""
 
@@ -24,7 +40,17 @@ class Bench:
         self._told = (0, 0, 0)
         self._states = node.create_publisher(JointState, "joint_states", MEASUREMENT)
         self._ft = node.create_publisher(WrenchStamped, "ft", MEASUREMENT)
-        self._subscription = node.create_subscription(JointState, "torque_command", self._command, COMMAND)
+        self._subscription = node.create_subscription(
+            JointState, "torque_command", lambda message: None, COMMAND, callback_group=Polled()
+        )
+
+    def poll(self) -> None:
+        """Put all commands that have arrived into the queue."""
+        handle = self._subscription.handle
+        with handle:
+            while (waiting := handle.take_message(JointState, False)) is not None:
+                message, info = waiting
+                self._command(message, info["received_timestamp"])
 
     def publish(self, state: State) -> None:
         """Publish one reading under its stamps."""
@@ -51,10 +77,10 @@ class Bench:
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._subscription)
 
-    def _command(self, message: JointState) -> None:
+    def _command(self, message: JointState, received: int) -> None:
         try:
             stamp, torque = effort_of(message)
         except ParameterError as error:
             self._node.get_logger().error(f"torque_command: {error}", throttle_duration_sec=1.0)
             return
-        self.commands.add(stamp, torque, time.time_ns())
+        self.commands.add(stamp, torque, received)

@@ -6,7 +6,7 @@ import math
 import threading
 
 MILLISECOND = 1_000_000
-HORIZON = 200 * MILLISECOND
+HORIZON = 300 * MILLISECOND
 WATCHDOG = 50 * MILLISECOND
 
 
@@ -14,7 +14,7 @@ class CommandQueue:
     """What came on `torque_command`, until it is due. The executor's thread adds, the cycle's takes.
 
     A command takes effect at its stamp. One whose stamp is over takes effect at once (`late` counts them);
-    one without a stamp, or further than 0.2 s from now, when it arrives (`unstamped`). Not-a-number is
+    one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`). Not-a-number is
     dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
     """
 

@@ -122,6 +122,7 @@ class Driver(ManagedEntity):
         assert bench is not None
         try:
             with self._lock:
+                bench.poll()
                 bench.commands.take(stamp + round(0.5 * SECOND / self._values["rate"]))
                 state = self._device.read()
                 self._device.write(bench.commands.torque if self._active else 0.0)

@@ -34,7 +34,7 @@ TABLE = (
         "limit", 68.0, "largest torque; the whole excitation is checked before it starts", "N m", 0.0, 1e4
     ),
     Parameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
-    Parameter("lead", 0.05, "how long before it takes effect a command is published", "s", 0.0, 0.1),
+    Parameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
     Parameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
 )
 SETTLE = SECOND // 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from typing import Any
 
 from rclpy.node import Node
@@ -10,7 +11,7 @@ from rclpy.node import Node
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._bench import Bench
-from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._run import run_node
@@ -22,6 +23,8 @@ TABLE = (
     Parameter("noise", True, "whether the sensors have their noise and quantum"),
     Parameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
 )
+STALL, PAUSE = SECOND // 50, 0.005
+"""After a stall of so many ns, the pause (s) in which commands arrive that were held up with this process."""
 
 
 class Plant:
@@ -34,7 +37,7 @@ class Plant:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         rig = load_rig(values["rig"])
         self._log = node.get_logger()
-        self._now = 0
+        self._now = self._behind = 0
         self._device = SimulatedDevice(
             rig,
             values["rate"],
@@ -53,11 +56,19 @@ class Plant:
         if not self._now:
             self._now = stamp
             self._device.open()
+        self._let_commands_in(time.time_ns() - stamp)
+        self._bench.poll()
         for instant, torque in self._bench.commands.take(stamp):
             self._now = instant
             self._device.write(torque)
         self._now = stamp
         self._bench.publish(self._device.read())
+
+    def _let_commands_in(self, behind: int) -> None:
+        """Pause once after a stall (ns): what was sent meanwhile is still on its way."""
+        if behind > STALL >= self._behind:
+            time.sleep(PAUSE)
+        self._behind = behind
 
     def finished(self) -> bool:
         """Run until stopped."""
