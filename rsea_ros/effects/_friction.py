@@ -1,11 +1,12 @@
 """What the friction effects share: the mean over a step of a friction torque, without limits on the step.
 
-The law is F * w / sqrt(w^2 + w_c^2), which is F * sign(w) but for a creep below w_c = 2 mrad/s (presliding).
-Over a step in which w goes straight from w_0 to w_1 its mean is, exactly,
+The law is F tanh(w / w_c), which is F sign(w) but for a creep below w_c = CREEP (presliding). Over a step in
+which w goes straight from w_0 to w_1 its mean is, exactly,
 
-    F * (w_0 + w_1) / (sqrt(w_0^2 + w_c^2) + sqrt(w_1^2 + w_c^2))
+    F w_c (ln cosh(w_1 / w_c) - ln cosh(w_0 / w_c)) / (w_1 - w_0)
 
-and w_1 depends on it: w_1 = w_free - mobility * mean. Newton's method, kept in a bracket, solves that, so sticking is no stiff problem.
+and w_1 depends on it: w_1 = w_free - mobility * mean. Newton's method, kept in a bracket, solves that, so
+sticking is no stiff problem.
 """
 
 import math
@@ -14,28 +15,64 @@ from numba import njit
 
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
+_SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
+_TURNS = 3.0  # in creep velocities: below it the motion may turn, and its speed does not go straight there
+_PARTS = 4  # of such a step
 
 
-@njit(inline="always")  # type: ignore[untyped-decorator]
+@njit(inline="always")
 def mean_friction(s, size, last):  # type: ignore[no-untyped-def]
     """Return the mean friction torque (N m, against motion when positive) of this step.
 
     size: friction torque at speed, N m. last: what this function returned at its last evaluation, which is
     already in the predicted end of the step.
     """
-    creep = s[CREEP]
-    w_0 = s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]
-    w_free = s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN] + s[MOBILITY] * last
-    gain, s_0 = s[MOBILITY] * size, math.sqrt(w_0 * w_0 + creep * creep)
-    low, high = w_free - abs(gain), w_free + abs(gain)
-    w_1 = w_free - gain * w_0 / s_0
-    for _ in range(30):
-        s_1 = math.sqrt(w_1 * w_1 + creep * creep)
-        mean = (w_0 + w_1) / (s_0 + s_1)
-        excess = w_1 + gain * mean - w_free
-        step = excess / (1.0 + gain * (1.0 - mean * w_1 / s_1) / (s_0 + s_1))
-        if abs(step) < 1e-9 * creep:
+    start = (s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]) / s[CREEP]
+    predicted = (s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN]) / s[CREEP]
+    mobility = s[MOBILITY] / s[CREEP]
+    free, gain = predicted + mobility * last, mobility * size
+    if start > _SLIDES and free - gain > _SLIDES:
+        return size
+    if start < -_SLIDES and free + gain < -_SLIDES:
+        return -size
+    if start * predicted > 0.0 and min(abs(start), abs(predicted)) > _TURNS:
+        return size * _implicit_mean(start, free, gain)
+    at, total = start, 0.0
+    for _ in range(_PARTS):
+        rise = (free - start) / _PARTS
+        mean = _implicit_mean(at, at + rise, gain / _PARTS)
+        at += rise - gain / _PARTS * mean
+        total += mean
+    return size * total / _PARTS
+
+
+@njit(inline="always")
+def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
+    """Return the mean of tanh over the path from start to end = free - gain * mean."""
+    low, high = free - abs(gain), free + abs(gain)
+    end, from_start = min(max(start, low), high), _ln_cosh(start)
+    for _ in range(40):
+        mean, slope = _mean_sign(start, end, from_start)
+        change = (end + gain * mean - free) / (1.0 + gain * slope)
+        if abs(change) < 1e-5:
             break
-        low, high = (low, w_1) if excess > 0.0 else (w_1, high)
-        w_1 = w_1 - step if low < w_1 - step < high else 0.5 * (low + high)
-    return size * (w_0 + w_1) / (s_0 + math.sqrt(w_1 * w_1 + creep * creep))
+        low, high = (low, end) if change > 0.0 else (end, high)
+        end = end - change if low < end - change < high else 0.5 * (low + high)
+    return mean - slope * change
+
+
+@njit(inline="always")
+def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
+    """Return the mean of tanh over a straight path from a to b, and its derivative by b. from_a: of _ln_cosh."""
+    path = b - a
+    if abs(path) < 1e-3:
+        mean = math.tanh(0.5 * (a + b))
+        return mean, 0.5 * (1.0 - mean * mean)
+    mean = (_ln_cosh(b) - from_a) / path
+    return mean, (math.tanh(b) - mean) / path
+
+
+@njit(inline="always")
+def _ln_cosh(x):  # type: ignore[no-untyped-def]
+    """Return ln cosh x + ln 2, which no large x overflows."""
+    return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))

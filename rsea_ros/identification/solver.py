@@ -53,18 +53,24 @@ def in_pool(pool: Executor) -> Map:
 def jacobian(problem: Problem, theta: FloatArray, residual: FloatArray, outputs: list[dict[str, FloatArray]],
              run: Map = serial) -> FloatArray:  # fmt: skip
     """Return d residual / d theta, shape (m, n)."""
+    return jacobian_columns(problem, theta, residual, range(len(theta)), outputs, run)
+
+
+def jacobian_columns(problem: Problem, theta: FloatArray, residual: FloatArray, which: Sequence[int],
+                     outputs: list[dict[str, FloatArray]] | None = None, run: Map = serial) -> FloatArray:  # fmt: skip
+    """Return some columns of d residual / d theta, shape (m, len(which)). outputs: at theta, for the clocks."""
 
     def column(i: int) -> FloatArray:
         unknown = problem.unknowns[i]
-        if unknown.name.startswith(CLOCK + "."):
+        if unknown.name.startswith(CLOCK + ".") and outputs is not None:
             return _clock_column(problem, outputs, unknown.name.split(".")[1])
         moved = theta.copy()
         step = _DIFFERENCE * unknown.scale
-        beyond = not unknown.logarithmic and theta[i] + step > unknown.high
+        beyond = theta[i] + step > unknown.inner(unknown.high)
         moved[i] += -step if beyond else step
         return (problem.residual(moved) - residual) / (moved[i] - theta[i])
 
-    return np.column_stack(list(run(column, range(len(theta))))) if len(theta) else np.empty((len(residual), 0))
+    return np.column_stack(list(run(column, which))) if len(which) else np.empty((len(residual), 0))
 
 
 def _clock_column(problem: Problem, outputs: list[dict[str, FloatArray]], channel: str) -> FloatArray:
@@ -89,7 +95,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
 
     outputs = problem.outputs(theta)
     residual = problem.residual_of(outputs)
-    cost, damping = cost_of(residual, theta), 1e-4
+    cost, damping = cost_of(residual, theta), 1e-7
     matrix = jacobian(problem, theta, residual, outputs, run)
     for _ in range(iterations):
         normal = matrix.T @ matrix + np.diag(weight**2)
@@ -104,16 +110,24 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
             if trial_cost < cost:
                 accepted = True
                 break
-            damping *= 8.0
+            damping *= 30.0
         if not accepted:
             break
         fall = (cost - trial_cost) / cost
         theta, residual, outputs, cost = trial, trial_residual, trial_outputs, trial_cost
-        damping = max(damping / 10.0, 1e-9)
+        damping = max(damping / 10.0, 1e-10)
         matrix = jacobian(problem, theta, residual, outputs, run)
         if fall < gain:
             break
     return Solution(problem, theta, residual, matrix, cost)
+
+
+def linearised(problem: Problem, theta: FloatArray) -> Solution:
+    """Return where a problem stands at theta, without a step."""
+    outputs = problem.outputs(theta)
+    residual = problem.residual_of(outputs)
+    prior = sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(theta, problem.unknowns, strict=True))
+    return Solution(problem, theta, residual, jacobian(problem, theta, residual, outputs), float(residual @ residual + prior))
 
 
 def _bounded(problem: Problem, theta: FloatArray) -> FloatArray:

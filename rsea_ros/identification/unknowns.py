@@ -64,7 +64,7 @@ def unknowns_of_effect(effect: Effect, start: Mapping[str, float], known: Collec
 
 
 def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
-    scale = 1.0 if p.logarithmic else max(abs(p.typical), 1e-12)
+    scale = 1.0 if p.logarithmic else abs(p.typical) or 1.0
     start = min(max(start, p.low), p.high)
     return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, math.inf, scale)
 
@@ -72,7 +72,7 @@ def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
 def clocks(channels: Iterable[str]) -> tuple[Unknown, ...]:
     """Return the clock errors of sensors, s: measured later than stamped when positive."""
     return tuple(
-        Unknown(f"{CLOCK}.{c}", 0.0, "s", -1e-2, 1e-2, False, CLOCK_DOUBT, CLOCK_DOUBT)
+        Unknown(f"{CLOCK}.{c}", 0.0, "s", -3.0 * CLOCK_DOUBT, 3.0 * CLOCK_DOUBT, False, CLOCK_DOUBT, CLOCK_DOUBT)
         for c in channels
         if c != "motor_torque"
     )

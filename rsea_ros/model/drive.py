@@ -22,6 +22,10 @@ ON_GRID = 1e-3
 """Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
 
 
+AT_REST = 0.5
+"""Of the whole record's standard deviation: a first sample below it is of a bench that started from rest."""
+
+
 @dataclass(frozen=True)
 class Drive:
     """The command on the step grid and the instants at which channels are wanted.
@@ -109,9 +113,13 @@ def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
 
 
 def _initial(record: Record) -> tuple[float, float]:
-    position = float(record["position"].y[0]) if "position" in record else 0.0
-    velocity = float(record["velocity"].y[0]) if "velocity" in record else 0.0
-    return position, velocity
+    """Return position and velocity at the start: rest, unless the first samples say otherwise.
+
+    The first sample comes a period after the first command; what the command did until then is not in it.
+    """
+    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
+    moved = abs(position[0]) > AT_REST * np.std(position) or abs(velocity[0]) > AT_REST * np.std(velocity)
+    return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
 
 
 def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:

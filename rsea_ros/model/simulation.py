@@ -27,6 +27,10 @@ CREEP_VELOCITY = 2e-3
 """rad/s. Below it a gear with friction creeps (presliding); standing still would make the step stiff."""
 
 
+_SENSORS = 1
+"""Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
+
+
 @dataclass(frozen=True)
 class Machine:
     """A rig made ready for the step: propagators, calls of its effects, and state for the step to change."""
@@ -50,11 +54,11 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
     """Return each channel of a drive at its sampling instants. ride: use the measured rotor angle."""
-    machine = build(rig, drive.step, drive.duration, drive.initial, in_loop=len(drive.reference) > 0)
+    machine = build(rig, drive.step, drive.drift_time, drive.initial, in_loop=len(drive.reference) > 0)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
     out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT]]
-    run(machine, drive.command, out[1:], reference=drive.reference, ridden=ridden)
+    run(machine, drive.command, out[1:], start=drive.origin, reference=drive.reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], drive.at[n], drive.command) for n in channels}
@@ -62,11 +66,8 @@ def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, F
 
 
 def _kick(machine: Machine, channel: str) -> float:
-    """Return what an impulse of the command does to a channel at once, its unit per N m s.
-
-    None where an effect changes the command on its way.
-    """
-    if channel == "motor_torque" or machine.calls.first[st.Port.GEAR] > 0:
+    """Return what an impulse of the command does to a channel at once, its unit per N m s."""
+    if channel == "motor_torque":
         return 0.0
     at_once = machine.linear.outputs[("position", "velocity", "ft").index(channel)] @ machine.linear.g[:, 0]
     return float(at_once / machine.table[st.STEP])
@@ -146,7 +147,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     stamps, blank = command.t + period, np.zeros(len(command))
     names = [n for n in OUTPUTS if not (n == "ft" and rig.rigid_spring)]
     asked = Record({"command": command, **{n: Channel(stamps, blank) for n in names}}, source=rig.name)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, _SENSORS])
     true = simulate(rig, asked)
     measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
     return asked.with_channels(**measured)
@@ -182,7 +183,7 @@ class Plant:
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count
         self._out = np.empty((self._count, len(OUTPUTS)))
-        self._rng = np.random.default_rng(seed)
+        self._rng = np.random.default_rng([seed, _SENSORS])
         self.reset()
 
     def reset(self) -> None:

@@ -1,0 +1,81 @@
+"""Where a model and the data part: by frequency, amplitude, speed, time and rotor angle, each against the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from rsea_ros.diagnosis.result import Misfit, Spectrum
+from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+_WORTH_TELLING = 1.25
+_BINS = 8
+_MOST = 3
+
+
+def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) -> tuple[Misfit, ...]:
+    """Return where the residual of a channel is more than its noise, worst first in each respect."""
+    residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+    found = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
+    keep, t = case.mask[channel], case.t[channel]
+    for what, unit, values in _respects(case, channel, rig):
+        found += _worst(_binned(what, unit, values[keep], residual[keep], case.noise[channel], channel))
+    found += _worst(_binned("time", "s", (t - case.start)[keep], residual[keep], case.noise[channel], channel, equal=True))
+    return tuple(found)
+
+
+def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
+    """Return the residual's level in third-octave bands over that of white noise of the floor's size."""
+    rate = 1.0 / float(np.median(np.diff(t)))
+    frequency, level = signal.welch(residual, rate, nperseg=min(2048, len(residual)))
+    white = noise**2 / (0.5 * rate)
+    edges = np.geomspace(max(frequency[1], 0.5), 0.5 * rate, 3 * 8 + 1)
+    bands = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        inside = (frequency >= low) & (frequency < high)
+        if inside.any():
+            bands.append(Misfit("frequency_band", float(low), float(high), "Hz", float(np.sqrt(level[inside].mean() / white)), channel))
+    return bands
+
+
+def spectrum(case: Case, before: dict[str, FloatArray], after: dict[str, FloatArray], channel: str) -> Spectrum:
+    """Return the residual's amplitude density before and after, with the noise floor's."""
+    rate = 1.0 / float(np.median(np.diff(case.t[channel])))
+    densities = []
+    for outputs in (before, after):
+        residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+        frequency, level = signal.welch(residual, rate, nperseg=min(2048, len(residual)))
+        densities.append(np.sqrt(level))
+    return Spectrum(channel, frequency[1:], densities[0][1:], densities[1][1:], case.noise[channel] / np.sqrt(0.5 * rate))
+
+
+def _respects(case: Case, channel: str, rig: Rig) -> list[tuple[str, str, FloatArray]]:
+    """Return what the residual is laid out against: name, unit, value at each of the channel's samples."""
+    t, respects = case.t[channel], []
+    load = "ft" if "ft" in case.measured else None
+    if load:
+        respects.append(("amplitude", "N m", np.abs(np.interp(t, case.t[load], case.measured[load]))))
+    if "velocity" in case.measured:
+        respects.append(("velocity", "rad/s", np.interp(t, case.t["velocity"], case.measured["velocity"])))
+    if isinstance(case.drive, Drive) and "position" in case.measured:
+        turns = np.interp(t, case.t["position"], case.measured["position"]) * rig["gear.ratio"]
+        respects.append(("angle", "rad", np.mod(turns, 2.0 * np.pi)))
+    return respects
+
+
+def _binned(what: str, unit: str, values: FloatArray, residual: FloatArray, noise: float, channel: str, equal: bool = False) -> list[Misfit]:
+    if len(values) < 4 * _BINS:
+        return []
+    edges = np.linspace(values.min(), values.max(), _BINS + 1) if equal else np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
+    power = np.bincount(which, residual**2, _BINS) / np.maximum(np.bincount(which, minlength=_BINS), 1)
+    return [Misfit(what, float(edges[i]), float(edges[i + 1]), unit, float(np.sqrt(power[i])) / noise, channel) for i in range(_BINS)]
+
+
+def _worst(items: list[Misfit]) -> list[Misfit]:
+    """Return the worst that are worth telling, of those that stand out of the rest where all are high."""
+    told = sorted((m for m in items if m.times_noise > _WORTH_TELLING), key=lambda m: -m.times_noise)
+    return told[:_MOST]

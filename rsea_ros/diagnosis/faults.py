@@ -1,0 +1,137 @@
+"""Faults of the data, found before any physics, reported and masked. One function a kind.
+
+Each takes a channel and returns which samples are bad, shape (n,). A sample that is masked is never fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.diagnosis.clock import repair_clock
+from rsea_ros.diagnosis.result import Fault
+from rsea_ros.identification.problem import BoolArray
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, FloatArray, Record
+
+_SPIKE = 12.0
+"""A sample further than this many robust sigmas from its neighbours is an outlier."""
+_CLIPPED = 8
+"""As many samples at exactly the largest value, some of them in a row, are clipping."""
+_SMALLEST_SHARE = 1e-3
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A record with its faults: finite, rising stamps; and which samples must not count, by channel."""
+
+    record: Record
+    masked: Mapping[str, BoolArray]
+    faults: tuple[Fault, ...]
+
+
+def check(record: Record, rig: Rig) -> Checked:
+    """Find and mask the faults of a record."""
+    faults = [Fault("missing_topic", name, 1.0) for name in missing(record, rig)]
+    repaired, clock_faults = repair_clock(record)
+    faults += clock_faults
+    masked: dict[str, BoolArray] = {}
+    for name, channel in repaired.channels.items():
+        bad = np.zeros(len(channel), bool)
+        for kind, find in FINDERS.items():
+            found = find(channel, name) & ~bad
+            if found.mean() > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
+                faults.append(Fault(kind, name, float(found.mean())))
+                bad |= found
+        masked[name] = bad
+    return Checked(_filled(repaired, masked), masked, tuple(faults))
+
+
+def missing(record: Record, rig: Rig) -> tuple[str, ...]:
+    """Return the channels that the rig's sensors would give and the record has not."""
+    return tuple(n for n in rig.sensors if n not in record)
+
+
+def not_finite(channel: Channel, name: str) -> BoolArray:
+    """Return which values are NaN or infinite."""
+    return ~np.isfinite(channel.y)
+
+
+def outliers(channel: Channel, name: str) -> BoolArray:
+    """Return which samples stand alone: far from the median of their neighbours, which agree."""
+    if name == "command":
+        return np.zeros(len(channel), bool)
+    y = channel.y
+    padded = np.concatenate([y[2:0:-1], y, y[-2:-4:-1]])
+    window = np.lib.stride_tricks.sliding_window_view(padded, 5)
+    away = y - np.nanmedian(window, axis=1)
+    spread = 1.4826 * np.nanmedian(np.abs(away[np.isfinite(away)]))
+    neighbours = np.nanmax(window[:, [0, 1, 3, 4]], axis=1) - np.nanmin(window[:, [0, 1, 3, 4]], axis=1)
+    limit = np.maximum(_SPIKE * max(spread, 1e-300), 3.0 * neighbours)
+    found: BoolArray = np.isfinite(away) & (np.abs(away) > limit)
+    return found
+
+
+def clipping(channel: Channel, name: str) -> BoolArray:
+    """Return which samples lie at exactly the largest or smallest value, if that is where many do in a row."""
+    bad = np.zeros(len(channel), bool)
+    if name in ("command", "reference", "motor_torque"):
+        return bad
+    for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):
+        at = channel.y == extreme
+        in_a_row = at[1:] & at[:-1]
+        if at.sum() >= _CLIPPED and in_a_row.sum() >= _CLIPPED // 2 and not _common(channel.y, float(extreme)):
+            bad |= at
+    return bad
+
+
+def _common(y: FloatArray, extreme: float) -> bool:
+    """Tell whether values just inside the extreme are as common as the extreme itself (a coarse quantum)."""
+    values, counts = np.unique(y[np.isfinite(y)], return_counts=True)
+    k = int(np.argmin(np.abs(values - extreme)))
+    inside = counts[max(k - 3, 0) : k].max(initial=0) if k > len(values) // 2 else counts[k + 1 : k + 4].max(initial=0)
+    return bool(counts[k] < 4 * max(int(inside), 1))
+
+
+def frozen(channel: Channel, name: str) -> BoolArray:
+    """Return which samples repeat the one before where the signal was moving.
+
+    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then. Only a
+    surplus of repeats over that, at a place where the samples around move, is a frozen sensor.
+    """
+    if name in ("command", "reference"):
+        return np.zeros(len(channel), bool)
+    step = np.diff(channel.y, prepend=np.nan)
+    repeat = step == 0.0
+    moving = np.abs(step[np.isfinite(step) & ~repeat])
+    if not len(moving) or not repeat.any():
+        return np.zeros(len(channel), bool)
+    quantum = float(moving.min())
+    by_chance = int((moving < 1.5 * quantum).sum()) / 2
+    surplus = repeat.sum() - 1.5 * by_chance
+    if surplus < max(5.0, _SMALLEST_SHARE * len(channel)):
+        return np.zeros(len(channel), bool)
+    jump = np.abs(np.concatenate([channel.y[3:] - channel.y[:-3], np.full(3, np.nan)]))
+    around = np.nan_to_num(np.maximum(jump, np.roll(jump, 3)))
+    still: BoolArray = repeat & ((around > 6.0 * quantum) | (by_chance < 0.05 * repeat.sum()))
+    return still
+
+
+FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
+    "nan": not_finite,
+    "frozen_samples": frozen,
+    "clipping": clipping,
+    "outliers": outliers,
+}
+
+
+def _filled(record: Record, masked: Mapping[str, BoolArray]) -> Record:
+    """Return the record with bad values bridged by straight lines, so that a simulation can run."""
+    channels = {}
+    for name, channel in record.channels.items():
+        good = ~masked[name] & np.isfinite(channel.y)
+        bridged = np.interp(channel.t, channel.t[good], channel.y[good]) if good.any() else np.zeros(len(channel))
+        channels[name] = Channel(channel.t, np.where(good, channel.y, bridged))
+    return record.with_channels(**channels)

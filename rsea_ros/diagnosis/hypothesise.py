@@ -1,0 +1,84 @@
+"""Hypotheses: every effect of the catalogue tried on the residual, cheaply and generously.
+
+From each start one simulation and one derivative for each of the effect's parameters; the nominal values
+move along with the derivatives they already have. Two such steps show what a full fit would gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.effects.effect import Effect
+from rsea_ros.errors import RseaError
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.solver import Solution, jacobian_columns
+from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
+from rsea_ros.signals import FloatArray
+
+_STEPS = 2
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect beside the present model, with where a full fit would begin and the cost already reached."""
+
+    effect: Effect
+    problem: Problem
+    theta: FloatArray
+    cost: float
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+
+def extended_problem(present: Problem, effect: Effect, start: dict[str, float]) -> Problem:
+    """Return the present problem with one more effect whose parameters may move."""
+    unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
+    return replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
+
+
+def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
+    """Return the best of an effect's starts after two cheap steps; None when the rig cannot have the effect."""
+    best: Hypothesis | None = None
+    for start in starts:
+        try:
+            tried = _from_start(present, effect, start)
+        except RseaError:
+            continue
+        if best is None or tried.cost < best.cost:
+            best = tried
+    return best
+
+
+def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:
+    problem = extended_problem(present.problem, effect, start)
+    n = len(present.theta)
+    prior = np.array([1.0 / u.doubt for u in problem.unknowns])
+    centre = start_vector(problem.unknowns)
+    theta = np.concatenate([present.theta, centre[n:]])
+    residual = problem.residual(theta)
+    own = jacobian_columns(problem, theta, residual, range(n, len(theta)))
+    matrix = np.column_stack([present.jacobian, own])
+    normal = matrix.T @ matrix + np.diag(prior**2)
+    normal += np.diag(1e-6 * np.diag(normal) + 1e-12)
+    cost = float(residual @ residual) + float(np.sum((prior * (theta - centre)) ** 2))
+    best = Hypothesis(effect, problem, theta, cost)
+    for _ in range(_STEPS):
+        slope = matrix.T @ residual + prior**2 * (theta - centre)
+        step = np.linalg.solve(normal, slope)
+        for share in (1.0, 0.3):
+            trial = np.array([u.inner(u.outer(float(v))) for u, v in zip(problem.unknowns, theta - share * step, strict=True)])
+            trial_residual = problem.residual(trial)
+            cost = float(trial_residual @ trial_residual) + float(np.sum((prior * (trial - centre)) ** 2))
+            if cost < best.cost:
+                break
+        else:
+            break
+        theta, residual = trial, trial_residual
+        best = Hypothesis(effect, problem, theta, cost)
+    return best

@@ -1,0 +1,121 @@
+"""What a diagnosis says, as values. Reports and files are made from these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from rsea_ros.identification.result import Overlay, ParameterEstimate
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of the data, found before any physics. share: of the channel's samples, 0 … 1."""
+
+    kind: str
+    channel: str
+    share: float
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Where a model and the data part: from … to (unit) of `what`, and how many times the noise."""
+
+    what: str
+    low: float
+    high: float
+    unit: str
+    times_noise: float
+    channel: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of a cause with its 95 % interval."""
+
+    value: float
+    unit: str
+    ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`."""
+
+    name: str
+    parameters: Mapping[str, Estimate]
+    gain_train: float
+    gain_holdout: float
+    gain_holdout_ci95: tuple[float, float]
+    evidence: str
+    equation: str = ""
+    channel: str = "ft"
+    confusable_with: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """A cause that was tried and not accepted, with its gain on data that it was not fitted to."""
+
+    name: str
+    gain_holdout: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """The run that would tell what these data cannot."""
+
+    why: str
+    excitation: Mapping[str, float | str]
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Amplitude spectral densities of a channel's residual: Hz; unit/sqrt(Hz)."""
+
+    channel: str
+    frequency: FloatArray
+    before: FloatArray
+    after: FloatArray
+    noise: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict and all that it rests on. Dicts are by channel, in the channel's unit.
+
+    residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
+    """
+
+    verdict: Verdict
+    sentence: str
+    rig_name: str
+    sources: tuple[str, ...]
+    duration: float
+    rate: float
+    faults: tuple[Fault, ...]
+    baseline_rig: Rig
+    baseline: tuple[ParameterEstimate, ...]
+    extended_rig: Rig
+    noise_rms: Mapping[str, float]
+    residual_rms: Mapping[str, float]
+    fit_percent: Mapping[str, float]
+    extended_residual_rms: Mapping[str, float]
+    extended_fit_percent: Mapping[str, float]
+    at_noise_floor: bool
+    misfit: tuple[Misfit, ...]
+    causes: tuple[Cause, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+    remaining: tuple[Misfit, ...] = ()
+    next_experiment: Experiment | None = None
+    before: tuple[Overlay, ...] = ()
+    after: tuple[Overlay, ...] = ()
+    spectra: tuple[Spectrum, ...] = ()
+    statements: tuple[str, ...] = field(default=())

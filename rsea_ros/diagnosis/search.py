@@ -1,0 +1,238 @@
+"""The search: from the re-fitted nominal model, cause after cause, to the noise floor or to where nothing helps.
+
+A model is fitted on FIT blocks and chosen on CHOOSE blocks; JUDGE blocks are not looked at here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.hints import starts_of
+from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.judge import compare
+from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
+from rsea_ros.diagnosis.windows import windows_of
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.noise import residual_floor
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution, linearised, solve
+from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.signals import FloatArray
+
+AT_FLOOR = 1.04
+"""RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
+_FITS_ON_PIECES = 9
+_FULL_FITS = 3
+_CLOSE = 1.1
+_FIT_ITERATIONS = 12
+MOST_CAUSES = 4
+
+Tell = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A fitted model, its simulated channels on every case, and how it does on the blocks that choose."""
+
+    solution: Solution
+    outputs: list[dict[str, FloatArray]]
+    choose: Score
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Names of the effects that act, in the order in which they came in."""
+        return tuple(e.name for e in self.solution.problem.rig.effects)
+
+    @property
+    def parameters(self) -> int:
+        """How many unknowns the model has."""
+        return len(self.solution.theta)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One effect tried in one round beside a model: what became of it."""
+
+    name: str
+    round: int
+    model: Model | None
+    why: str
+    confusable: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Search:
+    """All cases (every sample), the accepted models from the nominal one on, and what else was tried."""
+
+    cases: tuple[Case, ...]
+    models: tuple[Model, ...]
+    trials: tuple[Trial, ...] = ()
+    confusable: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def last(self) -> Model:
+        """The model with all accepted causes."""
+        return self.models[-1]
+
+
+def fitted(cases: Sequence[Case], problem: Problem, theta: FloatArray | None, places: tuple[int, ...] = FIT,
+           iterations: int = _FIT_ITERATIONS) -> Model:  # fmt: skip
+    """Fit a problem's unknowns on some blocks of the cases."""
+    masked = replace(problem, cases=tuple(part(c, places) for c in cases))
+    return as_model(cases, solve(masked, theta, iterations=iterations))
+
+
+def as_model(cases: Sequence[Case], solution: Solution) -> Model:
+    """Return a solution with its outputs and its score on the blocks that choose."""
+    outputs = solution.problem.outputs(solution.theta)
+    return Model(solution, outputs, score(solution.problem, tuple(part(c, CHOOSE) for c in cases), outputs))
+
+
+def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell) -> Search:
+    """Find the causes, most telling first. tell: progress (what is being tried, share done)."""
+    models = [fitted(cases, nominal, None, iterations=25)]
+    cases = requieted(cases, models[0])
+    models = [fitted(cases, nominal, models[0].solution.theta)]
+    trials: list[Trial] = []
+    confusable: dict[str, tuple[str, ...]] = {}
+    for number in range(MOST_CAUSES):
+        if at_floor(models[-1], cases):
+            break
+        accepted, tried, rivals = one_round(cases, models[-1], number, pool, tell)
+        trials += tried
+        if accepted is None:
+            break
+        confusable[accepted.causes[-1]] = rivals
+        quieter = requieted(cases, accepted)
+        accepted = fitted(quieter, accepted.solution.problem, accepted.solution.theta)
+        models = [*(rescored(quieter, m) for m in models), accepted]
+        cases = quieter
+    return without_needless(Search(cases, tuple(models), tuple(trials), confusable))
+
+
+def at_floor(model: Model, cases: Sequence[Case]) -> bool:
+    """Tell whether the residual of every channel is at its noise, on all blocks but those that judge."""
+    standing = score(model.solution.problem, tuple(part(c, (*FIT, *CHOOSE)) for c in cases), model.outputs)
+    return all(standing.ratio(n) < AT_FLOOR for n in standing.sums)
+
+
+def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Executor, tell: Tell) -> tuple[Model | None, list[Trial], tuple[str, ...]]:  # fmt: skip
+    """Try every effect that is not in the model; return the one to accept, all trials, and its equal rivals.
+
+    All are screened and the promising fitted on short pieces; the best of those are fitted on all that fits.
+    """
+    effects = [e for n, e in catalogue().items() if n not in present.causes]
+    rig, outputs = present.solution.problem.rig, present.outputs[0]
+    pieces = tuple(w for c in cases for w in windows_of(c))
+    there = linearised(replace(present.solution.problem, cases=pieces), present.solution.theta)
+
+    def try_one(i: int) -> Hypothesis | None:
+        tell(f"round {number + 1}: {effects[i].name}", _share(number, 0.4 * i / len(effects)))
+        return screen(there, effects[i], starts_of(effects[i], cases[0], rig, outputs))
+
+    def fit_pieces(h: Hypothesis) -> Hypothesis:
+        tell(f"round {number + 1}: fitting {h.name}", _share(number, 0.5))
+        solution = solve(h.problem, h.theta, iterations=_FIT_ITERATIONS)
+        return replace(h, theta=solution.theta, cost=solution.cost)
+
+    def fit_all(h: Hypothesis) -> Model:
+        tell(f"round {number + 1}: fitting {h.name} on everything", _share(number, 0.8))
+        return fitted(cases, replace(h.problem, cases=cases), h.theta)
+
+    screened = sorted((h for h in pool.map(try_one, range(len(effects))) if h is not None), key=lambda h: h.cost)
+    worth = [h for h in screened if h.cost < there.cost][:_FITS_ON_PIECES]
+    close = sorted(pool.map(fit_pieces, worth), key=lambda h: h.cost)
+    finalists = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost][: 2 * _FULL_FITS]
+    models = list(pool.map(fit_all, finalists))
+    better = [m for m in models if compare(m.choose, present.choose, m.parameters - present.parameters).better]
+    chosen, rivals = choose(better)
+    accepted, final = {id(m) for m in better}, {h.name for h in finalists}
+    trials = [Trial(h.name, number, None, "far behind the best on the data that it was fitted to") for h in screened if h.name not in final]
+    trials += [_trial(m, number, id(m) in accepted, chosen) for m in models if m is not chosen]
+    return chosen, trials, rivals
+
+
+def _share(number: int, within: float) -> float:
+    """Return the share done for the progress bar: rounds are taken to halve what is left."""
+    return 1.0 - 0.5**number * (1.0 - 0.5 * within)
+
+
+def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[str, ...]]:
+    """Return the model to accept and the names that do as well with no more parameters.
+
+    Of all that are not surely and materially worse than the best, the simplest; of equals, the one that
+    needs the least of what is known beforehand.
+    """
+    if not models:
+        return None, ()
+    best = min(models, key=lambda m: float(m.choose.loss.sum()))
+    contenders = [m for m in models if m is best or not compare(best.choose, m.choose).better]
+    simplest = min(contenders, key=lambda m: (m.parameters, prior_cost(m.solution) + loss_excess(m, best)))
+    rivals = tuple(m.causes[-1] for m in contenders if m is not simplest and m.parameters <= simplest.parameters)
+    return simplest, rivals
+
+
+def prior_cost(solution: Solution) -> float:
+    """Return what the fit paid for leaving the values that were known beforehand."""
+    unknowns: Sequence[Unknown] = solution.problem.unknowns
+    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(solution.theta, unknowns, strict=True) if np.isfinite(u.doubt)))
+
+
+def loss_excess(model: Model, best: Model) -> float:
+    """Return how much more a model loses than the best on the blocks that choose, in units of its scale."""
+    return float(model.choose.loss.sum() - best.choose.loss.sum()) / max(1.0, max(best.choose.ratio(n) for n in best.choose.sums) ** 2)
+
+
+def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
+    """Return the cases with the noise lowered where a model's residual shows that it is less than thought."""
+    return tuple(_requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True))
+
+
+def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> Case:
+    noise = dict(case.noise)
+    for n in case.measured:
+        if n in out:
+            residual = np.where(case.mask[n], case.measured[n] - out[n], 0.0)
+            quantum = problem.rig.sensors[n].quantum if n in problem.rig.sensors else 0.0
+            floor = max(residual_floor(residual, float(np.median(np.diff(case.t[n])))), 0.5 * quantum)
+            noise[n] = min(noise[n], floor)
+    return replace(case, noise=noise)
+
+
+def rescored(cases: Sequence[Case], model: Model) -> Model:
+    """Return the model with its score against the cases' present noise."""
+    problem = replace(model.solution.problem, cases=tuple(part(c, FIT) for c in cases))
+    return Model(replace(model.solution, problem=problem), model.outputs, score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs))
+
+
+def without_needless(found: Search) -> Search:
+    """Take out every accepted cause without which the later ones do as well."""
+    last = found.last
+    for name in last.causes[:-1]:
+        smaller = _without(found.cases, last, name)
+        if not compare(last.choose, smaller.choose, last.parameters - smaller.parameters).better:
+            kept = [m for m in found.models if name not in m.causes] + [smaller]
+            trials = (*found.trials, Trial(name, 99, None, "no longer needed once the other causes are in"))
+            return without_needless(replace(found, models=tuple(kept), trials=trials))
+    return found
+
+
+def _without(cases: Sequence[Case], model: Model, name: str) -> Model:
+    problem = model.solution.problem
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
+    rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
+    smaller = replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep))
+    return fitted(cases, smaller, model.solution.theta[keep])
+
+
+def _trial(model: Model, number: int, was_better: bool, chosen: Model | None) -> Trial:
+    name = model.causes[-1]
+    if chosen is None or not was_better:
+        return Trial(name, number, model, "does not lower the residual of data that it was not fitted to")
+    if model.parameters > chosen.parameters and float(model.choose.loss.sum()) < 1.02 * float(chosen.choose.loss.sum()):
+        return Trial(name, number, model, f"no better than {chosen.causes[-1]}, which is simpler")
+    return Trial(name, number, model, f"{chosen.causes[-1]} explains more")

@@ -1,0 +1,72 @@
+"""Which samples fit, which choose, which judge: blocks of time that no two of these share.
+
+The pattern of four blocks is fit, fit, choose, judge; with a held-out bag it is fit, fit, choose on the bag(s)
+and all of the held-out one judges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.identification.problem import BoolArray, Case, Problem
+from rsea_ros.signals import FloatArray
+
+BLOCK = 1.0
+"""s. Longer than any transient of the bench, short enough that every part of a sweep is in every set."""
+FIT, CHOOSE, JUDGE = (0, 1), (2,), (3,)
+
+
+def blocks_of(case: Case, channel: str) -> FloatArray:
+    """Return the number of the block of each sample of a channel."""
+    return np.maximum(np.floor((case.t[channel] - case.start) / BLOCK), 0).astype(np.int64)
+
+
+def part(case: Case, places: tuple[int, ...], period: int = 4) -> Case:
+    """Return the case with only the samples of some places of the pattern."""
+    mask: dict[str, BoolArray] = {n: np.isin(blocks_of(case, n) % period, places) for n in case.t}
+    return case.within(mask)
+
+
+@dataclass(frozen=True)
+class Score:
+    """Squared weighted residuals summed by channel and block, and how many samples that were.
+
+    sums, counts: by channel, shape (blocks,), of the blocks that have samples.
+    """
+
+    sums: dict[str, FloatArray]
+    counts: dict[str, FloatArray]
+
+    @property
+    def loss(self) -> FloatArray:
+        """Sum over the channels of each block, shape (blocks,)."""
+        return np.asarray(np.sum(list(self.sums.values()), axis=0))
+
+    def ratio(self, channel: str) -> float:
+        """RMS of the residual over the noise of a channel."""
+        return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))
+
+
+def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, FloatArray]]) -> Score:
+    """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
+    sums: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
+    counts: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
+    for case, out in zip(cases, outputs, strict=True):
+        length = int(case.duration / BLOCK) + 2
+        for n in problem.channels:
+            if n not in case.t or n not in out:
+                sums[n].append(np.zeros(length))
+                counts[n].append(np.zeros(length))
+                continue
+            keep = case.mask[n]
+            weighted = ((out[n] - case.measured[n]) / case.noise[n])[keep] ** 2
+            where = blocks_of(case, n)[keep]
+            sums[n].append(np.bincount(where, weighted, length)[:length])
+            counts[n].append(np.bincount(where, minlength=length)[:length].astype(float))
+    all_sums = {n: np.concatenate(parts) for n, parts in sums.items()}
+    all_counts = {n: np.concatenate(parts) for n, parts in counts.items()}
+    used = np.sum(list(all_counts.values()), axis=0) > 0
+    present = [n for n in problem.channels if all_counts[n].sum() > 0]
+    return Score({n: all_sums[n][used] for n in present}, {n: all_counts[n][used] for n in present})
