@@ -50,10 +50,10 @@ PAIRS = (
 """Two effects that different parts of the data show."""
 
 READINGS = (
-    ("asymmetric_friction", {"offset": 1.5, "viscous_difference": 2.0}, {"even_offset": 0.75, "even_b": 1.0}),
-    ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 1.0}),
+    ("asymmetric_friction", {"offset": 1.5}, {"friction_offset": 0.0, "one_sided": 1.5}),
+    ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 0.5}),
     ("backlash", {"gap": 2.0e-3}, {"encoder_on_chassis": 1.0}),
-    ("gear_compliance", {"stiffness": 8.0e3}, {"encoder_on_chassis": 1.0}),
+    ("gear_compliance", {"stiffness": 2.2e3}, {"encoder_on_chassis": 0.0}),
 )
 """Effect, its size, and values of the bench that make another sentence of the contract's row of it."""
 

@@ -110,7 +110,9 @@ def _force_torque(states, t, plant, outside, rng):
     reading = outside.ft_gain * true + outside.ft_quadratic * true**2 + outside.ft_bias
     reading += outside.ft_drift * share
     reading += outside.ft_thermal * -np.expm1(-t / outside.ft_thermal_tau)
-    reading += outside.hum * np.sin(2.0 * np.pi * (outside.hum_frequency * t + rng.random()))
+    any_phase = 2.0 * np.pi * rng.random()
+    phase = any_phase if np.isnan(outside.hum_phase) else outside.hum_phase
+    reading += outside.hum * np.sin(2.0 * np.pi * outside.hum_frequency * t + phase)
     reading += outside.ft_walk * np.sqrt(t[1] - t[0]) * np.cumsum(rng.normal(size=t.size))
     return reading + _crosstalk(t, outside, rng) + outside.ft_noise * rng.normal(size=t.size)
 

@@ -77,7 +77,8 @@ def friction(t, x, load, p):
     if p.angle_friction > 0.0:
         dry += 0.5 * p.angle_friction * (1.0 + math.sin(2.0 * math.pi * (x[G] - x[H]) / p.angle_period))
     drag = p.b_m * (1.0 + p.damping_drift * t / p.duration) * v + dry * sign
-    drag += forward * (p.one_sided + p.one_sided_b * v) + p.even_offset + p.even_b * abs(v)
+    drag += p.friction_offset + 0.5 * p.viscous_difference * abs(v)
+    drag += forward * (p.one_sided + p.one_sided_b * v)
     drag += p.quadratic_drag * v * abs(v)
     if p.bristle_k > 0.0:
         drag += p.bristle_k * x[BRISTLE] + p.bristle_b * bristle_rate(x, v, p)

@@ -15,7 +15,7 @@ CATALOGUE = MappingProxyType(
             "stribeck_torque": "stribeck",
             "stribeck_velocity": "stribeck_v",
         },
-        "asymmetric_friction": {"offset": "one_sided", "viscous_difference": "one_sided_b"},
+        "asymmetric_friction": {"offset": "friction_offset", "viscous_difference": "viscous_difference"},
         "load_dependent_friction": {"coefficient": "load_friction"},
         "backlash": {"gap": "gap"},
         "nonlinear_spring": {"cubic": "cubic"},
@@ -92,6 +92,8 @@ def hide(bench, effect, parameters):
     """Return the bench with an effect of the contract, parameters in the contract's units."""
     fields = CATALOGUE[effect]
     values = {fields[name]: value for name, value in parameters.items()}
+    if effect == "gear_compliance":
+        values["encoder_on_chassis"] = 1.0  # the encoder reads the gear's output, its compliance is before it
     if "resonance_omega" in values:
         values["resonance_omega"] *= 2.0 * np.pi
     return bench.having(**values)

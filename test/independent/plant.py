@@ -6,7 +6,7 @@ the facts and physics. Every `0.0` (or `inf`) below is an effect that is absent.
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 
@@ -41,10 +41,10 @@ class Plant(NamedTuple):
     coulomb: float = 0.0
     stribeck: float = 0.0  # extra at rest
     stribeck_v: float = 0.05
-    one_sided: float = 0.0  # more friction forward than backward
+    friction_offset: float = 0.0  # mean of forward and backward drag, as signed torques
+    viscous_difference: float = 0.0  # forward less backward
+    one_sided: float = 0.0  # the other reading of "one-sided": drag in the forward direction only
     one_sided_b: float = 0.0
-    even_offset: float = 0.0  # the other reading of "one-sided": the mean of forward and backward
-    even_b: float = 0.0
     load_friction: float = 0.0
     quadratic_drag: float = 0.0
     angle_friction: float = 0.0  # Coulomb friction that comes and goes with the output angle
@@ -62,17 +62,17 @@ class Plant(NamedTuple):
     cogging_period: float = 0.02
 
     gap: float = 0.0  # backlash between gear output and chassis, whole width
-    contact_k: float = 3.0e5
-    contact_b: float = 20.0
+    contact_k: float = 1.0e6
+    contact_b: float = 40.0
     gear_k: float = 0.0  # compliance between gear output and chassis
     gear_b: float = 0.2
-    encoder_on_chassis: float = 0.0  # other reading of "gear output" with a gap or a soft gear
+    encoder_on_chassis: float = 0.0  # behind the gap or the soft gear, not before it
 
     cubic: float = 0.0
     quadratic: float = 0.0  # a spring softer one way than the other, 1/rad
     bouc_wen: float = 0.0
     bouc_wen_angle: float = 2.0e-3
-    bouc_wen_beta: float = 0.5  # 1: Dahl's form
+    bouc_wen_beta: float = 1.0  # 0.5: unloading starts with the slope of loading
     stop_angle: float = inf
     stop_k: float = 0.0
     stiffness_drift: float = 0.0
@@ -107,6 +107,7 @@ class Outside(NamedTuple):
     ft_crosstalk_high: float = 14.0
     hum: float = 0.0
     hum_frequency: float = 50.0
+    hum_phase: float = nan  # rad; not a number: another one in every record
     eccentricity: float = 0.0  # rad, in the encoder
     eccentricity_cycles: float = 1.0  # per turn of the rotor
 

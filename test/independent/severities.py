@@ -33,7 +33,7 @@ SIZES = MappingProxyType(
         "stiffness_drift": (0.02, 0.06, 0.15),  # either way
         "damping_drift": (0.10, 0.20, 0.35),  # either way
         "hard_stop": (15.0e-3, 12.0e-3, 9.0e-3),
-        "gear_compliance": (2.9e3, 2.2e3, 1.5e3),
+        "gear_compliance": (2.0e4, 8.0e3, 4.0e3),
     }
 )
 """Size of each effect, in the unit of its main parameter where no comment says otherwise."""

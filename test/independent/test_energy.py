@@ -12,7 +12,7 @@ from independent.solvers import run_fixed
 PASSIVE = {
     "coulomb_friction": {"torque": 2.0},
     "stribeck_friction": {"coulomb_torque": 1.0, "stribeck_torque": 1.0, "stribeck_velocity": 0.05},
-    "asymmetric_friction": {"offset": 1.5, "viscous_difference": 2.0},
+    "asymmetric_friction": {"offset": 0.0, "viscous_difference": 8.0},
     "load_dependent_friction": {"coefficient": 0.1},
     "backlash": {"gap": 3.0e-3},
     "nonlinear_spring": {"cubic": 500.0},
