@@ -13,7 +13,7 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.identification.problem import Case, Problem, case_from, weighted
-#from rsea_ros.identification.responses import responses_of
+from rsea_ros.identification.responses import responses_of
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
 from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
 from rsea_ros.identification.unknowns import Unknown, apply, clocks, unknowns_of_effect, unknowns_of_rig
