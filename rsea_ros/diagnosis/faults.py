@@ -16,7 +16,7 @@ from rsea_ros.identification.problem import BoolArray
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, FloatArray, Record
 
-_SPIKE = 12.0
+_SPIKE = 25.0
 """A sample further than this many robust sigmas from its neighbours is an outlier."""
 _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
@@ -69,7 +69,7 @@ def outliers(channel: Channel, name: str) -> BoolArray:
     away = y - np.nanmedian(window, axis=1)
     spread = 1.4826 * np.nanmedian(np.abs(away[np.isfinite(away)]))
     neighbours = np.nanmax(window[:, [0, 1, 3, 4]], axis=1) - np.nanmin(window[:, [0, 1, 3, 4]], axis=1)
-    limit = np.maximum(_SPIKE * max(spread, 1e-300), 3.0 * neighbours)
+    limit = np.maximum(_SPIKE * max(spread, 1e-300), 5.0 * neighbours)
     found: BoolArray = np.isfinite(away) & (np.abs(away) > limit)
     return found
 

@@ -1,0 +1,188 @@
+"""Diagnosis: simulate, compare, hypothesise, fit, judge, until nothing is left or nothing helps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.compare import misfits, spectrum
+from rsea_ros.diagnosis.faults import Checked, check
+from rsea_ros.diagnosis.judge import gain
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected, Verdict
+from rsea_ros.diagnosis.search import Search, Trial, fitted, search
+from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
+from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.confidence import confidence_of, what_is_not_told
+from rsea_ros.identification.identify import CHANNELS, fit_percent, identified_rig, overlays_of, parameters_of, unknowns_of
+from rsea_ros.identification.problem import Case, Problem, case_from, simulated
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, Record
+
+Progress = Callable[[str, float], None]
+FLOOR = 1.1
+"""RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""
+HALF_EXPLAINED = 0.5
+"""Share of the residual above the noise that causes must take away to be named without reaching the floor."""
+PRIMARY = ("ft", "position", "motor_torque")
+"""The channel that gains and verdicts speak of: the first of these that is there."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A model of the accepted sequence, re-fitted on all blocks but those that judge, and judged there."""
+
+    solution: Solution
+    outputs: list[dict[str, FloatArray]]
+    train: Score
+    judged: Score
+
+
+def diagnose(records: Sequence[Record], rig: Rig, holdout: Record | None = None, progress: Progress | None = None) -> Diagnosis:  # fmt: skip
+    """Say where a rig's simulation and the records part, why, and what extending the model gains.
+
+    holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
+    Raises IdentificationError when the records do not hold what the rig needs.
+    """
+    tell = progress or (lambda step, share: None)
+    tell("checking the data", 0.0)
+    checked = [check(r, rig) for r in records]
+    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
+    judging = check(holdout, rig) if holdout is not None else None
+    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
+    with ThreadPoolExecutor(2) as pool:
+        found = search(cases, nominal, pool, tell)
+        tell("judging", 0.95)
+        stages = list(pool.map(lambda m: _stage(found, m.solution, judging, rig), found.models))
+    return _conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig)
+
+
+def _stage(found: Search, solution: Solution, judging: Checked | None, rig: Rig) -> Stage:
+    """Re-fit a model on all that does not judge, and judge it."""
+    model = fitted(found.cases, solution.problem, solution.theta, places=(*FIT, *CHOOSE))
+    problem = model.solution.problem
+    train = score(problem, problem.cases, model.outputs)
+    if judging is None:
+        judges = tuple(part(c, JUDGE) for c in found.cases)
+        return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))
+    case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
+    moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
+    return Stage(model.solution, model.outputs, train, score(problem, (case,), [simulated(case, moved, offsets)]))
+
+
+def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig) -> Diagnosis:  # fmt: skip
+    channel = next(n for n in PRIMARY if n in stages[0].judged.sums)
+    verdict = _verdict(stages, channel)
+    if verdict == "unexplained":
+        stages = stages[:1]
+    first, last = stages[0], stages[-1]
+    causes = tuple(_cause(found, a, b, channel) for a, b in zip(stages[:-1], stages[1:], strict=True))
+    named = [c.name for c in causes]
+    confidence, case = confidence_of(first.solution), found.cases[0]
+    faults = tuple(f for c in checked for f in c.faults)
+    where = misfits(case, first.outputs[0], channel, rig)
+    return Diagnosis(
+        verdict=verdict,
+        sentence=verdict_sentence(verdict, causes, channel, first.judged.ratio(channel), last.judged.ratio(channel), faults),
+        rig_name=rig.name,
+        sources=tuple(r.source for r in records),
+        duration=sum(r.stop - r.start for r in records),
+        rate=records[0]["command"].rate,
+        faults=faults,
+        baseline_rig=identified_rig(first.solution, confidence),
+        baseline=parameters_of(first.solution, confidence),
+        extended_rig=identified_rig(last.solution, confidence_of(last.solution)),
+        noise_rms=dict(case.noise),
+        residual_rms=_rms(first.judged, case),
+        fit_percent=_fit(first, found.cases),
+        extended_residual_rms=_rms(last.judged, case),
+        extended_fit_percent=_fit(last, found.cases),
+        at_noise_floor=reached(last.judged),
+        misfit=where,
+        causes=causes,
+        rejected=tuple(_rejected(t, first.judged, found.cases, channel) for t in _latest(found.trials) if t.name not in named),
+        remaining=misfits(case, last.outputs[0], channel, rig),
+        before=overlays_of(case, first.outputs[0]),
+        after=overlays_of(case, last.outputs[0]),
+        spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
+        statements=what_is_not_told(first.solution.problem.unknowns, confidence),
+    )
+
+
+def _verdict(stages: Sequence[Stage], channel: str) -> Verdict:
+    """Return the verdict: see contract.md, diagnosis.json."""
+    first, last = stages[0].judged, stages[-1].judged
+    if len(stages) == 1:
+        return "nothing_wrong" if reached(first) else "unexplained"
+    if reached(last):
+        return "explained"
+    return "partly_explained" if share_explained(first, last) > HALF_EXPLAINED else "unexplained"
+
+
+def reached(judged: Score) -> bool:
+    """Tell whether every channel is at its noise floor."""
+    return all(judged.ratio(n) <= FLOOR for n in judged.sums)
+
+
+def share_explained(first: Score, last: Score) -> float:
+    """Return the share of the residual above the noise that is gone, in the channel that was worst (RMS)."""
+    worst = max(first.sums, key=first.ratio)
+    above = [np.sqrt(max(s.ratio(worst) ** 2 - 1.0, 0.0)) for s in (first, last)]
+    return float(1.0 - above[1] / above[0]) if above[0] > 0.0 else 0.0
+
+
+def _cause(found: Search, without: Stage, with_it: Stage, channel: str) -> Cause:
+    """Return an accepted cause with its parameters and its gain on data that took no part."""
+    setting = with_it.solution.problem.rig.effects[-1]
+    effect = effect_named(setting.name)
+    speaks = channel if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel) else max(
+        without.judged.sums, key=lambda n: without.judged.ratio(n) / max(with_it.judged.ratio(n), 1e-12)
+    )  # fmt: skip
+    held_out, interval = gain(with_it.judged, without.judged, speaks)
+    train, _ = gain(with_it.train, without.train, speaks)
+    estimates = {p.name.split(".")[1]: p for p in parameters_of(with_it.solution, confidence_of(with_it.solution)) if p.name.startswith(effect.name + ".")}
+    return Cause(
+        name=effect.name,
+        parameters={k: Estimate(e.value, e.unit, e.ci95) for k, e in estimates.items()},
+        gain_train=train,
+        gain_holdout=held_out,
+        gain_holdout_ci95=interval,
+        evidence=evidence_of(effect, speaks, without.judged.ratio(speaks), with_it.judged.ratio(speaks), held_out),
+        equation=effect.equation,
+        channel=speaks,
+        confusable_with=found.confusable.get(effect.name, ()),
+    )
+
+
+def _latest(trials: Sequence[Trial]) -> list[Trial]:
+    """Return each effect's trial that says most: a fitted one, else the last."""
+    best: dict[str, Trial] = {}
+    for t in trials:
+        if t.name not in best or t.model is not None or best[t.name].model is None:
+            best[t.name] = t
+    return list(best.values())
+
+
+def _rejected(trial: Trial, nominal: Score, cases: tuple[Case, ...], channel: str) -> Rejected:
+    if trial.model is None:
+        return Rejected(trial.name, 0.0, trial.why)
+    judged = score(trial.model.solution.problem, tuple(part(c, JUDGE) for c in cases), trial.model.outputs)
+    return Rejected(trial.name, gain(judged, nominal, channel)[0], trial.why)
+
+
+def _rms(judged: Score, case: Case) -> dict[str, float]:
+    return {n: judged.ratio(n) * case.noise[n] for n in judged.sums}
+
+
+def _fit(stage: Stage, cases: tuple[Case, ...]) -> dict[str, float]:
+    """Return the fit of every channel on all samples that count, %."""
+    case, out = cases[0], stage.outputs[0]
+    keep = {n: case.mask[n] for n in stage.judged.sums if n in case.measured}
+    return {n: fit_percent((out[n] - case.measured[n])[k], case.measured[n][k]) for n, k in keep.items()}
+
+

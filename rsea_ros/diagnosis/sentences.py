@@ -1,0 +1,37 @@
+"""What a diagnosis says in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rsea_ros.diagnosis.result import Cause, Fault, Verdict
+from rsea_ros.effects.effect import Effect
+
+_CHANNELS = {"ft": "F/T torque", "position": "position", "velocity": "velocity", "motor_torque": "motor torque"}
+
+
+def verdict_sentence(verdict: Verdict, causes: Sequence[Cause], channel: str, before: float, after: float, faults: Sequence[Fault]) -> str:  # fmt: skip
+    """Return the verdict as one sentence. before, after: held-out residual over noise."""
+    name, data = _CHANNELS[channel], _data(faults)
+    named = " and ".join(c.name.replace("_", " ") for c in causes)
+    if verdict == "nothing_wrong":
+        return f"Nothing is wrong with the model: with its values re-fitted the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
+    if verdict == "unexplained":
+        return f"The {name} residual is {before:.1f} times the noise, and nothing in the catalogue explains it.{data}"
+    if verdict == "explained":
+        return f"{named.capitalize()}: with it the {name} residual falls from {before:.1f} to {after:.2f} times the noise, which is the floor.{data}"
+    return f"{named.capitalize()} explains part: the {name} residual falls from {before:.1f} to {after:.1f} times the noise; the rest is unexplained.{data}"
+
+
+def evidence_of(effect: Effect, channel: str, before: float, after: float, gain: float) -> str:
+    """Return the evidence for a cause as one sentence."""
+    return (
+        f"With {effect.about}, the {_CHANNELS[channel]} residual of data that took no part falls "
+        f"from {before:.2f} to {after:.2f} times the noise (gain {gain:.1%})."
+    )
+
+
+def _data(faults: Sequence[Fault]) -> str:
+    if not faults:
+        return ""
+    return " The data have faults, which were masked: " + ", ".join(f"{f.kind.replace('_', ' ')} in {f.channel}" for f in faults) + "."
