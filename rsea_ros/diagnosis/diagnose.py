@@ -72,7 +72,7 @@ def _stage(found: Search, solution: Solution, judging: Checked | None, rig: Rig)
         return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))
     case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
     moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
-    return Stage(model.solution, model.outputs, train, score(problem, (case,), [simulated(case, moved, offsets)]))
+    return Stage(model.solution, model.outputs, train, score(problem, (case,), simulated((case,), moved, offsets)))
 
 
 def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig) -> Diagnosis:  # fmt: skip

@@ -29,6 +29,7 @@ _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 _FIT_ITERATIONS = 12
+_FULL_ITERATIONS = 6
 MOST_CAUSES = 4
 
 Tell = Callable[[str, float], None]
@@ -141,7 +142,7 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
 
     def fit_all(h: Hypothesis) -> Model:
         tell(f"round {number + 1}: fitting {h.name} on everything", _share(number, 0.8))
-        return fitted(cases, replace(h.problem, cases=cases), h.theta)
+        return fitted(cases, replace(h.problem, cases=cases), h.theta, iterations=_FULL_ITERATIONS)
 
     screened = sorted((h for h in pool.map(try_one, range(len(effects))) if h is not None), key=lambda h: h.cost)
     worth = [h for h in screened if h.cost < there.cost][:_FITS_ON_PIECES]
@@ -198,7 +199,7 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
         if n in out:
             residual = np.where(case.mask[n], case.measured[n] - out[n], 0.0)
             quantum = problem.rig.sensors[n].quantum if n in problem.rig.sensors else 0.0
-            floor = max(residual_floor(residual, float(np.median(np.diff(case.t[n])))), 0.5 * quantum)
+            floor = max(residual_floor(residual), 0.5 * quantum)
             noise[n] = min(noise[n], floor)
     return replace(case, noise=noise)
 

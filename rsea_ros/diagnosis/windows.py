@@ -12,18 +12,18 @@ from rsea_ros.model.drive import Drive
 
 _RUN_UP = 0.5
 """s before a piece that are simulated and not compared: the state there is the measured one."""
-_ENOUGH = 24.0
+_ENOUGH = 14.0
 """s of data in all pieces together."""
 
 
 def windows_of(case: Case) -> tuple[Case, ...]:
-    """Return pieces of a case, each a run-up and the FIT blocks after it, about 24 s of data in all.
+    """Return pieces of a case, each a run-up and the FIT blocks after it, about 14 s of data in all.
 
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
     fit = part(case, FIT)
     drive = case.drive
-    if not isinstance(drive, Drive) or drive.duration < 1.5 * _ENOUGH:
+    if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
         return (fit,)
     starts = np.arange(4.0 * BLOCK, drive.duration - 2.0 * BLOCK, 4.0 * BLOCK)
     every = max(1, round(len(starts) * 2.0 * BLOCK / _ENOUGH))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -16,7 +16,7 @@ from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.inverse import Motion, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import simulate_drive
+from rsea_ros.model.simulation import simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
@@ -92,13 +92,19 @@ def _inverse_case(record: Record) -> Case:
     )
 
 
-def simulated(case: Case, rig: Rig, offsets: Mapping[str, float], *, ride: bool = False) -> dict[str, FloatArray]:
-    """Return the simulated channels of a case, sensors read `offsets` seconds later than stamped."""
-    if isinstance(case.drive, Motion):
-        return {"motor_torque": inverse_torque(rig, case.drive)}
-    shifted = {n: at + offsets.get(n, 0.0) / case.drive.step for n, at in case.drive.at.items()}
-    drive = Drive(**{**case.drive.__dict__, "at": shifted}) if any(offsets.values()) else case.drive
-    return simulate_drive(rig, drive, ride=ride)
+def simulated(cases: Sequence[Case], rig: Rig, offsets: Mapping[str, float], *, ride: bool = False) -> list[dict[str, FloatArray]]:  # fmt: skip
+    """Return the simulated channels of cases, sensors read `offsets` seconds later than stamped."""
+    drives = [_shifted(c.drive, offsets) for c in cases if isinstance(c.drive, Drive)]
+    simulations = iter(simulate_drives(rig, drives, ride=ride))
+    return [
+        {"motor_torque": inverse_torque(rig, c.drive)} if isinstance(c.drive, Motion) else next(simulations) for c in cases
+    ]
+
+
+def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
+    if not any(offsets.values()):
+        return drive
+    return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
 
 
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
@@ -119,7 +125,7 @@ class Problem:
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
         rig, offsets = apply(self.rig, self.unknowns, theta)
-        return [simulated(case, rig, offsets, ride=self.ride) for case in self.cases]
+        return simulated(self.cases, rig, offsets, ride=self.ride)
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""

@@ -87,18 +87,20 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
     )
 
 
-def initial_state(rig: Rig, output: tuple[float, float]) -> FloatArray:
-    """Return the state of least energy with this output angle (rad) and velocity (rad/s), shape (2n,).
+def start_map(rig: Rig) -> FloatArray:
+    """Return what turns output angle (rad) and velocity (rad/s) into the state of least energy, shape (2n, 2).
 
     So an encoder that starts away from zero turns what is free to turn and leaves the spring alone.
     """
     m = mechanics(rig)
     row = np.array(_DIFFERENCES[st.OUTPUT_ANGLE]) @ m.placement
-    if not (any(output) and row.any()):
-        return np.zeros(2 * m.order)
-    stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
-    least = [np.linalg.solve(energy, row) for energy in (stiff, m.mass)]
-    return np.concatenate([value * x / (row @ x) for value, x in zip(output, least, strict=True)])
+    start = np.zeros((2 * m.order, 2))
+    if row.any():
+        stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
+        for i, energy in enumerate((stiff, m.mass)):
+            least = np.linalg.solve(energy, row)
+            start[i * m.order : (i + 1) * m.order, i] = least / (row @ least)
+    return start
 
 
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:

@@ -17,7 +17,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.loop import control
-from rsea_ros.model.propagator import initial_state, propagator
+from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
@@ -40,6 +40,15 @@ class Machine:
     x: FloatArray
     table: FloatArray
     own: FloatArray
+    start_map: FloatArray
+
+    def begin(self, initial: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Set the state to an output angle (rad) and velocity (rad/s), at time zero, nothing remembered."""
+        self.x[:] = self.start_map @ np.array(initial)
+        self.own[:] = 0.0
+        self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
+        self.table[[st.POSITION, st.OUTPUT_ANGLE]], self.table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
+        self.table[st.FT] = self.linear.outputs[2] @ self.x
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
@@ -54,7 +63,24 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
     """Return each channel of a drive at its sampling instants. ride: use the measured rotor angle."""
-    machine = build(rig, drive.step, drive.drift_time, drive.initial, in_loop=len(drive.reference) > 0)
+    return simulate_drives(rig, (drive,), ride=ride)[0]
+
+
+def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) -> list[dict[str, FloatArray]]:
+    """Return the channels of several drives of one rig; what they share is made once."""
+    machines: dict[tuple[float, float, bool], Machine] = {}
+    results = []
+    for drive in drives:
+        kind = (drive.step, drive.drift_time, len(drive.reference) > 0)
+        if kind not in machines:
+            machines[kind] = build(rig, kind[0], kind[1], in_loop=kind[2])
+        results.append(_driven(machines[kind], rig, drive, ride))
+    return results
+
+
+def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, FloatArray]:
+    """Return the channels of a drive at their sampling instants, from its own beginning."""
+    machine.begin(drive.initial)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
     out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT]]
@@ -88,8 +114,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
             machine.x, machine.table, machine.own, out)  # fmt: skip
 
 
-def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] = (0.0, 0.0), *,
-          in_loop: bool = False) -> Machine:  # fmt: skip
+def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
     for effect, parameters in settings:
@@ -104,10 +129,7 @@ def build(rig: Rig, step: float, duration: float, initial: tuple[float, float] =
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
     table[st.CREEP] = CREEP_VELOCITY
     table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
-    x = initial_state(rig, initial)
-    table[[st.POSITION, st.OUTPUT_ANGLE]], table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
-    table[st.FT] = linear.outputs[2] @ x
-    return Machine(linear, calls, x, table, np.zeros(states))
+    return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 
 
 def _constants(rig: Rig) -> tuple[float, float, float, float]:
