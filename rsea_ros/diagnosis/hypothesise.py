@@ -14,7 +14,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution, jacobian_columns
+from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
 from rsea_ros.signals import FloatArray
 
@@ -70,9 +70,9 @@ def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> H
     best = Hypothesis(effect, problem, theta, cost)
     for _ in range(_STEPS):
         slope = matrix.T @ residual + prior**2 * (theta - centre)
-        step = np.linalg.solve(normal, slope)
+        aim = bounded_step(problem, theta, normal, slope)
         for share in (1.0, 0.3):
-            trial = np.array([u.inner(u.outer(float(v))) for u, v in zip(problem.unknowns, theta - share * step, strict=True)])
+            trial = theta + share * (aim - theta)
             trial_residual = problem.residual(trial)
             cost = float(trial_residual @ trial_residual) + float(np.sum((prior * (trial - centre)) ** 2))
             if cost < best.cost:

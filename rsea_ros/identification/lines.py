@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from rsea_ros.identification.result import ComplexArray
 from rsea_ros.signals import FloatArray
@@ -44,10 +43,12 @@ class Lines:
 def widened(sd: FloatArray, freedom: FloatArray | float) -> FloatArray:
     """Return sd scaled so that the circle of radius 1.73 sd holds the truth in 95 % of cases.
 
-    With the variance itself estimated from `freedom` complex values, |error|^2 / variance follows
-    F(2, 2 freedom); for a known variance its 95 % point is -ln 0.05 = 1.73^2.
+    With the variance itself estimated from m = `freedom` complex values, |error|^2 / variance follows
+    F(2, 2 m), which exceeds x with probability (1 + x / m)^-m; for a known variance with e^-x, so that its
+    95 % point is -ln 0.05 = 1.73^2.
     """
-    quantile = f_distribution.ppf(0.95, 2, 2.0 * np.maximum(freedom, 1.0))
+    m = np.maximum(freedom, 1.0)
+    quantile = m * (0.05 ** (-1.0 / m) - 1.0)
     result: FloatArray = sd * np.sqrt(quantile / -np.log(0.05))
     return result
 

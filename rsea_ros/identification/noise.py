@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import signal
+from scipy.fft import rfft
 
+from rsea_ros.identification.result import ComplexArray
 from rsea_ros.signals import Channel, FloatArray, Record
 
+_TINY = 1e-300
 TOP_OF_BAND = (0.62, 0.98)
 """Of the Nyquist frequency: where the noise is read off."""
 
@@ -27,22 +29,35 @@ def noise_floor(record: Record, name: str, quantum: float = 0.0) -> float:
     if len(y) < 64:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, least)
     period = float(np.median(np.diff(t)))
-    u = _held_before(record["command"], t - 0.25 * period)
-    length = int(min(512, 2 ** math.floor(math.log2(len(y) / 8))))
-    frequency, s_yy = signal.welch(y, 1.0 / period, nperseg=length)
-    _, coherence = signal.coherence(u, y, 1.0 / period, nperseg=length)
-    segments = max(2.0, 2.0 * len(y) / length - 1.0)
-    band = (frequency > TOP_OF_BAND[0] * 0.5 / period) & (frequency < TOP_OF_BAND[1] * 0.5 / period)
-    level = float(np.median((1.0 - coherence[band]) * s_yy[band])) / (1.0 - 1.8 / segments)
-    return max(math.sqrt(level * 0.5 / period), least)
+    u, v = _spectra(_held_before(record["command"], t - 0.25 * period)), _spectra(y)
+    power = np.mean(np.abs(v) ** 2, axis=0)
+    shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
+    unlike = (power - shared) / (1.0 - 1.8 / max(2.0, len(v)))
+    return max(math.sqrt(float(np.median(unlike[_top(unlike)]))), least)
 
 
-def residual_floor(residual: FloatArray, period: float) -> float:
+def residual_floor(residual: FloatArray) -> float:
     """Return the RMS of white noise with the level that a model's residual has at the top of the band."""
-    length = int(min(512, 2 ** math.floor(math.log2(max(len(residual), 64) / 8))))
-    frequency, level = signal.welch(residual, 1.0 / period, nperseg=min(length, len(residual)))
-    band = frequency > TOP_OF_BAND[0] * 0.5 / period
-    return math.sqrt(float(np.median(level[band])) * 0.5 / period)
+    power = np.mean(np.abs(_spectra(residual)) ** 2, axis=0)
+    return math.sqrt(float(np.median(power[_top(power)])))
+
+
+def _spectra(values: FloatArray) -> ComplexArray:
+    """Return the spectra of half-overlapping Hann segments, shape (segments, lines).
+
+    Scaled so that white noise has the square of its RMS in every line.
+    """
+    length = min(512, 2 ** math.floor(math.log2(max(len(values), 64) / 8)))
+    segments = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
+    window = np.hanning(length + 1)[:-1]
+    centred = (segments - segments.mean(axis=1, keepdims=True)) * window
+    spectra: ComplexArray = rfft(centred, axis=1) / math.sqrt(float(window @ window))
+    return spectra
+
+
+def _top(lines: FloatArray) -> slice:
+    """Return where the top of the band lies."""
+    return slice(math.ceil(TOP_OF_BAND[0] * len(lines)), math.floor(TOP_OF_BAND[1] * len(lines)))
 
 
 def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:

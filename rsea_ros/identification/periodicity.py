@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import find_peaks
 
 from rsea_ros.signals import FloatArray
 
@@ -41,7 +40,8 @@ def _likely_lags(command: FloatArray) -> list[int]:
     if len(correlation) < 3 or correlation[0] <= 0.0:
         return []
     unbiased = correlation / correlation[0] * n / (n - np.arange(len(correlation)))
-    peaks, _ = find_peaks(np.append(unbiased, 0.0), height=_LIKELY, distance=2)
+    inner, after = unbiased[1:], np.append(unbiased[2:], 0.0)
+    peaks = 1 + np.flatnonzero((inner > unbiased[:-1]) & (inner >= after) & (inner >= _LIKELY))
     high = peaks[unbiased[peaks] > 0.9 * unbiased[peaks].max()] if len(peaks) else peaks
     return [int(lag) for lag in high[:_TRIED]]
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import make_interp_spline
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Channel, FloatArray, Record
@@ -130,6 +129,8 @@ def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
     near = np.minimum(near, len(place) - 1)
     if np.all(np.abs(place[near] - wanted) < _STEADY):
         return y[near]
+    from scipy.interpolate import make_interp_spline  # 0.1 s that even stamps need not wait for
+
     spline: FloatArray = make_interp_spline(place, y, k=_DEGREE)(wanted)
     return spline
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.unknowns import CLOCK, start_vector
+from rsea_ros.identification.unknowns import CLOCK, Unknown, start_vector
 from rsea_ros.signals import FloatArray
 
 _DIFFERENCE = 1e-4
@@ -103,7 +103,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         accepted = False
         for _ in range(8):
             scaled = normal + damping * np.diag(np.diag(normal) + 1e-12)
-            trial = _bounded(problem, theta - np.linalg.lstsq(scaled, slope, rcond=None)[0])
+            trial = bounded_step(problem, theta, scaled, slope)
             trial_outputs = problem.outputs(trial)
             trial_residual = problem.residual_of(trial_outputs)
             trial_cost = cost_of(trial_residual, trial)
@@ -130,5 +130,24 @@ def linearised(problem: Problem, theta: FloatArray) -> Solution:
     return Solution(problem, theta, residual, jacobian(problem, theta, residual, outputs), float(residual @ residual + prior))
 
 
-def _bounded(problem: Problem, theta: FloatArray) -> FloatArray:
-    return np.array([u.inner(u.outer(float(t))) for u, t in zip(problem.unknowns, theta, strict=True)])
+def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return theta - normal^-1 slope inside the bounds; what meets a bound stays there and the rest makes up for it."""
+    low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
+    step, free = np.zeros(len(theta)), np.ones(len(theta), bool)
+    for _ in range(4):
+        right = slope[free] - normal[np.ix_(free, ~free)] @ -step[~free]
+        step[free] = -np.linalg.lstsq(normal[np.ix_(free, free)], right, rcond=None)[0]
+        beyond = free & ((theta + step < low) | (theta + step > high))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(theta + step, low, high)[beyond] - theta[beyond]
+        free &= ~beyond
+    return np.clip(theta + step, low, high)
+
+
+def _lowest(unknown: Unknown) -> float:
+    return max(unknown.low, 1e-300) if unknown.logarithmic else unknown.low
+
+
+def _highest(unknown: Unknown) -> float:
+    return unknown.high
