@@ -1,7 +1,7 @@
 """Equations of motion of the unlumped actuator, for any rig.
 
 Coordinates (absolute angles, rad): h housing, g gear output before the gear's own compliance,
-c spring chassis, d distal output. The rotor turns at
+c spring chassis, d distal output, p load on the housing's end. The rotor turns at
 
     w_rotor = w_h + n (w_g - w_h),   n = N (planetary) or -(N - 1) (star: annulus and carrier exchanged)
     w_rotor = N w_g                  (lumped: grounded, as if the housing's motion did not turn it)
@@ -11,7 +11,8 @@ so with J_r = J_m / N^2 the kinetic energy
     1/2 J_h w_h^2 + 1/2 J_sc w_c^2 + 1/2 J_r w_rotor^2 + 1/2 J_d w_d^2
 
 makes the rotor an inerter between housing and gear output (facts.md section 1). A clamped end, a rigid
-spring (d = c) and a stiff gear (c = g) are constraints q_full = P q, so M = P' M_full P and so on.
+spring (d = c), a stiff gear (c = g) and no spring on the proximal side (p = h) are constraints
+q_full = P q, so M = P' M_full P and so on.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ from rsea_ros.errors import RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-H, G, C, D = range(4)
-END_COORDINATES = ((H, "housing_end"), (D, "spring_end"))
+H, G, C, D, P = range(5)
+COORDINATES = 5
+END_COORDINATES = ((P, "housing_end"), (D, "spring_end"))
 
 PORTS = ("gear", "spring", "joint", "housing", "distal")
 """Where a torque can act. gear: on the gear output against the housing (the motor's torque acts here);
@@ -35,11 +37,11 @@ chassis, positive when it pushes the chassis forward; housing, distal: from outs
 
 PORT_DIRECTIONS = np.array(
     [
-        [-1.0, 1.0, 0.0, 0.0],
-        [0.0, 0.0, -1.0, 1.0],
-        [0.0, -1.0, 1.0, 0.0],
-        [1.0, 0.0, 0.0, 0.0],
-        [0.0, 0.0, 0.0, 1.0],
+        [-1.0, 1.0, 0.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, 1.0, 0.0],
+        [0.0, -1.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 1.0],
+        [0.0, 0.0, 0.0, 1.0, 0.0],
     ]
 )
 
@@ -48,7 +50,7 @@ PORT_DIRECTIONS = np.array(
 class Mechanics:
     """M q'' + D q' + K q = B' tau, with tau the torques at PORTS.
 
-    mass, damping, stiffness: shape (n, n). ports: B, shape (5, n). placement: P, shape (4, n).
+    mass, damping, stiffness: shape (n, n). ports: B, shape (5, n). placement: P, shape (5, n).
     """
 
     mass: FloatArray
@@ -98,8 +100,9 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
 
 
 def owners(rig: Rig) -> dict[int, int]:
-    """Return which coordinate each of H, G, C, D moves with (a stiff gear, a rigid spring)."""
+    """Return which coordinate each one moves with (a stiff gear, a rigid spring, no proximal spring)."""
     owner = {H: H, G: G, C: G if math.isinf(rig["gear.stiffness"]) else C, D: D}
+    owner[P] = H if math.isinf(rig["proximal_spring.stiffness"]) else P
     if rig.rigid_spring:
         owner[D] = owner[C]
     return owner
@@ -110,31 +113,35 @@ def _placement(rig: Rig) -> FloatArray:
     owner = owners(rig)
     fixed = {owner[end] for end, name in END_COORDINATES if name in rig.clamped}
     moving = [c for c in sorted(set(owner.values())) if c not in fixed]
-    placement = np.zeros((4, len(moving)))
-    for coordinate in (H, G, C, D):
-        if owner[coordinate] in moving:
-            placement[coordinate, moving.index(owner[coordinate])] = 1.0
+    placement = np.zeros((COORDINATES, len(moving)))
+    for coordinate, leader in owner.items():
+        if leader in moving:
+            placement[coordinate, moving.index(leader)] = 1.0
     return placement
 
 
 def actuator_matrices(rig: Rig) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mass, damping and stiffness of all that is between the two ends, shape (4, 4) each."""
-    mass, stiffness = np.zeros((4, 4)), np.zeros((4, 4))
+    """Return mass, damping and stiffness of all that is between the two ends, shape (5, 5) each."""
+    mass, stiffness = np.zeros((COORDINATES, COORDINATES)), np.zeros((COORDINATES, COORDINATES))
     n = train_ratio(rig)
     rotor = np.array([0.0 if rig.train == "lumped" else 1.0 - n, n])  # its speed by those of h and g
     mass[np.ix_((H, G), (H, G))] = rotor_inertia(rig) * np.outer(rotor, rotor)
     mass[C, C] += rig["chassis.inertia"]
+    mass[H, H] += rig["housing.inertia"]
     damping = _between(H, G, rig["rotor.reflected_damping"]) + _between(C, D, rig["spring.damping"])
     if not rig.rigid_spring:
         stiffness += _between(C, D, rig["spring.stiffness"])
     if math.isfinite(rig["gear.stiffness"]):
         stiffness += _between(G, C, rig["gear.stiffness"])
+    if math.isfinite(rig["proximal_spring.stiffness"]):
+        stiffness += _between(P, H, rig["proximal_spring.stiffness"])
+        damping += _between(P, H, rig["proximal_spring.damping"])
     return mass, damping, stiffness
 
 
 def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return mass, damping and stiffness of what is on the ends."""
-    mass, damping, stiffness = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    mass, damping, stiffness = (np.zeros((COORDINATES, COORDINATES)) for _ in range(3))
     for end, name in END_COORDINATES:
         if rig.end_is_free(name):
             gravity = rig[f"{name}.gravity"] if linear_gravity else 0.0
@@ -145,6 +152,6 @@ def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArr
 
 
 def _between(a: int, b: int, value: float) -> FloatArray:
-    matrix = np.zeros((4, 4))
+    matrix = np.zeros((COORDINATES, COORDINATES))
     matrix[np.ix_((a, b), (a, b))] = value * np.array([[1.0, -1.0], [-1.0, 1.0]])
     return matrix

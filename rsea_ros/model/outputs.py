@@ -18,6 +18,7 @@ import numpy as np
 
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import (
+    COORDINATES,
     END_COORDINATES,
     PORT_DIRECTIONS,
     PORTS,
@@ -39,7 +40,7 @@ element of Eqs. (1), (3), (4), (6). With b_s = 3 N m s/rad they differ by more t
 class Output:
     """A signal y = (c_0 + c_1 s + c_2 s^2) q + d tau.
 
-    c: shape (3, 4), on the coordinates (h, g, c, d) and their two derivatives. d: shape (5,), on the torques
+    c: shape (3, 5), on the coordinates (h, g, c, d, p) and their two derivatives. d: shape (5,), on the torques
     at equations.PORTS.
     """
 
@@ -93,7 +94,7 @@ def _spring_element(rig: Rig) -> Output:
 
 
 def _of_coordinates(factors: Mapping[int, float]) -> Output:
-    c = np.zeros((3, 4))
+    c = np.zeros((3, COORDINATES))
     for coordinate, factor in factors.items():
         c[0, coordinate] = factor
     return Output(c, np.zeros(len(PORTS)))

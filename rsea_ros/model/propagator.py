@@ -15,12 +15,12 @@ from rsea_ros.model.step import Linear
 from rsea_ros.signals import FloatArray
 
 _DIFFERENCES = {
-    st.GEAR_ANGLE: (-1.0, 1.0, 0.0, 0.0),
-    st.OUTPUT_ANGLE: (-1.0, 0.0, 1.0, 0.0),
-    st.DEFLECTION: (0.0, 0.0, 1.0, -1.0),
-    st.JOINT_ANGLE: (0.0, 1.0, -1.0, 0.0),
-    st.HOUSING_ANGLE: (1.0, 0.0, 0.0, 0.0),
-    st.DISTAL_ANGLE: (0.0, 0.0, 0.0, 1.0),
+    st.GEAR_ANGLE: (-1.0, 1.0, 0.0, 0.0, 0.0),
+    st.OUTPUT_ANGLE: (-1.0, 0.0, 1.0, 0.0, 0.0),
+    st.DEFLECTION: (0.0, 0.0, 1.0, -1.0, 0.0),
+    st.JOINT_ANGLE: (0.0, 1.0, -1.0, 0.0, 0.0),
+    st.HOUSING_ANGLE: (0.0, 0.0, 0.0, 0.0, 1.0),
+    st.DISTAL_ANGLE: (0.0, 0.0, 0.0, 1.0, 0.0),
 }
 
 
@@ -104,9 +104,18 @@ def start_map(rig: Rig) -> FloatArray:
 
 
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
-    """Return the rows of position, velocity and linear spring torque."""
+    """Return the rows of position, velocity and the linear torque at the F/T sensor."""
     position, velocity = (read_row(rig, m, s) for s in (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY))
+    if rig.ft_end == "housing_end":
+        return np.array([position, velocity, _proximal_torque(rig, m)])
     if rig.rigid_spring:
         return np.array([position, velocity, np.zeros(2 * m.order)])
     deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
     return np.array([position, velocity, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate])
+
+
+def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:
+    """Return the row of T_p = K_p (q_p - q_h) + b_p (q_p' - q_h'), what a sensor at the housing's end reads."""
+    difference = np.array([-1.0, 0.0, 0.0, 0.0, 1.0]) @ m.placement
+    stiffness, damping = rig["proximal_spring.stiffness"], rig["proximal_spring.damping"]
+    return np.concatenate([stiffness * difference, damping * difference])

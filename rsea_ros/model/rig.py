@@ -44,6 +44,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "chassis.inertia": Field("kg m^2", default=0.0),
         "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "spring.damping": Field("N m s/rad", default=0.0),
+        "housing.inertia": Field("kg m^2", default=0.0),
+        "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
+        "proximal_spring.damping": Field("N m s/rad", default=0.0),
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
     }
 )
@@ -61,10 +64,15 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Sensor:
-    """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS)."""
+    """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
+
+    zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
+    so only changes of its values tell something.
+    """
 
     noise: float = 0.0
     quantum: float = 0.0
+    zero_unknown: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,7 +102,8 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
-    known: names that no fit may move. proximal: which end the paper's *proximal* is.
+    known: names that no fit may move. proximal: which end the paper's *proximal* is. ft_end: which end the
+    F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
     """
 
     name: str
@@ -105,6 +114,7 @@ class Rig:
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
+    ft_end: str = "spring_end"
     controller: Controller | None = None
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""
@@ -151,6 +161,10 @@ class Rig:
         """Return the unit of a value."""
         return unit_of(name)
 
+    def zero_unknown(self, channel: str) -> bool:
+        """Tell whether a channel's sensor counts from another zero in every record."""
+        return channel in self.sensors and self.sensors[channel].zero_unknown
+
     def end_is_free(self, end: str) -> bool:
         """Tell whether an end can move (it has an inertia of its own)."""
         return end not in self.clamped
@@ -181,8 +195,14 @@ def _check_structure(rig: Rig) -> None:
         raise RigError(
             f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}"
         )
-    if rig.proximal not in END_NAMES:
-        raise RigError(f"rig {rig.name}: proximal = {rig.proximal!r}, expected one of {', '.join(END_NAMES)}")
+    for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
+        if end not in END_NAMES:
+            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}")
+    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
+        raise RigError(
+            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
+            "sensor, N m/rad"
+        )
     if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
         raise RigError(
             f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"

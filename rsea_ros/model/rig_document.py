@@ -26,7 +26,7 @@ from rsea_ros.model.rig import (
 from rsea_ros.signals import UNITS
 
 _GROUPS = sorted({name.split(".")[0] for name in FIELDS})
-_TOP = {"name", "about", "source", "known", "proximal", "sensors", "controller", "effects", *_GROUPS}
+_TOP = {"name", "about", "source", "known", "proximal", "ft_end", "sensors", "controller", "effects", *_GROUPS}
 _SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
 
 
@@ -51,6 +51,7 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
             [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
         ),
         proximal=text(document.get("proximal", "housing_end"), "proximal"),
+        ft_end=text(document.get("ft_end", "spring_end"), "ft_end"),
         controller=_controller(document.get("controller")),
         effects=effects,
     )
@@ -64,6 +65,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
+    if rig.ft_end != "spring_end":
+        document["ft_end"] = rig.ft_end
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -73,9 +76,7 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     if rig.rigid_spring:
         document.setdefault("spring", {})["rigid"] = True
     document["known"] = sorted(rig.known)
-    document["sensors"] = {
-        n: {"noise": s.noise, "quantum": s.quantum, "unit": UNITS[n]} for n, s in rig.sensors.items()
-    }
+    document["sensors"] = {n: _sensor_to_document(n, s) for n, s in rig.sensors.items()}
     if rig.controller:
         document["controller"] = {
             "k_p": rig.controller.k_p,
@@ -86,6 +87,11 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         {"name": e.name, "parameters": {k: float(v) for k, v in e.parameters.items()}} for e in rig.effects
     ]
     return document
+
+
+def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
+    body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
+    return {**body, "zero_unknown": True} if sensor.zero_unknown else body
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -137,7 +143,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     sensors = {}
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, {"noise", "quantum", "unit", "source"}, f"sensors.{name}")
+        only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown"}, f"sensors.{name}")
         if fields.get("unit") != UNITS[name]:
             raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
         noise, quantum = (
@@ -147,7 +153,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
             raise RigError(
                 f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
             )
-        sensors[name] = Sensor(noise, quantum)
+        sensors[name] = Sensor(noise, quantum, switch(fields, f"sensors.{name}.zero_unknown"))
     return sensors
 
 

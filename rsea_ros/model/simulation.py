@@ -15,6 +15,7 @@ import numpy as np
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
+from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
 from rsea_ros.model.loop import control
 from rsea_ros.model.propagator import propagator, start_map
@@ -58,7 +59,8 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
     the loop is closed in the simulation. refine divides the fixed step.
     """
     in_loop = rig.controller is not None and "reference" in record
-    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop))
+    from_rest = rig.zero_unknown("position")
+    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest))
 
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
@@ -122,6 +124,7 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
         if effect.structure is not None:
             rig = effect.structure(rig, parameters)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
+    _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
     calls, states = _calls(rig, active, in_loop)
     table = np.zeros(st.SIZE)
@@ -130,6 +133,13 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[st.CREEP] = CREEP_VELOCITY
     table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
+
+
+def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
+    """Raise RigError for an effect in the spring where the F/T sensor is not: the step adds its torque there."""
+    for effect, _ in active:
+        if rig.ft_end == "housing_end" and effect.port == st.Port.SPRING:
+            raise RigError(f"rig {rig.name}: effect {effect.name} with ft_end = housing_end, expected spring_end")
 
 
 def _constants(rig: Rig) -> tuple[float, float, float, float]:

@@ -19,6 +19,11 @@ RANGES = {
 }
 SPRING = {"spring.stiffness": (50.0, 3000.0), "spring.damping": (0.02, 5.0)}
 GEAR = {"gear.stiffness": (2e3, 5e4)}
+PROXIMAL = {
+    "proximal_spring.stiffness": (200.0, 5e4),
+    "proximal_spring.damping": (0.02, 5.0),
+    "housing.inertia": (0.01, 0.5),
+}
 END = {"inertia": (0.02, 1.0), "damping": (0.05, 1.0), "stiffness": (0.1, 20.0), "gravity": (0.1, 5.0)}
 
 
@@ -29,14 +34,17 @@ def _between(bounds: tuple[float, float]) -> st.SearchStrategy[float]:
 
 @st.composite
 def rigs(draw: st.DrawFn, *, gravity: bool = False) -> Rig:
-    """Draw a rig without effects: ends clamped or free, spring rigid or not, gear stiff or not, either train.
+    """Draw a rig without effects: ends clamped or free, spring rigid or not, gear stiff or
+    not, a spring on the proximal side or not, either train.
 
     gravity: let ends be pendulums, whose equations of motion are not linear.
     """
     clamped = frozenset(end for end in END_NAMES if draw(st.booleans()))
     compliant_gear = draw(st.booleans())
+    proximal = draw(st.sampled_from([False, False, True]))
     rigid = draw(st.booleans()) and (compliant_gear or "spring_end" not in clamped)
     ranges = RANGES | ({} if rigid else SPRING) | (GEAR if compliant_gear else {})
+    ranges |= PROXIMAL if proximal else {}
     for end in sorted(set(END_NAMES) - clamped):
         keys = ["inertia", "damping"] + [k for k in ("stiffness", "gravity") if draw(st.booleans())]
         ranges |= {f"{end}.{k}": END[k] for k in keys if gravity or k != "gravity"}
@@ -47,4 +55,5 @@ def rigs(draw: st.DrawFn, *, gravity: bool = False) -> Rig:
         rigid_spring=rigid,
         train=draw(st.sampled_from(["planetary", "star"])),
         proximal=draw(st.sampled_from(END_NAMES)),
+        ft_end=draw(st.sampled_from(END_NAMES)) if proximal and not rigid else "spring_end",
     )

@@ -9,37 +9,41 @@ from scipy.linalg import expm
 
 from rsea_ros.model.rig import Rig
 
-MOVABLE = ("housing", "gear", "chassis", "distal")
+MOVABLE = ("housing", "gear", "chassis", "distal", "proximal")
 
 
 def coordinates(rig: Rig) -> np.ndarray:
-    """Return the angles of housing, gear output, chassis, distal side by free coordinate, shape (4, n)."""
+    """Return the angles of the parts in MOVABLE by free coordinate, shape (5, n)."""
     names = ["gear"]
     names += ["chassis"] if math.isfinite(rig["gear.stiffness"]) else []
     names += [] if rig.rigid_spring else ["distal"]
     follow = {"gear": "gear", "chassis": "chassis" if "chassis" in names else "gear", "housing": "housing"}
     follow["distal"] = "distal" if "distal" in names else follow["chassis"]
-    names = ["housing", *names]
+    elastic = math.isfinite(rig["proximal_spring.stiffness"])
+    follow["proximal"] = "proximal" if elastic else "housing"
+    names = ["housing", *names, *(["proximal"] if elastic else [])]
     if "housing_end" in rig.clamped:
-        names.remove("housing")
+        names.remove(follow["proximal"])
     if "spring_end" in rig.clamped:
         names.remove(follow["distal"])
     return np.array([[1.0 if follow[part] == name else 0.0 for name in names] for part in MOVABLE])
 
 
 def kinetic(rig: Rig, w: np.ndarray) -> float:
-    """Return the kinetic energy at speeds w of housing, gear output, chassis, distal side, J."""
+    """Return the kinetic energy at speeds w of the parts in MOVABLE, J."""
     ratio = rig["gear.ratio"]
     carrier = w[0] + ratio * (w[1] - w[0])  # annulus on the housing
     annulus = w[0] - (ratio - 1.0) * (w[1] - w[0])  # carrier on the housing
     rotor = carrier if rig.train == "planetary" else annulus
     energy = rig["rotor.reflected_inertia"] / ratio**2 * rotor**2 + rig["chassis.inertia"] * w[2] ** 2
+    energy += rig["housing.inertia"] * w[0] ** 2
     return 0.5 * (energy + sum(_end(rig, end, "inertia") * w[i] ** 2 for i, end in _ENDS))
 
 
 def dissipation(rig: Rig, w: np.ndarray) -> float:
     """Return half the power lost, W."""
     inside = rig["rotor.reflected_damping"] * (w[1] - w[0]) ** 2 + rig["spring.damping"] * (w[2] - w[3]) ** 2
+    inside += rig["proximal_spring.damping"] * (w[4] - w[0]) ** 2
     return 0.5 * (inside + sum(_end(rig, end, "damping") * w[i] ** 2 for i, end in _ENDS))
 
 
@@ -48,13 +52,15 @@ def potential(rig: Rig, q: np.ndarray, *, small_angles: bool = False) -> float:
     energy = 0.0 if rig.rigid_spring else 0.5 * rig["spring.stiffness"] * (q[2] - q[3]) ** 2
     if math.isfinite(rig["gear.stiffness"]):
         energy += 0.5 * rig["gear.stiffness"] * (q[1] - q[2]) ** 2
+    if math.isfinite(rig["proximal_spring.stiffness"]):
+        energy += 0.5 * rig["proximal_spring.stiffness"] * (q[4] - q[0]) ** 2
     for i, end in _ENDS:
         rise = 0.5 * q[i] ** 2 if small_angles else 1.0 - math.cos(q[i])
         energy += 0.5 * _end(rig, end, "stiffness") * q[i] ** 2 + _end(rig, end, "gravity") * rise
     return energy
 
 
-_ENDS = ((0, "housing_end"), (3, "spring_end"))
+_ENDS = ((4, "housing_end"), (3, "spring_end"))
 
 
 def _end(rig: Rig, end: str, key: str) -> float:
@@ -83,7 +89,10 @@ def state_matrices(rig: Rig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     a[n:, :n], a[n:, n:] = -np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)
     b[n:] = np.linalg.solve(mass, p[1] - p[0])
     c[0, :n] = c[1, n:] = p[2] - p[0]
-    if not rig.rigid_spring:
+    if rig.ft_end == "housing_end":
+        stiffness, damping = rig["proximal_spring.stiffness"], rig["proximal_spring.damping"]
+        c[2] = np.concatenate([stiffness * (p[4] - p[0]), damping * (p[4] - p[0])])
+    elif not rig.rigid_spring:
         c[2] = np.concatenate(
             [rig["spring.stiffness"] * (p[2] - p[3]), rig["spring.damping"] * (p[2] - p[3])]
         )

@@ -51,7 +51,7 @@ def test_response_is_that_of_the_energies(rig):
     states = np.array([np.linalg.solve(s * np.eye(len(a)) - a, b) for s in S]).T
     agree(frequency_response(rig, outputs.position(), HZ), c[0] @ states)
     if not rig.rigid_spring:
-        agree(frequency_response(rig, outputs.end_torque(rig, "spring_end"), HZ), c[2] @ states)
+        agree(frequency_response(rig, outputs.end_torque(rig, rig.ft_end), HZ), c[2] @ states)
 
 
 @settings(max_examples=40)
@@ -61,8 +61,8 @@ def test_a_free_end_moves_by_the_torque_on_it(rig):
     for i, (end, sign) in enumerate((("housing_end", -1.0), ("spring_end", 1.0))):
         if end in rig.clamped:
             continue
-        angle = outputs.Output(np.zeros((3, 4)), np.zeros(5))
-        angle.c[0, 3 * i] = sign
+        angle = outputs.Output(np.zeros((3, 5)), np.zeros(5))
+        angle.c[0, (4, 3)[i]] = sign
         impedance = rig[f"{end}.inertia"] * S**2 + rig[f"{end}.damping"] * S
         impedance += rig[f"{end}.stiffness"] + rig[f"{end}.gravity"]
         held = impedance * frequency_response(rig, angle, HZ)
@@ -114,8 +114,8 @@ def test_both_ends_together_take_the_change_of_angular_momentum(name, train):
     rig = replace(load_rig(name), train=train, proximal="housing_end")
     ratio = rig["gear.ratio"]
     n = ratio if train == "planetary" else 1 - ratio
-    momentum = outputs.Output(np.zeros((3, 4)), np.zeros(5))
-    momentum.c[2] = rig["rotor.reflected_inertia"] / ratio**2 * np.array([1 - n, n, 0, 0])
+    momentum = outputs.Output(np.zeros((3, 5)), np.zeros(5))
+    momentum.c[2] = rig["rotor.reflected_inertia"] / ratio**2 * np.array([1 - n, n, 0, 0, 0])
     momentum.c[2, 2] += rig["chassis.inertia"]
     difference = transfer.proximal_per_motor(rig)(S) - transfer.distal_per_motor(rig)(S)
     agree(difference, frequency_response(rig, momentum, HZ))
