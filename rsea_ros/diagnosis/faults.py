@@ -16,8 +16,9 @@ from rsea_ros.identification.problem import BoolArray
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, FloatArray, Record
 
-_SPIKE = 25.0
-"""A sample further than this many robust sigmas from its neighbours is an outlier."""
+_AROUND = 10
+_SPIKE = 12.0
+"""A sample further than this many spreads of the ten around it from their median is an outlier."""
 _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
 _SMALLEST_SHARE = 1e-3
@@ -60,17 +61,19 @@ def not_finite(channel: Channel, name: str) -> BoolArray:
 
 
 def outliers(channel: Channel, name: str) -> BoolArray:
-    """Return which samples stand alone: far from the median of their neighbours, which agree."""
-    if name == "command":
+    """Return which samples stand alone: far from the median of the ten around them, which agree.
+
+    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours.
+    """
+    if name == "command" or len(channel) < 2 * _AROUND:
         return np.zeros(len(channel), bool)
-    y = channel.y
-    padded = np.concatenate([y[2:0:-1], y, y[-2:-4:-1]])
-    window = np.lib.stride_tricks.sliding_window_view(padded, 5)
-    away = y - np.nanmedian(window, axis=1)
-    spread = 1.4826 * np.nanmedian(np.abs(away[np.isfinite(away)]))
-    neighbours = np.nanmax(window[:, [0, 1, 3, 4]], axis=1) - np.nanmin(window[:, [0, 1, 3, 4]], axis=1)
-    limit = np.maximum(_SPIKE * max(spread, 1e-300), 5.0 * neighbours)
-    found: BoolArray = np.isfinite(away) & (np.abs(away) > limit)
+    padded = np.pad(np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect")
+    around = np.delete(np.lib.stride_tricks.sliding_window_view(padded, _AROUND + 1), _AROUND // 2, axis=1)
+    middle = np.median(around, axis=1)
+    spread = np.partition(np.abs(around - middle[:, None]), _AROUND - 3, axis=1)[:, _AROUND - 3]
+    steps = np.abs(np.diff(channel.y))
+    least = float(np.nanmedian(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    found: BoolArray = np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least)
     return found
 
 

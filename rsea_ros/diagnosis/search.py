@@ -20,7 +20,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, linearised, solve
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import CLOCK, Unknown
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
@@ -31,6 +31,7 @@ _CLOSE = 1.1
 _FIT_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 MOST_CAUSES = 4
+DELAY = "command_delay.delay"
 
 Tell = Callable[[str, float], None]
 
@@ -84,7 +85,29 @@ def fitted(cases: Sequence[Case], problem: Problem, theta: FloatArray | None, pl
            iterations: int = _FIT_ITERATIONS) -> Model:  # fmt: skip
     """Fit a problem's unknowns on some blocks of the cases."""
     masked = replace(problem, cases=tuple(part(c, places) for c in cases))
-    return as_model(cases, solve(masked, theta, iterations=iterations))
+    solution = solve(masked, theta, iterations=iterations)
+    moved = with_common_clock_in_delay(solution)
+    if moved is not None:
+        again = solve(masked, moved, iterations=iterations)
+        solution = min(solution, again, key=lambda s: s.cost)
+    return as_model(cases, solution)
+
+
+def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
+    """Return theta with the clock error that all sensors share turned into delay of the command, as it may be.
+
+    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
+    rest in the clocks. None for a model without a delay.
+    """
+    names = [u.name for u in solution.problem.unknowns]
+    clocks = [i for i, n in enumerate(names) if n.startswith(CLOCK + ".")]
+    if DELAY not in names or not clocks:
+        return None
+    theta = solution.theta.copy()
+    common = float(np.mean(theta[clocks]))
+    theta[clocks] -= common
+    theta[names.index(DELAY)] -= common
+    return theta
 
 
 def as_model(cases: Sequence[Case], solution: Solution) -> Model:

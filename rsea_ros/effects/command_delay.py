@@ -7,7 +7,7 @@ is the exact mean over the step of the held command.
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, STEP, Port
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 LENGTH = 1023
 """Commands kept: 60 ms at a step of 60 us."""
@@ -24,7 +24,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     x[1 + now] = s[COMMAND]
     newer, older = x[1 + (now - whole) % LENGTH], x[1 + (now - whole - 1) % LENGTH]
     x[0] = (now + 1) % LENGTH
-    s[COMMAND] = newer + part * (older - newer)
+    s[COMMAND], s[CURRENT] = newer + part * (older - newer), newer
 
 
 EFFECT = Effect(

@@ -8,7 +8,7 @@ The torque of a step is the exact mean of T_m over it for a command that is held
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, STEP, Port
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 
 @compiled
@@ -19,7 +19,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     command, behind = s[COMMAND], x[0] - s[COMMAND]
     u = s[STEP] / p[0]
     s[COMMAND] = command - behind * math.expm1(-u) / u
-    x[0] = command + behind * math.exp(-u)
+    x[0] = s[CURRENT] = command + behind * math.exp(-u)
 
 
 EFFECT = Effect(

@@ -12,7 +12,8 @@ from enum import IntEnum
 class Port(IntEnum):
     """Where in the chain an effect acts; the step calls the ports in this order.
 
-    COMMAND: once a step, changes s[COMMAND] before the motor's current is measured.
+    COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], what the measured current
+        shows at the end of the step.
     MOTOR: once a step, changes s[COMMAND] after that: what the measured current does not show.
     GEAR: at every evaluation of the torques, with the signals at the middle of the step; adds to
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
@@ -35,7 +36,7 @@ STEP = 1  # s, length of the step
 DURATION = 2  # s, length of the record; a plant that runs on takes its `duration`
 COMMIT = 3  # 1 when the step is done: only then may a SPRING effect change its own states x
 COMMAND = 4  # N m, held over the step
-CURRENT = 5  # N m, motor torque that the measured current shows
+CURRENT = 5  # N m, motor torque that the measured current shows at the end of the step
 REFERENCE = 6  # rad, of a controller in the loop
 K_S = 7  # N m/rad
 B_S = 8  # N m s/rad

@@ -6,13 +6,14 @@ T_m = min(max(T_command, -limit), limit)
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, Port
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Clip the command."""
     s[COMMAND] = min(max(s[COMMAND], -p[0]), p[0])
+    s[CURRENT] = min(max(s[CURRENT], -p[0]), p[0])
 
 
 EFFECT = Effect(

@@ -121,11 +121,10 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
     free, end, middle = np.empty(n), np.empty(n), np.empty(n)
     s_at, p_at, own_at = s.ctypes.data, calls.p.ctypes.data, own.ctypes.data
     for k in range(len(command)):
-        s[st.TIME], s[st.COMMAND] = start + k * h, command[k]
+        s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
         if len(reference) > 0:
             s[st.REFERENCE] = reference[k]
         call_port(_COMMAND, calls, s_at, p_at, own_at)
-        s[st.CURRENT] = s[st.COMMAND]
         call_port(_MOTOR, calls, s_at, p_at, own_at)
         for i in range(n):
             free[i] = end[i] = linear.g[i, 0] * s[st.COMMAND] + _dot(linear.phi[i], x)
