@@ -1,0 +1,79 @@
+"""PacketHandler of the SDK with its wrong parts replaced, so that its transactions can be used.
+
+txPacket of dynamixel-sdk 4.1.0 sends FF FF FD unstuffed, removeStuffing loses bytes, and rxPacket spins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dynamixel_sdk import (
+    COMM_RX_CORRUPT,
+    COMM_RX_TIMEOUT,
+    COMM_SUCCESS,
+    COMM_TX_ERROR,
+    COMM_TX_FAIL,
+    Protocol2PacketHandler,
+)
+
+from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, stuffed, unstuffed
+from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.receiver import Receiver
+
+
+class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
+    """Protocol 2.0; `receiver.rejected` counts what came in damaged."""
+
+    def __init__(self) -> None:
+        self.receiver = Receiver()
+        self._frames: list[bytes] = []
+
+    def updateCRC(self, crc_accum: int, data_blk_ptr: Sequence[int], data_blk_size: int) -> int:
+        """Return the CRC of the first bytes of a block."""
+        return crc16(data_blk_ptr[:data_blk_size], crc_accum)
+
+    def addStuffing(self, packet: Sequence[int]) -> list[int]:
+        """Return a packet with INST and parameters stuffed and LEN put right; the CRC is not."""
+        return _with_payload(packet, stuffed(_payload(packet)))
+
+    def removeStuffing(self, packet: Sequence[int]) -> list[int]:
+        """Return a packet with INST and parameters as they were before stuffing.
+
+        Raises ValueError for one that no stuffing makes.
+        """
+        plain = unstuffed(_payload(packet))
+        if plain is None:
+            raise ValueError(f"packet {bytes(packet).hex(' ')}: FF FF FD inside, expected FF FF FD FD")
+        return _with_payload(packet, plain)
+
+    def txPacket(self, port: Port, txpacket: Sequence[int]) -> int:
+        """Stuff, sign and send a packet; what has come in before is thrown away. Raises PortLost."""
+        data = frame(txpacket[4], _payload(txpacket))
+        if len(data) > LONGEST:
+            return int(COMM_TX_ERROR)
+        port.clearPort()
+        self.receiver.reset()
+        self._frames.clear()
+        sent = port.writePort(data)
+        return int(COMM_SUCCESS if sent == len(data) else COMM_TX_FAIL)
+
+    def rxPacket(self, port: Port, fast_option: bool) -> tuple[bytes, int]:
+        """Wait for the next status packet until the port's time is over. Raises PortLost."""
+        rejected = self.receiver.rejected.total()
+        while not self._frames:
+            data = port.receive()
+            self._frames += self.receiver.feed(data, raw=fast_option)
+            if not data and port.isPacketTimeout():
+                damaged = self.receiver.waiting or self.receiver.rejected.total() > rejected
+                return b"", int(COMM_RX_CORRUPT if damaged else COMM_RX_TIMEOUT)
+        return self._frames.pop(0), int(COMM_SUCCESS)
+
+
+def _payload(packet: Sequence[int]) -> bytes:
+    """Return INST and parameters of a packet by its LEN."""
+    return bytes(packet[OVERHEAD : OVERHEAD - 2 + packet[5] + (packet[6] << 8)])
+
+
+def _with_payload(packet: Sequence[int], payload: bytes) -> list[int]:
+    length = len(payload) + 2
+    return [*packet[:5], length & 0xFF, length >> 8, *payload, *packet[-2:]]

@@ -1,0 +1,113 @@
+"""The serial port: it waits instead of spinning, and a reply is late after the time that the wire needs."""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+
+import serial  # type: ignore[import-untyped]
+from dynamixel_sdk import PortHandler
+
+from rsea_ros.errors import DeviceError
+
+BAUD_RATES = (
+    9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000, 6_000_000, 10_500_000,
+)  # fmt: skip
+"""What the motors can do, bit/s."""
+BITS_PER_BYTE = 10
+
+
+class PortLost(DeviceError):
+    """The port is not there, or not any more."""
+
+
+class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
+    """PortHandler of the SDK with a blocking wait and a time-out from baud rate, size and return delay.
+
+    latency: what USB adapter and scheduler may add to the time on the wire, s.
+    return_delay: pause of the motor before it answers, s.
+    """
+
+    def __init__(self, path: str, baud: int, latency: float) -> None:
+        super().__init__(path)
+        self.baudrate = baud
+        self.latency, self.return_delay = latency, 500e-6
+        self._deadline = 0.0
+        self.descriptor = -1
+
+    def open(self) -> None:
+        """Open the port for this process alone. Raises PortLost."""
+        try:
+            self.ser = serial.Serial(self.port_name, self.baudrate, timeout=0, exclusive=True)
+        except (OSError, ValueError) as error:
+            raise PortLost(f"port {self.port_name}: {error}, expected a serial port that is free") from None
+        self.is_open, self.is_using = True, False
+        self.descriptor = self.ser.fileno()
+        self.ser.reset_input_buffer()
+
+    def close(self) -> None:
+        """Let the port go."""
+        self.is_open, self.descriptor = False, -1
+        if self.ser is not None:
+            self.ser.close()
+
+    def getCFlagBaud(self, baudrate: int) -> int:
+        """Return the baud rate when the motors can do it, else -1."""
+        return baudrate if baudrate in BAUD_RATES else -1
+
+    def setBaudRate(self, baudrate: int) -> bool:
+        """Open the port anew at another rate; tell whether it is one of BAUD_RATES."""
+        if self.getCFlagBaud(baudrate) < 0:
+            return False
+        self.close()
+        self.baudrate = baudrate
+        self.open()
+        return True
+
+    def writePort(self, packet: bytes) -> int:
+        """Send bytes; return how many went out. Raises PortLost."""
+        try:
+            return os.write(self.descriptor, packet)
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise PortLost(f"port {self.port_name}: {error.strerror} while sending") from None
+
+    def clearPort(self) -> None:
+        """Throw away what has come in."""
+        while self._take():
+            pass
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Begin to wait for a reply of so many bytes, after a request of at most 16."""
+        on_wire = (packet_length + 16) * BITS_PER_BYTE / self.baudrate
+        self.setPacketTimeoutMillis(1e3 * (on_wire + self.return_delay + self.latency))
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        """Begin to wait."""
+        self._deadline = time.monotonic() + 1e-3 * msec
+
+    def isPacketTimeout(self) -> bool:
+        """Tell whether the wait is over."""
+        return time.monotonic() > self._deadline
+
+    def receive(self) -> bytes:
+        """Return what comes before the deadline, empty after it. Raises PortLost."""
+        wait = max(0.0, self._deadline - time.monotonic())
+        try:
+            ready, _, _ = select.select((self.descriptor,), (), (), wait)
+        except (OSError, ValueError) as error:
+            raise PortLost(f"port {self.port_name}: {error} while waiting for a reply") from None
+        return self._take() if ready else b""
+
+    def _take(self) -> bytes:
+        try:
+            data = os.read(self.descriptor, 4096)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise PortLost(f"port {self.port_name}: {error.strerror} while receiving") from None
+        if not data:
+            return b""
+        return data
