@@ -110,7 +110,7 @@ def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], 
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
-        statements=what_is_not_told(first.solution.problem.unknowns, first.solution.theta, confidence),
+        statements=what_is_not_told(first.solution.problem.unknowns, confidence),
     )
 
 
