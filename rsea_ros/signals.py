@@ -48,7 +48,9 @@ class Channel:
 
     def __post_init__(self) -> None:
         if self.t.shape != self.y.shape or self.t.ndim != 1:
-            raise ChannelError(f"stamps of shape {self.t.shape} for values of shape {self.y.shape}, expected equal (n,)")
+            raise ChannelError(
+                f"stamps of shape {self.t.shape} for values of shape {self.y.shape}, expected equal (n,)"
+            )
         for array in (self.t, self.y):
             array.setflags(write=False)
 
@@ -82,7 +84,9 @@ class Record:
     def __post_init__(self) -> None:
         unknown = set(self.channels) - set(UNITS)
         if unknown:
-            raise ChannelError(f"{self.source}: unknown channel {sorted(unknown)[0]!r}, expected one of {', '.join(UNITS)}")
+            raise ChannelError(
+                f"{self.source}: unknown channel {sorted(unknown)[0]!r}, expected one of {', '.join(UNITS)}"
+            )
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
 
     def __contains__(self, name: str) -> bool:

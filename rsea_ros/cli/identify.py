@@ -4,20 +4,35 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from msg_adapters import read_record
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 
+if TYPE_CHECKING:
+    from rsea_ros.identification.result import Identification
+
 HELP = "frequency response and parameters with confidence from recorded runs"
+NARROWEST = 100
+"""Columns of the table where no terminal says how many it has."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3")
-    parser.add_argument("--rig", default="paper_high_impedance", help="rig file, or the name of one in config/rigs (default %(default)s)")
-    parser.add_argument("--out", help="directory for identification.json, model.yaml, report.html (default out/identify-BAG)")
-    parser.add_argument("--json", action="store_true", help="print identification.json to stdout and nothing else")
+    parser.add_argument(
+        "--rig",
+        default="paper_high_impedance",
+        help="rig file, or the name of one in config/rigs (default %(default)s)",
+    )
+    parser.add_argument(
+        "--out",
+        help="directory for identification.json, model.yaml, report.html (default out/identify-BAG)",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print identification.json to stdout and nothing else"
+    )
     add_topic_options(parser)
 
 
@@ -35,20 +50,23 @@ def run(args: argparse.Namespace) -> int:
         report = write_results(result, args.out or Path("out") / f"identify-{Path(args.bags[0]).stem}")
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
-        return 0
-    _print(result, report)
+    else:
+        _print(result, report)
     return 0
 
 
-def _print(result, report: Path) -> None:  # type: ignore[no-untyped-def]
+def _print(result: Identification, report: Path) -> None:
+    """Print the table, and a line for each thing to know beside it."""
     from rich.console import Console
 
+    from rsea_ros.report.statics_words import statics_sentences
     from rsea_ros.report.terminal import terminal_table
 
     console = Console()
+    if not console.is_terminal:
+        console = Console(width=NARROWEST)
     console.print(terminal_table(result, None))
-    for sentence in (*result.statements, *result.notes):
-        console.print(sentence, highlight=False)
-    console.print(f"report: {report}", highlight=False, soft_wrap=True)
-
-
+    found = statics_sentences(result.statics) if result.statics else ()
+    for sentence in (*found, *result.statements, *result.notes):
+        print(sentence)
+    print(f"report: {report}")

@@ -23,7 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("model", help="model.yaml, or any rig")
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
-    parser.add_argument("--out", metavar="CSV", help="predicted channels: t in s, then a column a channel in SI units")
+    parser.add_argument(
+        "--out", metavar="CSV", help="predicted channels: t in s, then a column a channel in SI units"
+    )
     parser.add_argument("--json", action="store_true", help="JSON is what this verb prints anyway")
     add_topic_options(parser)
 

@@ -23,19 +23,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("rig", help="rig or model.yaml, or the name of one in config/rigs")
     parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
-    parser.add_argument("--effect", action="append", default=[], metavar="NAME:param=value,…",
-                        help="switch an effect on, SI units; without parameters its typical size. Effects: " + ", ".join(catalogue()))  # fmt: skip
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME:param=value,…",
+        help="switch an effect on, SI units; without parameters its typical size. Effects: "
+        + ", ".join(catalogue()),
+    )
     default = Settings()
-    parser.add_argument("--excitation", default="chirp", choices=sorted(KINDS), help="kind of the command (default %(default)s)")
+    parser.add_argument(
+        "--excitation",
+        default="chirp",
+        choices=sorted(KINDS),
+        help="kind of the command (default %(default)s)",
+    )
     parser.add_argument("--duration", type=float, default=60.0, help="s (default %(default)s)")
     parser.add_argument("--rate", type=float, default=default.rate, help="Hz (default %(default)s)")
-    parser.add_argument("--amplitude", type=float, default=default.amplitude, help="N m (default %(default)s)")
-    parser.add_argument("--deviation", type=float, default=default.noise, help="N m, standard deviation of the noise on a chirp (default %(default)s)")
-    parser.add_argument("--low", type=float, default=default.low, help="Hz, lowest frequency (default %(default)s)")
-    parser.add_argument("--high", type=float, default=default.high, help="Hz, highest frequency (default %(default)s)")
-    parser.add_argument("--period", type=float, default=default.period, help="s, of multisine and steps (default %(default)s)")
+    parser.add_argument(
+        "--amplitude", type=float, default=default.amplitude, help="N m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--deviation",
+        type=float,
+        default=default.noise,
+        help="N m, standard deviation of noise on a chirp (default %(default)s)",
+    )
+    parser.add_argument(
+        "--low", type=float, default=default.low, help="Hz, lowest frequency (default %(default)s)"
+    )
+    parser.add_argument(
+        "--high", type=float, default=default.high, help="Hz, highest frequency (default %(default)s)"
+    )
+    parser.add_argument(
+        "--period", type=float, default=default.period, help="s, of multisine and steps (default %(default)s)"
+    )
     parser.add_argument("--limit", type=float, default=100.0, help="N m, refused above (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of command and sensor noise (default %(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="of command and sensor noise (default %(default)s)"
+    )
     parser.add_argument("--no-noise", action="store_true", help="perfect sensors")
     add_topic_options(parser)
 
@@ -44,14 +70,25 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the bag."""
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
-    settings = Settings(rate=args.rate, duration=args.duration, amplitude=args.amplitude, noise=args.deviation,
-                        low=args.low, high=args.high, period=args.period, seed=args.seed)  # fmt: skip
+    settings = Settings(
+        rate=args.rate,
+        duration=args.duration,
+        amplitude=args.amplitude,
+        noise=args.deviation,
+        low=args.low,
+        high=args.high,
+        period=args.period,
+        seed=args.seed,
+    )
     values = excitation(args.excitation, settings)
     check_limits(values, args.limit, args.rate)
     command = Channel(np.arange(len(values)) / args.rate, values)
     record = synthesize(rig, command, seed=args.seed + 1, noise=not args.no_noise)
     write_record(record, args.out, topic_map(args))
-    print(f"{args.out}: {args.duration:g} s at {args.rate:g} Hz of {rig.name}" + "".join(f", {e.name}" for e in rig.effects))
+    print(
+        f"{args.out}: {args.duration:g} s at {args.rate:g} Hz of {rig.name}"
+        + "".join(f", {e.name}" for e in rig.effects)
+    )
     return 0
 
 
@@ -61,10 +98,12 @@ def parse_effect(text: str) -> EffectSetting:
     effect = effect_named(name)
     values = dict(effect.typical)
     for item in filter(None, rest.split(",")):
-        key, equals, value = item.partition("=")
+        key, _, value = item.partition("=")
         try:
             values[key.strip()] = float(value)
         except ValueError:
-            raise ParameterError(f"--effect {text}: {key.strip()} = {value!r}, expected NAME:param=value with a number in SI") from None
+            raise ParameterError(
+                f"--effect {text}: {key.strip()} = {value!r}, expected NAME:param=value with a number in SI"
+            ) from None
     effect.vector(values)
     return EffectSetting(name, values)

@@ -11,22 +11,38 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import CLOCK, Unknown
 from rsea_ros.signals import FloatArray
+
+IntArray = npt.NDArray[np.int64]
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
 _Z95 = 1.959964
-_TOLD = 0.5
-"""Below this share the prior, not the data, decides a parameter."""
+_NULL = 1e-9
+"""Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
+_INVOLVED = 0.2
+"""A parameter moves along with an untold direction when it moves at least so much of the largest."""
+_ALIKE = 0.8
+"""Values share a factor when the one that moves least moves so much of the one that moves most."""
+_MEASURE = "Measure it apart, or excite it more."
+_REMEDY = {
+    "spring.damping": "Excitation above the resonance, or F/T sensor and encoder together, would tell it.",
+    "housing_end.damping": "A free swing of the housing would tell it.",
+}
 
 
 @dataclass(frozen=True)
 class Confidence:
-    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share that the data told."""
+    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share that the data told.
+
+    told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
+    unknowns free: 0 where only a ratio with others is told. information: J'J, shape (n, n).
+    """
 
     covariance: FloatArray
     told: FloatArray
@@ -42,26 +58,33 @@ class Confidence:
 
 def confidence_of(solution: Solution) -> Confidence:
     """Return the doubt that is left after a fit."""
-    doubt = np.array([u.doubt for u in solution.problem.unknowns])
+    doubt = np.array([u.reach for u in solution.problem.unknowns])
     prior = np.diag(1.0 / doubt**2)
     information = solution.jacobian.T @ solution.jacobian
     inverse = np.linalg.pinv(information + prior, hermitian=True)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    told = 1.0 - np.diag(covariance) / doubt**2
-    return Confidence(covariance, np.clip(told, 0.0, 1.0), information)
+    return Confidence(covariance, _told(information, doubt), information)
+
+
+def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:
+    """Return by unknown the share of what is known of it that the data alone brought, 0 … 1."""
+    scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
+    told: FloatArray = 1.0 / (1.0 + np.diag(np.linalg.inv(scaled)))
+    return told
 
 
 def _block_scores(solution: Solution) -> FloatArray:
     blocks = sample_blocks(solution.problem, BLOCK)
     scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
-    np.add.at(scores, blocks, solution.jacobian * solution.residual[:, None])
+    for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
+        column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
     result: FloatArray = scores.T @ scores
     return result
 
 
-def sample_blocks(problem: Problem, length: float) -> FloatArray:
+def sample_blocks(problem: Problem, length: float) -> IntArray:
     """Return for every residual the number of the block of `length` s that it lies in, all cases in a row."""
     parts, first = [], 0
     for case in problem.cases:
@@ -76,23 +99,27 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - _Z95 * sd), unknown.outer(coordinate + _Z95 * sd)
 
 
-def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[str, ...]:
+def what_is_not_told(
+    unknowns: Sequence[Unknown], theta: FloatArray, confidence: Confidence
+) -> tuple[str, ...]:
     """Return plain sentences on what the data cannot tell, and what would make it so.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
     prior's: a common factor of several values cannot be told, only their ratios, or a single value not.
     """
-    index = [i for i, u in enumerate(unknowns) if np.isfinite(u.doubt) and not u.name.startswith("clock.")]
+    asked = [i for i, u in enumerate(unknowns) if not u.name.startswith(CLOCK)]
+    stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
+    index = [i for i in asked if i not in stuck]
+    sentences = [_bound_sentence(unknowns[i], float(theta[i])) for i in stuck]
     if not index:
-        return ()
-    doubt = np.array([unknowns[i].doubt for i in index])
-    scaled = _without_the_rest(confidence.information, index) * np.outer(doubt, doubt)
+        return tuple(sentences)
+    reach, scale = (np.array([getattr(unknowns[i], key) for i in index]) for key in ("reach", "scale"))
+    scaled = _without_the_rest(confidence.information, index) * np.outer(reach, reach)
     values, vectors = np.linalg.eigh(scaled)
-    sentences = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value < 1.0:
-            involved = [unknowns[index[k]].name for k in range(len(index)) if abs(vector[k]) > 0.25]
-            sentences.append(_sentence(involved))
+    for vector in vectors[:, values < 1.0].T:
+        moved = np.abs(vector * reach / scale)
+        involved = [unknowns[index[k]] for k in np.flatnonzero(moved > _INVOLVED * moved.max())]
+        sentences.append(_sentence(involved, moved[moved > _INVOLVED * moved.max()]))
     return tuple(sentences)
 
 
@@ -102,22 +129,31 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
     own, cross = information[np.ix_(index, index)], information[np.ix_(index, rest)]
     if not rest:
         return own
-    result: FloatArray = own - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
+    result: FloatArray = (
+        own - cross @ np.linalg.pinv(information[np.ix_(rest, rest)], hermitian=True) @ cross.T
+    )
     return result
 
 
-def _sentence(names: Sequence[str]) -> str:
-    if len(names) == 1:
-        return f"{names[0]} is not identifiable from these data: what is known of it is the rig's prior. {_REMEDY.get(names[0], _MEASURE)}"
-    listed = ", ".join(names[:-1]) + " and " + names[-1]
+def _bound_sentence(unknown: Unknown, coordinate: float) -> str:
     return (
-        f"Only ratios of {listed} are identifiable from these data: a common factor is taken from the rig. "
-        "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+        f"{unknown.name} ran to its bound, {unknown.outer(coordinate):.3g} {unknown.unit}: "
+        "these data show nothing of it, or something that the rig lacks stands in for it."
     )
 
 
-_MEASURE = "Measure it apart, or excite it more."
-_REMEDY = {
-    "spring.damping": "More excitation above the resonance, or the F/T sensor together with the encoder, would tell it.",
-    "housing_end.damping": "A free swing of the housing would tell it.",
-}
+def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
+    """Return what cannot be told of unknowns that move together. moved: how far each, in its scale."""
+    names = [u.name for u in unknowns]
+    if len(names) == 1:
+        prior = np.isfinite(unknowns[0].doubt)
+        source = "what is known of it is the rig's prior" if prior else "they do not show it"
+        remedy = _REMEDY.get(names[0], _MEASURE)
+        return f"{names[0]} is not identifiable from these data: {source}. {remedy}"
+    listed = ", ".join(names[:-1]) + " and " + names[-1]
+    if all(u.logarithmic for u in unknowns) and moved.min() > _ALIKE * moved.max():
+        return (
+            f"Only ratios of {listed} are identifiable from these data: a common factor is taken from the "
+            "rig. A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+        )
+    return f"{listed} are identifiable from these data only together, not each. {_MEASURE}"

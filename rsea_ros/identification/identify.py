@@ -11,11 +11,11 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
-from rsea_ros.identification.noise import noise_floor
 from rsea_ros.identification.problem import Case, Problem, case_from, weighted
 from rsea_ros.identification.responses import responses_of
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
 from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
+from rsea_ros.identification.statics import statics_of
 from rsea_ros.identification.unknowns import Unknown, apply, clocks, unknowns_of_effect, unknowns_of_rig
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
@@ -41,7 +41,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     with ThreadPoolExecutor(2) as pool:
         solution = fit(cases, rig, run=in_pool(pool))
     report("frequency responses", 0.7)
-    result = _result(solution, records)
+    result = _result(solution, records, cases)
     report("done", 1.0)
     return result
 
@@ -52,12 +52,16 @@ def check_usable(record: Record) -> None:
         bad = ~(np.isfinite(channel.y) & np.isfinite(channel.t))
         if bad.any():
             k = int(np.argmax(bad))
-            raise IdentificationError(f"{record.source}: {name}[{k}] at {channel.t[k]:.4f} s = {channel.y[k]}, expected a finite value")
+            raise IdentificationError(
+                f"{record.source}: {name}[{k}] at {channel.t[k]:.4f} s = {channel.y[k]}, "
+                "expected a finite value"
+            )
         back = np.diff(channel.t) <= 0.0
         if back.any():
             k = int(np.argmax(back)) + 1
             raise IdentificationError(
-                f"{record.source}: {name} stamp {k} = {channel.t[k]:.6f} s after {channel.t[k - 1]:.6f} s, expected rising stamps"
+                f"{record.source}: {name} stamp {k} = {channel.t[k]:.6f} s after {channel.t[k - 1]:.6f} s, "
+                "expected rising stamps"
             )
 
 
@@ -83,7 +87,11 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
     effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
-    return (*unknowns_of_rig(rig), *(u for group in effects for u in group), *(clocks(channels) if not is_inverse(rig) else ()))
+    return (
+        *unknowns_of_rig(rig),
+        *(u for group in effects for u in group),
+        *(clocks(channels) if not is_inverse(rig) else ()),
+    )
 
 
 def misfit_ratios(solution: Solution) -> dict[str, float]:
@@ -100,7 +108,8 @@ def _reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
     return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})
 
 
-def _result(solution: Solution, records: Sequence[Record]) -> Identification:
+def _result(solution: Solution, records: Sequence[Record], cases: Sequence[Case]) -> Identification:
+    """Gather the result. cases: as they were before any weight followed a misfit."""
     problem = solution.problem
     confidence = confidence_of(solution)
     outputs = problem.outputs(solution.theta)
@@ -115,24 +124,29 @@ def _result(solution: Solution, records: Sequence[Record]) -> Identification:
         parameters=parameters_of(solution, confidence),
         correlation=confidence.correlation,
         residual_rms={n: _rms(e) for n, (e, _) in errors.items()},
-        noise_rms={n: float(np.mean([noise_floor(r, n) for r in records if n in r])) for n in errors},
+        noise_rms={n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in errors},
         fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
         responses=responses,
         models=models,
         overlays=overlays_of(problem.cases[0], outputs[0]),
-        statements=what_is_not_told(problem.unknowns, confidence),
+        statics=statics_of(records[0], rig),
+        statements=what_is_not_told(problem.unknowns, solution.theta, confidence),
         notes=tuple(note for r in records for note in r.notes),
     )
 
 
-def errors_by_channel(problem: Problem, outputs: Sequence[Mapping[str, FloatArray]]) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return by channel the error (simulated - measured) and the measured values of the samples that count."""
+def errors_by_channel(
+    problem: Problem, outputs: Sequence[Mapping[str, FloatArray]]
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return by channel the error (simulated - measured) and the measured values, of samples that count."""
     parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     for case, out in zip(problem.cases, outputs, strict=True):
         for n in problem.present(case):
             keep, y = case.mask[n], case.measured[n]
             parts.setdefault(n, []).append(((out[n] - y)[keep], y[keep]))
-    return {n: (np.concatenate([e for e, _ in p]), np.concatenate([y for _, y in p])) for n, p in parts.items()}
+    return {
+        n: (np.concatenate([e for e, _ in p]), np.concatenate([y for _, y in p])) for n, p in parts.items()
+    }
 
 
 def fit_percent(error: FloatArray, measured: FloatArray) -> float:
@@ -154,7 +168,9 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
             spread=u.doubt,
             told_by_data=float(told),
         )
-        for u, theta, s, told in zip(solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True)
+        for u, theta, s, told in zip(
+            solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True
+        )
     )
 
 
@@ -164,7 +180,9 @@ def identified_rig(solution: Solution, confidence: Confidence) -> Rig:
     quantities = dict(rig.quantities)
     for estimate in parameters_of(solution, confidence):
         if estimate.name in quantities:
-            quantities[estimate.name] = replace(quantities[estimate.name], ci95=estimate.ci95, source="identified")
+            quantities[estimate.name] = replace(
+                quantities[estimate.name], ci95=estimate.ci95, source="identified"
+            )
     return replace(rig, quantities=quantities)
 
 

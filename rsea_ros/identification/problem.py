@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.noise import noise_floor
+from rsea_ros.identification.noise import noise_floor, residual_floor
 from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive, drive_from
-from rsea_ros.model.inverse import Motion, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drives
 from rsea_ros.model.step import OUTPUTS
@@ -27,7 +27,10 @@ SETTLE = 0.3
 
 @dataclass(frozen=True)
 class Case:
-    """One record ready to be simulated: drive, measured channels, their noise, and which samples count."""
+    """One record ready to be simulated: drive, measured channels, their noise, and which samples count.
+
+    floating: channels whose zero is unknown; they are compared without their means.
+    """
 
     drive: Drive | Motion
     t: Mapping[str, FloatArray]
@@ -35,12 +38,11 @@ class Case:
     noise: Mapping[str, float]
     mask: Mapping[str, BoolArray]
     source: str = ""
+    floating: frozenset[str] = frozenset()
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
-        both = {n: m & mask[n] for n, m in self.mask.items()}
-        return Case(self.drive, self.t, self.measured, self.noise, both, self.source)
-
+        return replace(self, mask={n: m & mask[n] for n, m in self.mask.items()})
 
     @property
     def start(self) -> float:
@@ -50,7 +52,8 @@ class Case:
     @property
     def duration(self) -> float:
         """Length of the record, s."""
-        return self.drive.duration if isinstance(self.drive, Drive) else float(self.drive.t[-1] - self.drive.t[0])
+        drive = self.drive
+        return drive.duration if isinstance(drive, Drive) else float(drive.t[-1] - drive.t[0])
 
 
 def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None = None) -> Case:
@@ -62,43 +65,67 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
         return _inverse_case(record)
     channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
     if not set(channels) - {"motor_torque"}:
-        raise IdentificationError(f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one")
+        raise IdentificationError(
+            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+        )
     in_loop = rig.controller is not None and "reference" in record
+    floating = frozenset(n for n in channels if rig.zero_unknown(n))
     quanta = {n: rig.sensors[n].quantum if n in rig.sensors else 0.0 for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SETTLE
     return Case(
-        drive=drive_from(record, closed_loop=in_loop),
+        drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
         noise=MappingProxyType({n: noise_floor(record, n, quanta[n]) for n in channels}),
-        mask=MappingProxyType({n: good[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}),
+        mask=MappingProxyType(
+            {n: good[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
+        ),
         source=record.source,
+        floating=floating,
     )
 
 
 def _inverse_case(record: Record) -> Case:
-    """Make a record of a drive without a spring ready: its torque against the one that its motion takes."""
-    motion = motion_from(record)
-    residual = motion.torque - signal.savgol_filter(motion.torque, 2 * int(0.05 * record["position"].rate) + 1, 3)
+    """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
+
+    Noise: what the filter lets through of the white noise that the torque has at the top of its band.
+    """
+    motion, torque = motion_from(record), acted(record)
+    noise = residual_floor(torque.y) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     edges = (motion.t < motion.t[0] + SETTLE) | (motion.t > motion.t[-1] - SETTLE)
     return Case(
         drive=motion,
         t={"motor_torque": motion.t},
         measured={"motor_torque": motion.torque},
-        noise={"motor_torque": max(float(np.std(residual)), 1e-9)},
+        noise={"motor_torque": max(noise, 1e-6 * float(np.std(torque.y)), 1e-300)},
         mask={"motor_torque": ~edges},
         source=record.source,
     )
 
 
-def simulated(cases: Sequence[Case], rig: Rig, offsets: Mapping[str, float], *, ride: bool = False) -> list[dict[str, FloatArray]]:  # fmt: skip
-    """Return the simulated channels of cases, sensors read `offsets` seconds later than stamped."""
+def simulated(
+    cases: Sequence[Case], rig: Rig, offsets: Mapping[str, float], *, ride: bool = False
+) -> list[dict[str, FloatArray]]:
+    """Return the simulated channels of cases, sensors read `offsets` seconds later than stamped.
+
+    A channel whose zero is unknown comes with the measured mean.
+    """
     drives = [_shifted(c.drive, offsets) for c in cases if isinstance(c.drive, Drive)]
     simulations = iter(simulate_drives(rig, drives, ride=ride))
     return [
-        {"motor_torque": inverse_torque(rig, c.drive)} if isinstance(c.drive, Motion) else next(simulations) for c in cases
+        {"motor_torque": inverse_torque(rig, c.drive)}
+        if isinstance(c.drive, Motion)
+        else _on_measured_zero(c, next(simulations))
+        for c in cases
     ]
+
+
+def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    for n in case.floating:
+        keep = case.mask[n]
+        outputs[n] = outputs[n] + float(np.mean((case.measured[n] - outputs[n])[keep]))
+    return outputs
 
 
 def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:

@@ -13,7 +13,7 @@ from rsea_ros.signals import FloatArray, Record
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[tuple[FrequencyResponse, ...], tuple[ComplexArray, ...]]:
-    """Return the measured responses of a record's sensors to the command, and the rig's linear model of each."""
+    """Return the measured responses of a record's sensors to the command, and the rig's model of each."""
     outputs = [n for n in ("ft", "position") if n in record and not (n == "ft" and rig.rigid_spring)]
     measured = tuple(estimate_response(record, n) for n in outputs)
     return measured, tuple(model_response(rig, r.output, r.frequency) for r in measured)
@@ -25,7 +25,9 @@ def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray
     row = _output_row(rig, output)
     s = 2j * np.pi * np.asarray(frequency)
     eye = np.eye(len(system.a))
-    solved = np.linalg.solve(s[:, None, None] * eye - system.a, np.broadcast_to(system.b[:, :1], (len(s), len(eye), 1)))
+    solved = np.linalg.solve(
+        s[:, None, None] * eye - system.a, np.broadcast_to(system.b[:, :1], (len(s), len(eye), 1))
+    )
     response: ComplexArray = np.einsum("j,kj->k", row, solved[:, :, 0])
     return response
 
@@ -33,5 +35,7 @@ def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray
 def _output_row(rig: Rig, output: str) -> FloatArray:
     m = state_space(rig).mechanics
     if output == "ft":
-        return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(rig, m, st.DEFLECTION_RATE)
+        return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(
+            rig, m, st.DEFLECTION_RATE
+        )
     return read_row(rig, m, {"position": st.OUTPUT_ANGLE, "velocity": st.OUTPUT_VELOCITY}[output])

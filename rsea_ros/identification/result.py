@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -69,7 +70,7 @@ class Identification:
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
     frequencies of each of `responses`. statements: plain sentences, one each on what is not identifiable
-    and what would make it so.
+    and what would make it so. statics: of slow ramps against a locked output.
     """
 
     rig: Rig
@@ -84,5 +85,6 @@ class Identification:
     responses: tuple[FrequencyResponse, ...] = ()
     models: tuple[ComplexArray, ...] = ()
     overlays: tuple[Overlay, ...] = ()
+    statics: Statics | None = None
     statements: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())

@@ -37,6 +37,7 @@ class Solution:
         return {u.name: u.outer(float(t)) for u, t in zip(self.problem.unknowns, self.theta, strict=True)}
 
 
+Outputs = list[dict[str, FloatArray]]
 Map = Callable[[Callable[[int], FloatArray], Sequence[int]], Sequence[FloatArray]]
 
 
@@ -50,15 +51,16 @@ def in_pool(pool: Executor) -> Map:
     return lambda function, items: list(pool.map(function, items))
 
 
-def jacobian(problem: Problem, theta: FloatArray, residual: FloatArray, outputs: list[dict[str, FloatArray]],
-             run: Map = serial) -> FloatArray:  # fmt: skip
+def jacobian(
+    problem: Problem, theta: FloatArray, residual: FloatArray, outputs: Outputs, run: Map = serial
+) -> FloatArray:
     """Return d residual / d theta, shape (m, n)."""
     return jacobian_columns(problem, theta, residual, range(len(theta)), outputs, run)
 
 
 def jacobian_columns(problem: Problem, theta: FloatArray, residual: FloatArray, which: Sequence[int],
-                     outputs: list[dict[str, FloatArray]] | None = None, run: Map = serial) -> FloatArray:  # fmt: skip
-    """Return some columns of d residual / d theta, shape (m, len(which)). outputs: at theta, for the clocks."""
+                     outputs: Outputs | None = None, run: Map = serial) -> FloatArray:  # fmt: skip
+    """Return columns of d residual / d theta, shape (m, len(which)). outputs: at theta, for the clocks."""
 
     def column(i: int) -> FloatArray:
         unknown = problem.unknowns[i]
@@ -68,23 +70,28 @@ def jacobian_columns(problem: Problem, theta: FloatArray, residual: FloatArray, 
         step = _DIFFERENCE * unknown.scale
         beyond = theta[i] + step > unknown.inner(unknown.high)
         moved[i] += -step if beyond else step
-        return (problem.residual(moved) - residual) / (moved[i] - theta[i])
+        slope: FloatArray = (problem.residual(moved) - residual) / (moved[i] - theta[i])
+        return slope
 
     return np.column_stack(list(run(column, which))) if len(which) else np.empty((len(residual), 0))
 
 
-def _clock_column(problem: Problem, outputs: list[dict[str, FloatArray]], channel: str) -> FloatArray:
+def _clock_column(problem: Problem, outputs: Outputs, channel: str) -> FloatArray:
     parts = []
     for case, out in zip(problem.cases, outputs, strict=True):
         for name in problem.present(case):
-            rate = np.gradient(out[name], case.t[name]) / case.noise[name] if name == channel else np.zeros(len(out[name]))
+            rate = (
+                np.gradient(out[name], case.t[name]) / case.noise[name]
+                if name == channel
+                else np.zeros(len(out[name]))
+            )
             parts.append(np.nan_to_num(rate[case.mask[name]]))
     return np.concatenate(parts)
 
 
 def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int = 25, run: Map = serial,
           gain: float = _SMALLEST_GAIN) -> Solution:  # fmt: skip
-    """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on for."""
+    """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on."""
     start = start_vector(problem.unknowns)
     theta = start.copy() if theta is None else theta.copy()
     weight = 1.0 / np.array([u.doubt for u in problem.unknowns])
@@ -127,11 +134,20 @@ def linearised(problem: Problem, theta: FloatArray) -> Solution:
     outputs = problem.outputs(theta)
     residual = problem.residual_of(outputs)
     prior = sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(theta, problem.unknowns, strict=True))
-    return Solution(problem, theta, residual, jacobian(problem, theta, residual, outputs), float(residual @ residual + prior))
+    return Solution(
+        problem,
+        theta,
+        residual,
+        jacobian(problem, theta, residual, outputs),
+        float(residual @ residual + prior),
+    )
 
 
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:
-    """Return theta - normal^-1 slope inside the bounds; what meets a bound stays there and the rest makes up for it."""
+    """Return theta - normal^-1 slope inside the bounds.
+
+    What meets a bound stays there and the rest makes up for it.
+    """
     low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
     step, free = np.zeros(len(theta)), np.ones(len(theta), bool)
     for _ in range(4):

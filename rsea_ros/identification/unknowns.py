@@ -36,6 +36,27 @@ class Unknown:
     doubt: float
     scale: float
 
+    @property
+    def reach(self) -> float:
+        """Return how far from its start it may lie when the data say nothing: doubt, else the bounds."""
+        if math.isfinite(self.doubt):
+            return self.doubt
+        wide = (
+            self.inner(self.high) - self.inner(self.low)
+            if self.low > 0.0 or not self.logarithmic
+            else math.inf
+        )
+        return wide if math.isfinite(wide) else 1e6 * self.scale
+
+    def at_bound(self, coordinate: float) -> bool:
+        """Tell whether the fit ended at a bound that is not where it vanishes."""
+        ends = [
+            self.inner(b)
+            for b in (self.low, self.high)
+            if math.isfinite(b) and (b > 0.0 or not self.logarithmic)
+        ]
+        return any(abs(coordinate - end) < 1e-6 * self.scale for end in ends if end != self.inner(self.start))
+
     def inner(self, value: float) -> float:
         """Return the coordinate that the fit works in."""
         return math.log(value) if self.logarithmic else value
@@ -58,9 +79,15 @@ def _rig_unknown(rig: Rig, name: str) -> Unknown:
     return Unknown(name, value, rig.unit(name), FIELDS[name].low, math.inf, False, math.inf, 1.0)
 
 
-def unknowns_of_effect(effect: Effect, start: Mapping[str, float], known: Collection[str] = ()) -> tuple[Unknown, ...]:
+def unknowns_of_effect(
+    effect: Effect, start: Mapping[str, float], known: Collection[str] = ()
+) -> tuple[Unknown, ...]:
     """Return the parameters of an effect from a start, without a prior; not those listed as known."""
-    return tuple(_effect_unknown(effect, p, start[p.name]) for p in effect.parameters if f"{effect.name}.{p.name}" not in known)
+    return tuple(
+        _effect_unknown(effect, p, start[p.name])
+        for p in effect.parameters
+        if f"{effect.name}.{p.name}" not in known
+    )
 
 
 def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
@@ -72,7 +99,9 @@ def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
 def clocks(channels: Iterable[str]) -> tuple[Unknown, ...]:
     """Return the clock errors of sensors, s: measured later than stamped when positive."""
     return tuple(
-        Unknown(f"{CLOCK}.{c}", 0.0, "s", -3.0 * CLOCK_DOUBT, 3.0 * CLOCK_DOUBT, False, CLOCK_DOUBT, CLOCK_DOUBT)
+        Unknown(
+            f"{CLOCK}.{c}", 0.0, "s", -3.0 * CLOCK_DOUBT, 3.0 * CLOCK_DOUBT, False, CLOCK_DOUBT, CLOCK_DOUBT
+        )
         for c in channels
         if c != "motor_torque"
     )

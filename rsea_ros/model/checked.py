@@ -23,7 +23,7 @@ def number(value: Any, name: str, unit: str) -> float:
 
 def switch(body: Mapping[str, Any], name: str) -> bool:
     """Return true or false of a group. Raises RigError when it is something else."""
-    value = body.get(name.split(".")[1], False)
+    value = body.get(name.split(".")[-1], False)
     if not isinstance(value, bool):
         raise RigError(f"{name} = {value!r}, expected true or false")
     return value

@@ -65,11 +65,14 @@ def steps_per_sample(period: float, longest: float = LONGEST_STEP) -> int:
     return max(1, math.ceil(period / longest - 1e-9))
 
 
-def drive_from(record: Record, *, refine: int = 1, closed_loop: bool = False) -> Drive:
+def drive_from(
+    record: Record, *, refine: int = 1, closed_loop: bool = False, from_rest: bool = False
+) -> Drive:
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
     the bag's command has beside the measured motor torque is then an outside disturbance.
+    from_rest: the bench began at zero, whatever the first samples say.
     """
     command = record["command"]
     if len(command) < 10:
@@ -95,7 +98,7 @@ def drive_from(record: Record, *, refine: int = 1, closed_loop: bool = False) ->
         impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=np.interp(ends, *_ty(record["position"])) if "position" in record else np.empty(0),
-        initial=_initial(record),
+        initial=(0.0, 0.0) if from_rest else _initial(record),
     )
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy import signal
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
@@ -23,11 +22,10 @@ from rsea_ros.model.equations import mechanics, train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
 from rsea_ros.model.step import call_port
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.signals import Channel, FloatArray, Record
 
 CUT_OFF = 20.0
 """Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""
-
 
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
@@ -55,17 +53,29 @@ def motion_from(record: Record) -> Motion:
     """Return the filtered motion and the torque that acted. Raises IdentificationError without a position."""
     if "position" not in record:
         raise IdentificationError(
-            f"{record.source}: no position channel, expected one: a rig without a spring is judged by its motion"
+            f"{record.source}: no position channel, expected one: "
+            "a rig without a spring is judged by its motion"
         )
     position = record["position"]
     period = 1.0 / position.rate
     t = np.arange(position.t[0], position.t[-1] + 0.5 * period, period)
-    numerator, denominator = signal.butter(4, min(CUT_OFF * 2.0 * period, 0.8))
-    q = signal.filtfilt(numerator, denominator, np.interp(t, position.t, position.y))
-    acted = record["motor_torque" if "motor_torque" in record else "command"]
-    torque = np.interp(t, acted.t, acted.y)
+    q = smoothed(np.interp(t, position.t, position.y), period)
+    torque = np.interp(t, acted(record).t, acted(record).y)
     v = np.gradient(q, period)
-    return Motion(t, q, v, np.gradient(v, period), signal.filtfilt(numerator, denominator, torque))
+    return Motion(t, q, v, np.gradient(v, period), smoothed(torque, period))
+
+
+def acted(record: Record) -> Channel:
+    """Return the motor torque that acted: measured, or as commanded where it was not."""
+    return record["motor_torque" if "motor_torque" in record else "command"]
+
+
+def smoothed(values: FloatArray, period: float) -> FloatArray:
+    """Return values behind the Butterworth filter, run both ways. period: s, between samples."""
+    from scipy.signal import butter, filtfilt  # 0.4 s that rigs with a spring need not wait for
+
+    result: FloatArray = filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values)
+    return result
 
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
@@ -81,8 +91,7 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     torque = torque + rig["spring_end.gravity"] * np.sin(motion.q)
     gains = motor_gain(machine.calls, machine.table, machine.own)
     added = _effect_torques(machine.calls, machine.table, machine.own, motion.q, motion.v, train_ratio(rig))
-    numerator, denominator = signal.butter(4, min(CUT_OFF * 2.0 * period, 0.8))
-    result: FloatArray = (torque - signal.filtfilt(numerator, denominator, added)) / gains
+    result: FloatArray = (torque - smoothed(added, period)) / gains
     return result
 
 
@@ -91,7 +100,7 @@ def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
     return {"motor_torque": inverse_torque(rig, motion)}
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def motor_gain(calls, s, own):  # type: ignore[no-untyped-def]
     """Return what the effects at the motor make of a torque of 1 N m."""
     s[st.COMMAND] = 1.0
@@ -99,7 +108,7 @@ def motor_gain(calls, s, own):  # type: ignore[no-untyped-def]
     return s[st.COMMAND]
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def _effect_torques(calls, s, own, q, v, ratio):  # type: ignore[no-untyped-def]
     """Return what the effects add at the gear along a motion, N m."""
     added = np.empty(len(q))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.rig import Rig
@@ -18,12 +19,12 @@ SETTLE = 0.3
 
 @dataclass(frozen=True)
 class Comparison:
-    """A channel at its stamps t (s): measured and predicted, in the channel's unit, and which samples count."""
+    """A channel at its stamps t (s): measured and predicted, in its unit, and which samples count."""
 
     t: FloatArray
     measured: FloatArray
     predicted: FloatArray
-    counts: np.ndarray
+    counts: npt.NDArray[np.bool_]
 
     @property
     def rms_error(self) -> float:
@@ -41,15 +42,24 @@ class Comparison:
 def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
     """Simulate a rig on the commands of a record and hold it against every channel that was measured.
 
-    A rig without a spring is judged by the torque that the measured motion takes (see inverse.py).
+    A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
+    whose zero is unknown by its changes.
     """
     if is_inverse(rig):
         motion = motion_from(record)
-        return {"motor_torque": _comparison(motion.t, motion.torque, inverse_torque(rig, motion), edges=True)}
-    return {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+        torque = inverse_torque(rig, motion)
+        return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
+    compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+    return {n: _on_measured_zero(c) if rig.zero_unknown(n) else c for n, c in compared.items()}
 
 
-def _comparison(t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False) -> Comparison:
+def _on_measured_zero(c: Comparison) -> Comparison:
+    return replace(c, predicted=c.predicted + float(np.mean((c.measured - c.predicted)[c.counts])))
+
+
+def _comparison(
+    t: FloatArray, measured: FloatArray, predicted: FloatArray, edges: bool = False
+) -> Comparison:
     last = t[-1] - SETTLE if edges else t[-1]
     counts = np.isfinite(measured) & np.isfinite(t) & (t >= t[0] + SETTLE) & (t <= last)
     return Comparison(t, measured, predicted, counts)

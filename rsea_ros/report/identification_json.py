@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
@@ -31,6 +32,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
              "from_hz": finite(r.frequency[0]), "to_hz": finite(r.frequency[-1])}
             for r in i.responses if len(r.frequency)
         ],
+        **({"statics": numbers(asdict(i.statics))} if i.statics else {}),
         "statements": list(i.statements),
         "notes": list(i.notes),
     }  # fmt: skip
@@ -47,9 +49,9 @@ def parameter(p: ParameterEstimate) -> dict[str, Any]:
     }
 
 
-def numbers(values: Mapping[str, float]) -> dict[str, float | None]:
+def numbers(values: Mapping[str, float | None]) -> dict[str, float | None]:
     """Return finite numbers by name, None for others."""
-    return {name: finite(value) for name, value in values.items()}
+    return {name: None if value is None else finite(value) for name, value in values.items()}
 
 
 def finite(value: float) -> float | None:

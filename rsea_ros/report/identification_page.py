@@ -13,6 +13,7 @@ from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragr
 from rsea_ros.report.palette import AFTER, MEASURED
 from rsea_ros.report.parameters import clock_sentence, parameter_table
 from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
+from rsea_ros.report.statics_words import statics_sentences
 from rsea_ros.signals import UNITS
 
 AT_NOISE = 1.1
@@ -26,6 +27,7 @@ def identification_report(identification: Identification) -> str:
         key_numbers(_keys(identification)),
         _next(identification),
         _parameters(identification),
+        _statics(identification),
     ]
     responses = identification.responses
     models = identification.models or (None,) * len(responses)
@@ -101,6 +103,13 @@ def _parameters(identification: Identification) -> str:
         f'<p class="caption under">{clock}</p>' if clock else "",
         caption="Grey: what the rig stated, with its 95 % range. Blue: the result and its 95 % interval.",
     )
+
+
+def _statics(identification: Identification) -> str:
+    if identification.statics is None:
+        return ""
+    sentences = statics_sentences(identification.statics)
+    return section("Slow ramps against the locked output", bullets(sentences))
 
 
 def _parameter_finding(identification: Identification) -> str:

@@ -29,8 +29,8 @@ def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
 
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
-    """Return what was found of the sensors' clocks, empty where none was asked for."""
-    clocks = [p for p in parameters if p.name.startswith(_CLOCK)]
+    """Return what was found of the sensors' clocks, empty where all may be true to their stamps."""
+    clocks = [p for p in parameters if p.name.startswith(_CLOCK) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
     if not clocks:
         return ""
     parts = [
@@ -45,7 +45,7 @@ def told(share: float) -> str:
     """Return in words how much of what is known of a parameter the data brought."""
     if share >= _TOLD:
         return "yes"
-    return "in part" if share >= _UNTOLD else "no: the rig's prior"
+    return "in part" if share >= _UNTOLD else "no"
 
 
 def _row(p: ParameterEstimate) -> str:
