@@ -42,7 +42,10 @@ class Confidence:
 
     told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
     unknowns free: 0 where only a ratio with others is told. information: J'J, shape (n, n).
+    theta: where the fit ended, shape (n,).
     """
+
+    theta: FloatArray
 
     covariance: FloatArray
     told: FloatArray
@@ -65,7 +68,7 @@ def confidence_of(solution: Solution) -> Confidence:
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    return Confidence(covariance, _told(information, doubt), information)
+    return Confidence(solution.theta, covariance, _told(information, doubt), information)
 
 
 def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:
@@ -99,14 +102,13 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - _Z95 * sd), unknown.outer(coordinate + _Z95 * sd)
 
 
-def what_is_not_told(
-    unknowns: Sequence[Unknown], theta: FloatArray, confidence: Confidence
-) -> tuple[str, ...]:
+def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[str, ...]:
     """Return plain sentences on what the data cannot tell, and what would make it so.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
     prior's: a common factor of several values cannot be told, only their ratios, or a single value not.
     """
+    theta = confidence.theta
     asked = [i for i, u in enumerate(unknowns) if not u.name.startswith(CLOCK)]
     stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
     index = [i for i in asked if i not in stuck]

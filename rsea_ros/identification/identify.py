@@ -130,7 +130,7 @@ def _result(solution: Solution, records: Sequence[Record], cases: Sequence[Case]
         models=models,
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        statements=what_is_not_told(problem.unknowns, solution.theta, confidence),
+        statements=what_is_not_told(problem.unknowns, confidence),
         notes=tuple(note for r in records for note in r.notes),
     )
 
