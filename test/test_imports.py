@@ -22,7 +22,7 @@ OWN = {
     "identification": BASE | {"effects", "model"},
     "diagnosis": BASE | {"effects", "model", "identification"},
     "control": BASE,
-    "design": BASE,
+    "design": BASE | {"model"},
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
@@ -49,7 +49,7 @@ FOREIGN = {
     "signals": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,
-    "report": {"numpy", "plotly", "rich"},
+    "report": {"numpy", "plotly", "rich", "schemdraw"},
     "nodes": {"numpy", "rclpy", "rich", "yaml"},
     "cli": {"numpy", "rich", "rclpy", "yaml"},
 }

@@ -59,6 +59,13 @@ def _circuit_and_band() -> Iterator[Finding]:
         "phase passes −10° at "
         f"{flat_band(eq_6, 3.0, 10.0):.1f} Hz.",
     )
+    yield Finding(
+        "inconsistent",
+        "2.2 and Fig. 7",
+        "With torque as voltage and velocity as current an infinite impedance is an open branch. The text "
+        "puts a "
+        "short circuit there, which would make T_d = 0; nodal analysis of the open one gives Eq. (4).",
+    )
     lag = math.degrees(math.atan(2 * math.pi * 80.0 * b_s / k_s))
     yield Finding(
         "silent",
