@@ -28,6 +28,7 @@ setup(
     python_requires=">=3.10",
     install_requires=["setuptools"],
     zip_safe=False,
+    package_data={"rsea_ros.report": ["*.css", "*.js"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (str(SHARE), ["package.xml"]),

@@ -30,7 +30,8 @@ OWN = {
     "nodes": CORE | {"hardware", "report", "msg_adapters"},
     "cli": CORE | {"hardware", "report", "msg_adapters", "nodes"},
     "__main__": {"cli"},
-    "__init__": set(),
+    "__init__": {"compiler_cache"},
+    "compiler_cache": set(),
 }
 """Layers of this project that a layer may import beside itself."""
 
