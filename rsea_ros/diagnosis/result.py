@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.identification.problem import BoolArray
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -92,6 +93,7 @@ class Diagnosis:
     """The verdict and all that it rests on. Dicts are by channel, in the channel's unit.
 
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
+    before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
     """
 
     verdict: Verdict
@@ -119,3 +121,4 @@ class Diagnosis:
     after: tuple[Overlay, ...] = ()
     spectra: tuple[Spectrum, ...] = ()
     statements: tuple[str, ...] = field(default=())
+    masked: Mapping[str, BoolArray] = field(default_factory=dict)

@@ -1,0 +1,90 @@
+"""`rsea diagnose`: what the simulation gets wrong, why, and how much knowing it gains."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import get_args
+
+from msg_adapters import TopicMap, read_record
+from msg_adapters.overlay import write_overlay
+from rsea_ros.cli._progress import progress
+from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.diagnosis.result import Diagnosis, Verdict
+from rsea_ros.errors import BagError, ParameterError
+from rsea_ros.signals import Record
+
+HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
+RIG = "paper_high_impedance"
+FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
+FOUND = 1
+"""Exit status when the verdict is one that --fail-on names."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add = parser.add_argument
+    verdicts = get_args(Verdict)
+    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
+    add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
+    add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
+    add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG)")
+    add("--json", action="store_true", help="print diagnosis.json to stdout and nothing else")
+    add(
+        "--fail-on",
+        nargs="+",
+        action="extend",
+        default=[],
+        choices=verdicts,
+        metavar="VERDICT",
+        help=f"exit status {FOUND} when the verdict is one of these: {', '.join(verdicts)}",
+    )
+    add_topic_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose and write the results."""
+    from rsea_ros.diagnosis.diagnose import diagnose
+    from rsea_ros.model.rig_file import load_rig
+    from rsea_ros.report.diagnosis_files import write_diagnosis
+
+    out = directory(args.out or Path("out") / f"diagnose-{Path(args.bags[0]).stem}")
+    rig, topics = load_rig(args.rig), topic_map(args)
+    with progress("diagnose") as tell:
+        tell("reading", 0.0)
+        records = [readable(bag, topics) for bag in args.bags]
+        holdout = readable(args.holdout, topics) if args.holdout else None
+        result = diagnose(records, rig, holdout, tell)
+        report = write_diagnosis(result, records[0], out, write_overlay)
+    if args.json:
+        print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
+    else:
+        _print(result, report)
+    return FOUND if result.verdict in args.fail_on else 0
+
+
+def directory(path: str | Path) -> Path:
+    """Return where the results go. Raises ParameterError, before any work, when it is a file."""
+    if Path(path).exists() and not Path(path).is_dir():
+        raise ParameterError(f"--out {path}: is a file, expected a directory or a new name")
+    return Path(path)
+
+
+def readable(bag: str, topics: TopicMap) -> Record:
+    """Return a run with all its faults, which are findings. Raises BagError for one without commands."""
+    record = read_record([bag], topics=topics, strict=False)
+    if "command" not in record:
+        wanted = topics.topic("torque_command")
+        raise BagError(f"{bag}: no torque on {wanted}, expected the commands that drove the run")
+    return record
+
+
+def _print(result: Diagnosis, report: Path) -> None:
+    from rich.console import Console
+
+    from rsea_ros.report.diagnosis_terminal import terminal_lines
+
+    console = Console()
+    for line in terminal_lines(result):
+        console.print(line, highlight=False, soft_wrap=True)
+    console.print(f"report      {report}", highlight=False, soft_wrap=True, markup=False)

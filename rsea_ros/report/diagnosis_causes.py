@@ -1,0 +1,98 @@
+"""The causes of a diagnosis as HTML: what was found with its evidence, and what was tried and rejected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Rejected
+from rsea_ros.report import diagnosis_words as say
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis_tables import table
+from rsea_ros.report.page import bullets, equation, paragraph, section
+from rsea_ros.report.palette import AFTER, GRID, MEASURED, QUIET, faint
+
+_WIDTH, _HEIGHT = 180.0, 18.0
+_GAIN = "Gain: share of the residual that is gone, on data that took no part in any fit or choice."
+
+
+def cause_section(cause: Cause) -> str:
+    """Return what a cause is, how large, and why it was accepted."""
+    share = f"{say.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
+    body = [_sizes(cause), equation(cause.equation) if cause.equation else "", paragraph(cause.evidence)]
+    body += [paragraph(_gain(cause)), _rivals(cause)]
+    return section(words.sentence(f"{say.effect(cause.name)}: {share}"), *body)
+
+
+def _gain(cause: Cause) -> str:
+    interval = say.percent_range(cause.gain_holdout_ci95)
+    train = say.percent(cause.gain_train)
+    return f"95 % interval of that gain: {interval}; on the data of the fit it is {train}."
+
+
+def _sizes(cause: Cause) -> str:
+    cells = []
+    for name, p in cause.parameters.items():
+        value, half, unit = say.estimate(p)
+        doubt = f" <small>± {half}</small>" if half else ""
+        what = f"{escape(name.replace('_', ' '))}, 95 % interval"
+        cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
+    return f'<div class="keys">{"".join(cells)}</div>'
+
+
+def _rivals(cause: Cause) -> str:
+    if not cause.confusable_with:
+        return ""
+    rivals = words.listed([say.effect(n) for n in cause.confusable_with])
+    return paragraph(f"These data do not tell it from {rivals}.")
+
+
+def tried_section(diagnosis: Diagnosis) -> str:
+    """Return all that was tried: causes and fitted rivals with their gains, then the others by reason."""
+    if not (diagnosis.causes or diagnosis.rejected):
+        return ""
+    fitted = sorted((r for r in diagnosis.rejected if was_fitted(r)), key=lambda r: -r.gain_holdout)
+    rows = [_row(c.name, c.gain_holdout, "accepted", strong=True) for c in diagnosis.causes]
+    rows += [_row(r.name, r.gain_holdout, r.why) for r in fitted]
+    shown = table(("Cause", "#Gain", "", "Outcome"), rows) if rows else ""
+    others = bullets(_by_reason([r for r in diagnosis.rejected if not was_fitted(r)]))
+    return section(_tried_title(diagnosis), shown, others, caption=_GAIN)
+
+
+def was_fitted(rejected: Rejected) -> bool:
+    """Tell whether a cause came as far as a gain: one without is exactly zero or not a number."""
+    return math.isfinite(rejected.gain_holdout) and rejected.gain_holdout != 0.0
+
+
+def _tried_title(diagnosis: Diagnosis) -> str:
+    tried = len(diagnosis.causes) + len(diagnosis.rejected)
+    return f"{tried} causes were tried, {len(diagnosis.causes) or 'none'} accepted"
+
+
+def _by_reason(rejected: Sequence[Rejected]) -> list[str]:
+    names: dict[str, list[str]] = {}
+    for r in rejected:
+        names.setdefault(r.why, []).append(say.effect(r.name))
+    return [f"{words.sentence(say.prose(why))}: {words.listed(sorted(n))}." for why, n in names.items()]
+
+
+def _row(name: str, gain: float, outcome: str, strong: bool = False) -> str:
+    plain = escape(words.sentence(say.effect(name)))
+    shown = f"<b>{plain}</b>" if strong else plain
+    bar = _bar(gain, AFTER if strong else faint(MEASURED, 0.6))
+    return (
+        f"<tr><td>{shown}<small>{escape(name)}</small></td><td class='number'>{say.percent(gain)}</td>"
+        f"<td>{bar}</td><td>{escape(say.prose(outcome))}</td></tr>"
+    )
+
+
+def _bar(share: float, colour: str) -> str:
+    """Return a bar from zero to a share of one; one below zero is only a stroke at zero."""
+    length = _WIDTH * min(max(share, 0.0), 1.0)
+    return (
+        f'<svg class="interval" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" aria-hidden="true">'
+        f'<rect x="0" y="3" width="{_WIDTH:g}" height="{_HEIGHT - 6:g}" rx="2" fill="{GRID}" opacity="0.5"/>'
+        f'<rect x="0" y="3" width="{length:.1f}" height="{_HEIGHT - 6:g}" rx="2" fill="{colour}"/>'
+        f'<line x1="0.5" x2="0.5" y1="0" y2="{_HEIGHT:g}" stroke="{QUIET}"/></svg>'
+    )

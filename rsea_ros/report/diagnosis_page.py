@@ -1,0 +1,84 @@
+"""The report of a diagnosis, as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.report import diagnosis_words as say
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis_causes import cause_section, tried_section
+from rsea_ros.report.diagnosis_figures import spectrum_figure, time_figure
+from rsea_ros.report.diagnosis_profile import profiles
+from rsea_ros.report.diagnosis_tables import channel_section, experiment_section
+from rsea_ros.report.diagnosis_where import where_figure
+from rsea_ros.report.page import Block, bullets, key_numbers, page, paragraph, section
+from rsea_ros.report.palette import AFTER, BEFORE
+from rsea_ros.report.parameters import parameter_table
+
+
+def diagnosis_report(diagnosis: Diagnosis) -> str:
+    """Return the report as HTML that opens without a network."""
+    d = diagnosis
+    footer = [f"Data: {', '.join(d.sources)}", "rsea diagnose. All values in SI."]
+    return page(say.headline(d), _kicker(d), list(_blocks(d)), footer)
+
+
+def _blocks(d: Diagnosis) -> Iterator[Block]:
+    """Yield the page from top to bottom: the verdict first, then what it rests on."""
+    main = say.main_channel(d)
+    yield key_numbers(_keys(d, main))
+    if d.faults:
+        yield f'<p class="next">{escape(say.faults(d.faults))}</p>'
+    yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
+    if any(o.channel == main for o in d.before):
+        yield time_figure(d, main)
+    where = profiles(d, main)
+    if where:
+        yield where_figure(where, bool(d.causes), AFTER if d.at_noise_floor and not d.causes else BEFORE)
+    yield from (cause_section(c) for c in d.causes)
+    yield tried_section(d)
+    yield channel_section(d)
+    yield _untold(d)
+    if d.next_experiment is not None:
+        yield experiment_section(d.next_experiment)
+    yield _faults(d)
+    yield _baseline(d)
+
+
+def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
+    """Return the numbers of the first screen."""
+    channel = words.channel(main)
+    if d.causes:
+        gone = (say.percent(say.gain(d, main)), f"of the {channel} residual gone, on data that took no part")
+        return [gone, (say.residual_change(d, main), "times the noise, before and after")]
+    keys = [(say.residual_change(d, main), f"times the noise is the {channel} residual")]
+    if d.rejected:
+        keys.append((str(len(d.rejected)), "causes tried, none accepted"))
+    return [*keys, (f"{d.extended_fit_percent[main]:.2f} %", f"of the {channel} explained")]
+
+
+def _kicker(d: Diagnosis) -> str:
+    return f"Diagnosis of {d.rig_name} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
+
+
+def _untold(d: Diagnosis) -> str:
+    told = [*say.confusions(d), *d.statements]
+    body = bullets(told) if told else paragraph("Nothing that was asked for.")
+    return section("What these data cannot tell", body)
+
+
+def _faults(d: Diagnosis) -> str:
+    if not d.faults:
+        return section(
+            "No fault was found in the data", paragraph("No sample is missing, frozen or clipped.")
+        )
+    items = bullets([words.sentence(f"{say.fault(f)}.") for f in d.faults])
+    caption = "Found before any fit. Faulty samples are masked, never explained by physics."
+    return section("Faults of the data", items, caption=caption)
+
+
+def _baseline(d: Diagnosis) -> str:
+    title = "The rig's own values, fitted before any cause was looked for"
+    return section(title, parameter_table(d.baseline))

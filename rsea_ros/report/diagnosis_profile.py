@@ -1,0 +1,95 @@
+"""Where the residual is large: its RMS over the noise against load, speed, rotor angle and time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.identification.problem import SETTLE
+from rsea_ros.identification.result import Overlay
+from rsea_ros.signals import UNITS, FloatArray
+
+BINS = 16
+_FEWEST = 4 * BINS
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The residual laid out against one respect.
+
+    edges: of the bins in `unit`, shape (n + 1,). before, after: RMS over the noise, shape (n,).
+    """
+
+    what: str
+    unit: str
+    edges: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+    @property
+    def contrast(self) -> float:
+        """Largest over smallest RMS before: how much the residual depends on this respect."""
+        return float(np.nanmax(self.before) / max(float(np.nanmin(self.before)), 1e-12))
+
+
+def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
+    """Return a profile for every respect that the record has the signals for."""
+    before, after = ({o.channel: o for o in overlays} for overlays in (diagnosis.before, diagnosis.after))
+    if channel not in before:
+        return ()
+    here, noise = before[channel], diagnosis.noise_rms[channel]
+    counted = _counted(diagnosis, here)
+    residuals = [((o[channel].measured - o[channel].simulated) / noise)[counted] for o in (before, after)]
+    if counted.sum() < _FEWEST:
+        return ()
+    found = []
+    for what, unit, values, equal in _respects(diagnosis, before, here):
+        edges = _edges(values[counted], equal)
+        found.append(Profile(what, unit, edges, *(_rms_in(edges, values[counted], r) for r in residuals)))
+    return tuple(found)
+
+
+def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
+    """Return which samples count: neither those before the bench has settled nor faulty ones."""
+    faulty = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
+    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~faulty
+    return good
+
+
+def _respects(
+    diagnosis: Diagnosis, measured: Mapping[str, Overlay], here: Overlay
+) -> Iterator[tuple[str, str, FloatArray, bool]]:
+    """Yield name, unit, value at each sample, and whether bins are equally wide (else equally full)."""
+    load = "ft" if "ft" in measured else "motor_torque"
+    if load in measured:
+        yield "amplitude", UNITS[load], np.abs(_at(here.t, measured[load])), False
+    if "velocity" in measured:
+        yield "velocity", UNITS["velocity"], _at(here.t, measured["velocity"]), False
+    ratio = diagnosis.extended_rig["gear.ratio"]
+    if "position" in measured and ratio > 1.0:
+        yield "angle", "rad", np.mod(_at(here.t, measured["position"]) * ratio, 2.0 * np.pi), True
+    yield "time", "s", here.t - here.t[0], True
+
+
+def _at(t: FloatArray, overlay: Overlay) -> FloatArray:
+    return np.interp(t, overlay.t, overlay.measured)
+
+
+def _edges(values: FloatArray, equal: bool) -> FloatArray:
+    shares = np.linspace(0.0, 1.0, BINS + 1)
+    edges = values.min() + shares * np.ptp(values) if equal else np.quantile(values, shares)
+    distinct: FloatArray = np.unique(edges)
+    return distinct if len(distinct) > 1 else np.array([distinct[0], distinct[0] + 1e-12])
+
+
+def _rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> FloatArray:
+    """Return the RMS of the residual in each bin; NaN where a bin is empty."""
+    count = len(edges) - 1
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
+    number = np.bincount(which, minlength=count).astype(float)
+    power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
+    rms: FloatArray = np.sqrt(power)
+    return rms

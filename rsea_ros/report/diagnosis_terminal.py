@@ -1,0 +1,59 @@
+"""The essence of a diagnosis on a terminal, in about ten lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.text import Text
+
+from rsea_ros.diagnosis.result import Diagnosis, Estimate, Misfit
+from rsea_ros.report import diagnosis_words as say
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis_causes import was_fitted
+
+_STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
+_WIDTH = 12
+_MOST = 3
+
+
+def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
+    """Return the verdict and what it rests on, a line each."""
+    lines = [Text(say.headline(diagnosis), style=_STYLES.get(diagnosis.verdict, "bold green"))]
+    return [*lines, *(Text.assemble((name.ljust(_WIDTH), "dim"), text) for name, text in _rows(diagnosis))]
+
+
+def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
+    main = say.main_channel(d)
+    ratios, rms = say.residual_change(d, main), say.rms_change(d, main)
+    yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
+    for cause in d.causes:
+        yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
+        gain, interval = say.percent(cause.gain_holdout), say.percent_range(cause.gain_holdout_ci95)
+        yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
+    if d.misfit:
+        yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
+    rivals = [r for r in d.rejected if was_fitted(r)][:_MOST]
+    for rival in rivals:
+        yield "rejected", f"{rival.name}: {say.prose(rival.why)}"
+    if d.rejected:
+        yield "tried", f"{len(d.causes) + len(d.rejected)} causes of the catalogue"
+    for sentence in (*say.confusions(d), *d.statements):
+        yield "not told", sentence
+    if d.next_experiment is not None:
+        yield "next run", f"{d.next_experiment.why} ({say.excitation(dict(d.next_experiment.excitation))})"
+    for fault in d.faults:
+        yield "data", say.fault(fault)
+
+
+def _size(name: str, parameter: Estimate) -> str:
+    value, half, unit = say.estimate(parameter)
+    return f"{name.replace('_', ' ')} {value}{f' ± {half}' if half else ''} {unit}".rstrip()
+
+
+def _worst(d: Diagnosis) -> list[Misfit]:
+    """Return the worst misfit in each respect."""
+    worst: dict[str, Misfit] = {}
+    for m in d.misfit:
+        if m.what not in worst or m.times_noise > worst[m.what].times_noise:
+            worst[m.what] = m
+    return sorted(worst.values(), key=lambda m: -m.times_noise)[:_MOST]
