@@ -1,11 +1,27 @@
-"""Device: what a driver can do with an actuator, real or simulated. Four methods."""
+"""Device: what a driver can do with an actuator, real or simulated."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from rsea_ros.errors import DeviceError
+
 Wrench = tuple[float, float, float, float, float, float]
+
+
+class NoReply(DeviceError):
+    """A transaction without an intact reply in its time; the next one may do."""
+
+
+class Refused(DeviceError):
+    """An instruction that the device understood and did not obey."""
+
+
+class PortLost(DeviceError):
+    """The port is not there, or not any more."""
 
 
 @dataclass(frozen=True)
@@ -15,6 +31,9 @@ class State:
     stamp, ft_stamp: instants of acquisition, ns since the epoch. position: rad, velocity: rad/s, of the gear
     output relative to the housing. motor_torque: N m at the gear output, from measured current. wrench:
     force x, y, z (N) and torque x, y, z (N m) of the F/T sensor; None without one.
+    wrenches: all that came since the last reading, as (stamp, wrench), where the sensor is faster.
+    current A, voltage V, temperature °C: nan where the device does not measure them.
+    hardware_error, ft_trouble: what motor and sensor complain of, in words; empty when of nothing.
     """
 
     stamp: int
@@ -23,6 +42,12 @@ class State:
     motor_torque: float
     ft_stamp: int = 0
     wrench: Wrench | None = None
+    wrenches: Sequence[tuple[int, Wrench]] = ()
+    current: float = math.nan
+    voltage: float = math.nan
+    temperature: float = math.nan
+    hardware_error: str = ""
+    ft_trouble: str = ""
 
 
 class Device(Protocol):
@@ -31,11 +56,29 @@ class Device(Protocol):
     def open(self) -> None:
         """Connect, with no torque."""
 
+    def enable(self) -> None:
+        """Switch the torque on, at zero."""
+
     def read(self) -> State:
         """Return the newest reading."""
 
     def write(self, torque: float) -> None:
         """Command a motor torque at the gear output (N m), held until the next one."""
+
+    def disable(self) -> None:
+        """Command zero torque and switch it off."""
+
+    def zero_ft(self) -> None:
+        """Take what the F/T sensor measures now for zero."""
+
+    def recover(self) -> None:
+        """Connect again where the connection was lost. Raises DeviceError while a fault is still there."""
+
+    def reboot(self) -> None:
+        """Restart the actuator, with no torque."""
+
+    def health(self) -> Mapping[str, object]:
+        """Return counts and values for diagnostics, by name."""
 
     def close(self) -> None:
         """Command zero torque and let go; also after a failed `open` or `read`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -63,6 +63,27 @@ class SimulatedDevice:
         if not np.isfinite(torque):
             raise DeviceError(f"torque of {torque} N m, expected a finite value")
         self._writes.append((self._clock(), float(torque)))
+
+    def enable(self) -> None:
+        """Do nothing: there is no power stage to switch."""
+
+    def disable(self) -> None:
+        """Command zero torque."""
+        self.write(0.0)
+
+    def zero_ft(self) -> None:
+        """Do nothing: the sensor has no offset that a tare would take away."""
+
+    def recover(self) -> None:
+        """Do nothing: the connection cannot be lost."""
+
+    def reboot(self) -> None:
+        """Command zero torque."""
+        self.write(0.0)
+
+    def health(self) -> Mapping[str, object]:
+        """Return nothing: what could fail is not simulated here."""
+        return {}
 
     def close(self) -> None:
         """Command zero torque and stop."""

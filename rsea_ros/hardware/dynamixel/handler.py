@@ -20,12 +20,21 @@ from rsea_ros.hardware.dynamixel.frames import LONGEST, OVERHEAD, crc16, frame, 
 from rsea_ros.hardware.dynamixel.port import Port
 from rsea_ros.hardware.dynamixel.receiver import Receiver
 
+EMPTY = 11
+"""Bytes of a status packet without parameters."""
+
 
 class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
-    """Protocol 2.0; `receiver.rejected` counts what came in damaged."""
+    """Protocol 2.0; `receiver.rejected` counts what came in damaged.
+
+    expected: parameters of the reply that is waited for; one of another size answers an older request, is
+    left out and counted (`stale`). None: any. A refusal has no parameters and is let through.
+    """
 
     def __init__(self) -> None:
         self.receiver = Receiver()
+        self.stale = 0
+        self.expected: int | None = None
         self._frames: list[bytes] = []
 
     def updateCRC(self, crc_accum: int, data_blk_ptr: Sequence[int], data_blk_size: int) -> int:
@@ -60,13 +69,21 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     def rxPacket(self, port: Port, fast_option: bool) -> tuple[bytes, int]:
         """Wait for the next status packet until the port's time is over. Raises PortLost."""
         rejected = self.receiver.rejected.total()
-        while not self._frames:
+        while True:
+            while self._frames:
+                packet = self._frames.pop(0)
+                if self._answers(packet):
+                    return packet, int(COMM_SUCCESS)
+                self.stale += 1
             data = port.receive()
             self._frames += self.receiver.feed(data, raw=fast_option)
             if not data and port.isPacketTimeout():
                 damaged = self.receiver.waiting or self.receiver.rejected.total() > rejected
                 return b"", int(COMM_RX_CORRUPT if damaged else COMM_RX_TIMEOUT)
-        return self._frames.pop(0), int(COMM_SUCCESS)
+
+    def _answers(self, packet: bytes) -> bool:
+        parameters, refused = len(packet) - EMPTY, packet[8] & 0x7F
+        return self.expected is None or parameters == self.expected or bool(refused and not parameters)
 
 
 def _payload(packet: Sequence[int]) -> bytes:

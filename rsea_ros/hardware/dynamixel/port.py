@@ -9,17 +9,13 @@ import time
 import serial  # type: ignore[import-untyped]
 from dynamixel_sdk import PortHandler
 
-from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import PortLost
 
 BAUD_RATES = (
     9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000, 6_000_000, 10_500_000,
 )  # fmt: skip
 """What the motors can do, bit/s."""
 BITS_PER_BYTE = 10
-
-
-class PortLost(DeviceError):
-    """The port is not there, or not any more."""
 
 
 class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types

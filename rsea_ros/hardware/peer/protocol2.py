@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 PREAMBLE = (0xFF, 0xFF, 0xFD, 0x00)
@@ -20,13 +21,18 @@ def checksum(data: bytes) -> int:
     """Return the remainder of the bytes, as one long number, modulo x^16 + x^15 + x^2 + 1."""
     register = 0
     for byte in data:
-        register ^= byte << 8
-        for _ in range(8):
-            carry = register >> 15
-            register = (register << 1) & 0xFFFF
-            if carry:
-                register ^= 0x8005
+        register = _divided(register >> 8 ^ byte) ^ (register & 255) << 8
     return register
+
+
+@cache
+def _divided(byte: int) -> int:
+    """Return the remainder of byte · x^16."""
+    rest = byte << 16
+    for bit in range(23, 15, -1):
+        if rest >> bit & 1:
+            rest ^= 0x18005 << bit - 16
+    return rest
 
 
 def escape(payload: bytes) -> bytes:

@@ -1,0 +1,67 @@
+"""`rsea bench`: the paper's bench on a wire, for the driver to be tried without hardware."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.ft import ForceSensor
+from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.motor import Motor
+from rsea_ros.hardware.peer.registers import MODELS
+from rsea_ros.hardware.peer.requests import LineRequests
+from rsea_ros.hardware.peer.station import Station
+from rsea_ros.hardware.simulated import SimulatedDevice
+from rsea_ros.model.rig_file import load_rig
+
+HELP = "a motor on a pseudo-terminal and an F/T sensor on UDP, with a simulated plant behind both"
+PLANT_RATE = 2000.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add = parser.add_argument
+    add("--port", type=Path, default=Path("/tmp/rsea-bench"), help="link to the pseudo-terminal")
+    add("--model", type=int, default=54024, choices=sorted(MODELS), help="number of the motor")
+    add("--rig", default="paper_high_impedance", help="the plant: a name in config/rigs, or a file")
+    add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
+    add("--torque-constant", type=float, default=6.826, help="N m at the gear output per A")
+    add("--return-delay", type=int, default=0, help="pause before an answer, unit 2 µs, 0 to 254")
+    add("--seed", type=int, default=0, help="of the sensors' noise and of the misbehaviour")
+    add("--requests", action="store_true", help="take requests to misbehave on stdin, a JSON object a line")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Say in one line of JSON where the bench is, and run it until stdin ends, or SIGINT or SIGTERM."""
+    if not 1.0 <= args.ft_rate <= 7000.0:
+        raise ParameterError(f"--ft-rate {args.ft_rate:g} Hz, expected 1 to 7000 Hz")
+    if not 0 <= args.return_delay <= 254:
+        raise ParameterError(f"--return-delay {args.return_delay}, expected 0 to 254 (unit 2 µs)")
+    plant = SimulatedDevice(load_rig(args.rig), PLANT_RATE, seed=args.seed, clock=time.monotonic_ns)
+    wrong = Misbehaviour(seed=args.seed)
+    motor = Motor(args.model, plant, args.torque_constant)
+    motor.put("return_delay", args.return_delay)
+    plant.open()
+    bus, sensor = Bus(args.port, motor, wrong), ForceSensor(plant, args.ft_rate, wrong)
+    stop, stopping = os.pipe()
+    inlet = sys.stdin.fileno() if args.requests else stop
+    requests = LineRequests(motor, bus, sensor, wrong, inlet, sys.stdout.fileno())
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    place = {"port": str(args.port), "model": args.model, "ft_port": sensor.port, "page_port": sensor.page}
+    print(json.dumps(place), flush=True)
+    try:
+        Station(plant, motor, bus, sensor, requests).run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        bus.vanish()
+        os.close(stopping)
+    return 0

@@ -1,0 +1,76 @@
+"""Transactions with one motor: every result and error byte looked at, every failure counted by kind."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
+
+from rsea_ros.hardware.device import NoReply, Refused
+from rsea_ros.hardware.dynamixel.handler import PacketHandler
+from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.tables import Item
+
+ALERT = 0x80
+REFUSALS = {
+    1: "failed", 2: "unknown instruction", 3: "CRC wrong", 4: "value out of range", 5: "length wrong",
+    6: "value beyond its limit", 7: "access denied",
+}  # fmt: skip
+
+
+class Bus:
+    """One motor on a port. alert: bit 7 of the last error byte. errors: failed transactions by kind."""
+
+    def __init__(self, port: Port, identity: int) -> None:
+        self.port, self._id = port, identity
+        self.handler = PacketHandler()
+        self._failed: Counter[str] = Counter()
+        self.alert = False
+
+    @property
+    def errors(self) -> Counter[str]:
+        """Failed transactions (`lost`, `corrupt`, `refused`), `stale` replies, damaged frames (`crc`, …)."""
+        return self._failed + self.handler.receiver.rejected + Counter(stale=self.handler.stale)
+
+    def ping(self) -> int:
+        """Return the model number. Raises NoReply."""
+        self.handler.expected = 3
+        model, result, error = self.handler.ping(self.port, self._id)
+        self._check("ping", result, error)
+        return int(model)
+
+    def read(self, address: int, size: int) -> bytes:
+        """Return bytes of the control table. Raises NoReply, Refused, PortLost."""
+        self.handler.expected = size
+        data, result, error = self.handler.readTxRx(self.port, self._id, address, size)
+        self._check(f"read of {size} bytes at {address}", result, error)
+        return bytes(data)
+
+    def get(self, item: Item) -> int:
+        """Return an item."""
+        return item.value(self.read(item.address, item.size), item.address)
+
+    def put(self, item: Item, value: int) -> None:
+        """Write an item; the motor has acknowledged it when this returns."""
+        self.handler.expected = 0
+        result, error = self.handler.writeTxRx(
+            self.port, self._id, item.address, item.size, item.data(value)
+        )
+        self._check(f"write of {value} at {item.address}", result, error)
+
+    def reboot(self) -> None:
+        """Reboot the motor."""
+        self.handler.expected = 0
+        self._check("reboot", *self.handler.reboot(self.port, self._id))
+
+    def _check(self, what: str, result: int, error: int) -> None:
+        if result != COMM_SUCCESS:
+            kind = "corrupt" if result == COMM_RX_CORRUPT else "lost"
+            self._failed[kind] += 1
+            reply = "a damaged reply" if kind == "corrupt" else "no reply"
+            raise NoReply(f"motor ID {self._id} on {self.port.port_name}: {reply} to {what}")
+        self.alert = bool(error & ALERT)
+        if error & ~ALERT:
+            self._failed["refused"] += 1
+            why = REFUSALS.get(error & ~ALERT, f"error {error & ~ALERT}")
+            raise Refused(f"motor ID {self._id}: {what} refused: {why}")

@@ -1,0 +1,227 @@
+"""A Dynamixel Pro in torque mode: one read and one write a cycle, in SI units."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import NoReply, PortLost
+from rsea_ros.hardware.dynamixel.bus import Bus
+from rsea_ros.hardware.dynamixel.frames import frame
+from rsea_ros.hardware.dynamixel.port import Port
+from rsea_ros.hardware.dynamixel.tables import TABLES, ControlTable, Item, error_names
+from rsea_ros.hardware.supervised import Supervisor
+
+T = TypeVar("T")
+ATTEMPTS = 5
+TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
+RETURN_DELAY_UNIT = 2e-6
+WATCHDOG_UNIT = 0.02
+WATCHDOG, SUPERVISION = 0.06, 0.1
+"""s without the host after which the motor's own watchdog, or the supervisor, takes the torque away."""
+WRITE = 0x03
+BOOT_TIME, BOOT_POLL = 5.0, 0.02
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Where the motor is and what it is.
+
+    baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
+    per A. latency: what adapter and scheduler may add to the time on the wire, s.
+    """
+
+    path: str
+    baud: int = 1_000_000
+    identity: int = 1
+    model: int = 0
+    torque_constant: float = 6.826
+    latency: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What one read holds. instant: middle of the transaction, monotonic ns. counts: of the encoder."""
+
+    instant: int
+    counts: int
+    position: float
+    velocity: float
+    current: float
+    voltage: float
+    temperature: float
+    hardware_error: str
+
+
+class Motor:
+    """One motor on a port of its own."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._port = Port(settings.path, settings.baud, settings.latency)
+        self.bus = Bus(self._port, settings.identity)
+        self._supervisor: Supervisor | None = None
+        self._on = False
+        self._longer = 0
+        self.table: ControlTable | None = None
+        self.torque_limit = math.nan
+
+    @property
+    def _known(self) -> ControlTable:
+        if self.table is None:
+            raise PortLost(f"motor on {self._settings.path}: not open")
+        return self.table
+
+    def open(self) -> None:
+        """Open the port, check who answers, switch the torque off, set torque mode, read the limit."""
+        self._port.open()
+        self.table = table = _table(_patient(self.bus.ping), self._settings)
+        self._put(table.status_level, ACKNOWLEDGE_ALL)
+        self._stop()
+        self._port.return_delay = RETURN_DELAY_UNIT * _patient(lambda: self.bus.get(table.return_delay))
+        if _patient(lambda: self.bus.get(table.operating_mode)) != TORQUE_MODE:
+            self._put(table.operating_mode, TORQUE_MODE)
+        limit = _patient(lambda: self.bus.get(table.torque_limit))
+        self.torque_limit = limit * table.ampere * self._settings.torque_constant
+        if table.bus_watchdog is None:
+            self._supervisor = Supervisor(self._port.descriptor, SUPERVISION, self._stop_frames())
+
+    def enable(self) -> None:
+        """Switch the torque on, at zero, with a watchdog. Raises DeviceError."""
+        table = self._known
+        self._stop()
+        if table.bus_watchdog is not None:
+            self._put(table.bus_watchdog, round(WATCHDOG / WATCHDOG_UNIT))
+        self._put(table.torque_enable, 1)
+        self._on = True
+
+    def disable(self) -> None:
+        """Command zero torque and switch it off."""
+        self._on = False
+        if self.table is not None:
+            self._stop()
+
+    def read(self) -> Sample:
+        """Read everything that is measured, once. Raises NoReply, PortLost, Refused.
+
+        After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
+        size and cannot be taken for the new one.
+        """
+        table = self._known
+        start, size = table.sample
+        begin = time.monotonic_ns()
+        try:
+            data = self.bus.read(start, size + self._longer)
+        except NoReply:
+            self._longer ^= 1
+            raise
+        instant = (begin + time.monotonic_ns()) // 2
+        error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
+        counts = table.position.value(data, start)
+        return Sample(
+            instant=instant,
+            counts=counts,
+            position=counts * 2.0 * math.pi / table.pulses,
+            velocity=table.velocity.value(data, start) * table.radian_per_second,
+            current=table.current.value(data, start) * table.ampere,
+            voltage=table.voltage.value(data, start) * 0.1,
+            temperature=float(table.temperature.value(data, start)),
+            hardware_error=error,
+        )
+
+    def write(self, torque: float) -> None:
+        """Command a torque (N m). Raises NoReply, PortLost, Refused."""
+        if self._supervisor is not None:
+            self._supervisor.beat(self._on)
+        table = self._known
+        self.bus.put(table.goal_torque, round(torque / self._settings.torque_constant / table.ampere))
+
+    def torque_of(self, current: float) -> float:
+        """Return the torque (N m) of a current (A)."""
+        return current * self._settings.torque_constant
+
+    def recover(self) -> None:
+        """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
+        try:
+            _patient(self.bus.ping)
+        except DeviceError:
+            self.close()
+            self.open()
+        error = _patient(lambda: self.bus.get(self._known.hardware_error))
+        if error:
+            raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
+
+    def reboot(self) -> None:
+        """Reboot the motor and set it up again. Raises DeviceError when it does not come back."""
+        self.disable()
+        _patient(self.bus.reboot)
+        deadline = time.monotonic() + BOOT_TIME
+        while True:
+            time.sleep(BOOT_POLL)
+            try:
+                self.bus.ping()
+                break
+            except NoReply:
+                if time.monotonic() > deadline:
+                    raise
+        self.close()
+        self.open()
+
+    def close(self) -> None:
+        """Zero torque, off, port closed; where the motor does not acknowledge it the supervisor goes on."""
+        self._on, safe = False, False
+        try:
+            if self.table is not None:
+                self._stop()
+                safe = True
+        except DeviceError:
+            safe = False  # the supervisor's turn
+        finally:
+            if self._supervisor is not None:
+                self._supervisor.close(safe=safe)
+                self._supervisor = None
+            self.table = None
+            self._port.close()
+
+    def _stop(self) -> None:
+        """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal."""
+        table = self._known
+        self._put(table.torque_enable, 0)
+        if table.bus_watchdog is not None:
+            self._put(table.bus_watchdog, 0)
+        self._put(table.goal_torque, 0)
+
+    def _stop_frames(self) -> list[bytes]:
+        """Return the frames that zero the torque and switch it off, for the supervisor."""
+        table = self._known
+        return [
+            frame(self._settings.identity, bytes([WRITE, *item.address.to_bytes(2, "little"), *item.data(0)]))
+            for item in (table.goal_torque, table.torque_enable)
+        ]
+
+    def _put(self, item: Item, value: int) -> None:
+        _patient(lambda: self.bus.put(item, value))
+
+
+def _table(model: int, settings: Settings) -> ControlTable:
+    """Return the control table of a model number. Raises DeviceError for one that is not expected."""
+    where = f"motor ID {settings.identity} on {settings.path}"
+    if model not in TABLES:
+        raise DeviceError(f"{where}: model {model}, expected one of {', '.join(map(str, TABLES))}")
+    if settings.model not in (0, model):
+        raise DeviceError(f"{where}: model {model}, expected {settings.model} (parameter model)")
+    return TABLES[model]
+
+
+def _patient(transaction: Callable[[], T]) -> T:
+    """Return what a transaction returns, tried again when a reply is lost."""
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return transaction()
+        except NoReply:
+            continue
+    return transaction()

@@ -1,0 +1,127 @@
+"""The paper's bench as a device: a Dynamixel Pro on RS-485 and an ATI Net F/T sensor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from rsea_ros.hardware.device import State, Wrench
+from rsea_ros.hardware.dynamixel.motor import Motor
+from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.limits import Limits, check_limits
+from rsea_ros.hardware.netft.sensor import Sensor
+from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+
+
+class DynamixelNetft:
+    """Motor and sensor behind the Device interface.
+
+    Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
+    stiffness: of the rig's spring, N m/rad, which the limits are checked against.
+    """
+
+    def __init__(
+        self, motor: MotorSettings, sensor: SensorSettings | None, limits: Limits, stiffness: float
+    ) -> None:
+        self._motor = Motor(motor)
+        self._sensor = Sensor(sensor) if sensor is not None else None
+        self._limits, self._stiffness = limits, stiffness
+        self._epoch = 0
+        self.origin = 0.0
+        self._waiting: list[tuple[int, Wrench]] = []
+        self._trouble = ""
+        self._last: State | None = None
+
+    def open(self) -> None:
+        """Connect to both and check the limits. Raises DeviceError, ParameterError; nothing stays open."""
+        self._epoch = time.time_ns() - time.monotonic_ns()
+        try:
+            self._motor.open()
+            check_limits(self._limits, self._motor.torque_limit, self._stiffness)
+            self.origin = self._motor.read().position
+            if self._sensor is not None:
+                self._sensor.open()
+        except Exception:
+            self.close()
+            raise
+
+    def enable(self) -> None:
+        """Switch the torque on, at zero."""
+        self._motor.enable()
+
+    def read(self) -> State:
+        """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError."""
+        self._take_wrenches()
+        sample = self._motor.read()
+        wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
+        stamp, wrench = wrenches[-1] if wrenches else (0, None)
+        self._last = State(
+            stamp=sample.instant + self._epoch,
+            position=sample.position - self.origin,
+            velocity=sample.velocity,
+            motor_torque=self._motor.torque_of(sample.current),
+            ft_stamp=stamp,
+            wrench=wrench,
+            wrenches=wrenches,
+            current=sample.current,
+            voltage=sample.voltage,
+            temperature=sample.temperature,
+            hardware_error=sample.hardware_error,
+            ft_trouble=trouble,
+        )
+        return self._last
+
+    def _take_wrenches(self) -> None:
+        """Keep what the sensor has sent until a reading takes it along, also over a lost reply."""
+        if self._sensor is None:
+            return
+        wrenches, trouble = self._sensor.take()
+        slipped = self._epoch + time.monotonic_ns() - time.time_ns()  # the system clock may have been set
+        self._waiting += [(stamp + slipped, wrench) for stamp, wrench in wrenches]
+        self._trouble = self._trouble or trouble
+
+    def write(self, torque: float) -> None:
+        """Command a torque (N m)."""
+        self._motor.write(torque)
+
+    def disable(self) -> None:
+        """Command zero torque and switch it off."""
+        self._motor.disable()
+
+    def zero_ft(self) -> None:
+        """Tare the sensor."""
+        if self._sensor is not None:
+            self._sensor.zero()
+
+    def recover(self) -> None:
+        """Connect again; raises DeviceError while motor or sensor still complain."""
+        self._motor.recover()
+        if self._sensor is not None:
+            self._sensor.recover()
+
+    def reboot(self) -> None:
+        """Reboot the motor, then see to the sensor."""
+        self._motor.reboot()
+        if self._sensor is not None:
+            self._sensor.recover()
+
+    def health(self) -> Mapping[str, object]:
+        """Return errors of bus and stream by kind, and what the motor said of itself last."""
+        values: dict[str, object] = {f"bus_{kind}": n for kind, n in self._motor.bus.errors.items()}
+        if self._motor.table is not None:
+            values |= {"motor": self._motor.table.name, "torque_limit_nm": f"{self._motor.torque_limit:.4g}"}
+        if self._sensor is not None:
+            values |= {f"ft_{kind}": n for kind, n in self._sensor.counts().items()}
+            values["ft_noise_nm"] = f"{self._sensor.noise[5]:.3g}"
+        if self._last is not None:
+            values |= {"temperature_c": self._last.temperature, "voltage_v": f"{self._last.voltage:.1f}"}
+            values["hardware_error"] = self._last.hardware_error or "none"
+        return values
+
+    def close(self) -> None:
+        """Zero torque, off, everything closed."""
+        try:
+            self._motor.close()
+        finally:
+            if self._sensor is not None:
+                self._sensor.close()

@@ -1,0 +1,97 @@
+"""A device behind its limits: what a driver does in each cycle, without ROS."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import Device, NoReply, State
+from rsea_ros.hardware.limits import Fault, Guard, Limits
+
+
+class Guarded:
+    """Reads and writes once a cycle; turns what goes wrong into latched faults, never into an exception.
+
+    enabled: whether commands get through. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    """
+
+    def __init__(self, device: Device, limits: Limits, rate: float) -> None:
+        self.device, self.guard = device, Guard(limits, 1.0 / rate)
+        self.enabled = False
+        self.cycles: Counter[str] = Counter()
+        self.state: State | None = None
+        self._lost = {"read": 0, "write": 0}
+
+    @property
+    def fault(self) -> Fault | None:
+        """The latched fault."""
+        return self.guard.fault
+
+    def read(self) -> State | None:
+        """Return the reading of this cycle; None when there was none."""
+        try:
+            state = self.device.read()
+        except DeviceError as error:
+            self._failed("read", error)
+            return None
+        self._lost["read"] = 0
+        self.guard.look(state)
+        self.state = state
+        return state
+
+    def write(self, wanted: float, age: float | None) -> float:
+        """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
+        torque = self.guard.allowed(wanted, age if self.enabled else None)
+        try:
+            self.device.write(torque)
+        except DeviceError as error:
+            self._failed("write", error)
+        else:
+            self._lost["write"] = 0
+        return torque
+
+    def enable(self) -> None:
+        """Switch the torque on, at zero. Raises DeviceError while a fault is latched."""
+        if self.guard.fault is not None:
+            raise DeviceError(f"fault {self.guard.fault}, expected clear_fault first")
+        self.guard.clear()
+        self.device.enable()
+        self.enabled = True
+
+    def disable(self) -> None:
+        """Command zero torque and switch it off."""
+        self.enabled = False
+        self.guard.torque = 0.0
+        self.device.disable()
+
+    def zero_ft(self) -> None:
+        """Tare the F/T sensor. Raises DeviceError while torque is commanded."""
+        if self.guard.torque != 0.0:
+            raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N m is commanded, expected 0 N m")
+        self.device.zero_ft()
+
+    def clear(self) -> None:
+        """Connect again if need be and forget the fault. Raises DeviceError while its cause is there."""
+        self.device.recover()
+        self._again()
+
+    def reboot(self) -> None:
+        """Restart the actuator; the fault is forgotten, the torque is on as before, at zero."""
+        self.device.reboot()
+        self._again()
+
+    def _again(self) -> None:
+        self._lost = dict.fromkeys(self._lost, 0)
+        if self.enabled:
+            self.device.enable()
+        self.guard.clear()
+
+    def _failed(self, what: str, error: DeviceError) -> None:
+        """Count a failure. One lost answer costs a cycle; several in a row, and any other failure, trip."""
+        self._lost[what] += 1
+        self.cycles[f"failed_{what}s"] += 1
+        limit = self.guard.limits.lost_cycles
+        if not isinstance(error, NoReply):
+            self.guard.trip(Fault(type(error).__name__.lower(), detail=str(error)))
+        elif self._lost[what] >= limit:
+            self.guard.trip(Fault("no_reply", self._lost[what], limit, "cycles", str(error)))

@@ -1,0 +1,136 @@
+"""An F/T sensor in SI units: records as wrenches, what is wrong with the stream, noise floor and tare."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import Wrench
+from rsea_ros.hardware.netft.calibration import Calibration, fetch
+from rsea_ros.hardware.netft.receiver import Arrival, Receiver
+from rsea_ros.hardware.netft.records import SET_BIAS, trouble
+
+SETTLE, FIRST = 0.1, 3.0
+"""s over which noise and tare are measured; s that the first record may take."""
+QUIET_CYCLES = 3
+TARED = 6.0
+"""Standard deviations that the mean may be off after a tare: the bias is one record, with its noise."""
+AXES = ("Fx in N", "Fy in N", "Fz in N", "Tx in N m", "Ty in N m", "Tz in N m")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """host, UDP port of RDT, TCP port of the web page; timeout: s without a record that are a fault."""
+
+    host: str
+    port: int = 49152
+    page_port: int = 80
+    timeout: float = 0.01
+JUMPS = {"restarted": "the sensor was restarted", "frozen": "ft_sequence stands still"}
+
+
+class Sensor:
+    """One sensor. noise: standard deviation of each axis at rest, N and N m."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._receiver = Receiver(settings.host, settings.port)
+        self._calibration = Calibration(1.0, 1.0)
+        self.noise: Wrench = (0.0,) * 6
+        self._quiet = 0
+        self._seen: Mapping[str, int] = {}
+
+    def open(self) -> None:
+        """Get the calibration, start the stream, measure the noise. Raises DeviceError."""
+        self._calibration = fetch(self._settings.host, self._settings.page_port)
+        self._receiver.open()
+        try:
+            values = self._collect()
+        except DeviceError:
+            self._receiver.close()
+            raise
+        self.noise = _six(values.std(axis=0))
+        self._restart_watch()
+
+    def take(self) -> tuple[list[tuple[int, Wrench]], str]:
+        """Return the records since the last call as (stamp, wrench), and what is wrong: '' for nothing."""
+        arrivals = self._receiver.take()
+        wrong = self._silence(arrivals) or self._jump() or _complaint(arrivals)
+        return [(a.stamp, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
+
+    def zero(self) -> None:
+        """Let the sensor take its present load for zero. Raises DeviceError when it does not."""
+        self._receiver.send(SET_BIAS)
+        time.sleep(0.02)
+        values = self._collect()
+        quantum = np.array([self._calibration.force] * 3 + [self._calibration.torque] * 3)
+        excess = np.abs(values.mean(axis=0)) / (TARED * np.array(self.noise) + quantum)
+        if np.any(excess > 1.0):
+            axis = int(np.argmax(excess))
+            mean = values[:, axis].mean()
+            raise DeviceError(f"F/T sensor: {AXES[axis]} is {mean:.4g} after the tare, expected about 0")
+        self._restart_watch()
+
+    def recover(self) -> None:
+        """Wait for the stream to be sound. Raises DeviceError when it is not."""
+        self._collect()
+        complaint = _complaint([self._receiver.newest] if self._receiver.newest else [])
+        if complaint:
+            raise DeviceError(f"F/T sensor: {complaint} is still there, expected it to be over")
+        self._restart_watch()
+
+    def counts(self) -> dict[str, int]:
+        """Return what came and what is gone, by kind."""
+        return {**self._receiver.sequence.counts, **self._receiver.refused}
+
+    def close(self) -> None:
+        """End the stream."""
+        self._receiver.close()
+
+    def _collect(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        """Return the wrenches of the next SETTLE seconds, one a row. Raises DeviceError without any."""
+        self._receiver.take()
+        deadline = time.monotonic() + FIRST
+        while not (arrivals := self._receiver.take()):
+            if time.monotonic() > deadline:
+                where = f"{self._settings.host}:{self._settings.port}"
+                raise DeviceError(f"F/T sensor {where}: no record within {FIRST:g} s, expected a stream")
+            time.sleep(0.005)
+        time.sleep(SETTLE)
+        arrivals += self._receiver.take()
+        return np.array([self._calibration.wrench(a.record.counts) for a in arrivals])
+
+    def _restart_watch(self) -> None:
+        self._quiet, self._seen = 0, dict(self._receiver.sequence.counts)
+
+    def _silence(self, arrivals: list[Arrival]) -> str:
+        self._quiet = 0 if arrivals else self._quiet + 1
+        newest = self._receiver.newest
+        age = time.time_ns() - newest.stamp if newest else 0
+        if self._quiet < QUIET_CYCLES or age < self._settings.timeout * 1e9:
+            return ""
+        return f"no record for {age / 1e6:.1f} ms, limit {1e3 * self._settings.timeout:g} ms"
+
+    def _jump(self) -> str:
+        """Tell whether the sensor's own counter stood still or went back since it was last looked at."""
+        counts = self._receiver.sequence.counts
+        for kind, words in JUMPS.items():
+            if counts[kind] > self._seen.get(kind, 0):
+                return words
+        return ""
+
+
+def _complaint(arrivals: list[Arrival]) -> str:
+    for arrival in arrivals:
+        if kind := trouble(arrival.record.status):
+            return f"{kind}, status 0x{arrival.record.status:08x}"
+    return ""
+
+
+def _six(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Wrench:
+    fx, fy, fz, tx, ty, tz = (float(value) for value in values)
+    return fx, fy, fz, tx, ty, tz

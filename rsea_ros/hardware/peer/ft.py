@@ -1,0 +1,132 @@
+"""The F/T sensor's box: RDT over UDP, and the page with its calibration over HTTP."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.motor import Plant
+
+STOP, STREAM, BUFFERED, RESET_LATCH, SET_BIAS = 0, 2, 3, 0x41, 0x42
+SATURATED = 0x8002_0000
+COUNTS_PER_NEWTON, COUNTS_PER_NEWTON_MILLIMETRE = 1_000_000, 1_000
+PAGE = f"""<?xml version="1.0"?>
+<netft><prodname>Net F/T</prodname><calsn>FT00000</calsn><cfgnam>bench</cfgnam>
+<cfgcpf>{COUNTS_PER_NEWTON}</cfgcpf><cfgcpt>{COUNTS_PER_NEWTON_MILLIMETRE}</cfgcpt>
+<scfgfu>N</scfgfu><scfgtu>N-mm</scfgtu><comrdtrate>{{rate}}</comrdtrate></netft>
+"""
+
+
+class ForceSensor:
+    """Streams records at `rate` (Hz) to the last client that asked. gone: records that were left out."""
+
+    def __init__(self, plant: Plant, rate: float, wrong: Misbehaviour, host: str = "127.0.0.1") -> None:
+        self._plant, self._wrong = plant, wrong
+        self._period = round(1e9 / rate)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
+        self.socket.bind((host, 0))
+        self.socket.setblocking(False)
+        self.descriptor = self.socket.fileno()
+        self.port = self.socket.getsockname()[1]
+        self._client: tuple[str, int] | None = None
+        self._left: int | None = None
+        self._rdt, self._ft, self.status = 0, 0, 0
+        self._bias, self._counts = [0] * 6, [0] * 6
+        self._due = 0
+        self.gone = 0
+        self.keep = False
+        self.sent: list[tuple[int, tuple[int, ...]]] = []
+        self.page = _serve_page(host, PAGE.format(rate=round(rate)))
+
+    @property
+    def next_due(self) -> int | None:
+        """When the next record goes out, ns; None when nobody asks."""
+        return self._due if self._client else None
+
+    def serve(self, now: int) -> None:
+        """Take requests."""
+        while True:
+            try:
+                request, client = self.socket.recvfrom(64)
+            except OSError:
+                return
+            if len(request) == 8 and request[0] == 0x12 and request[1] == 0x34:
+                command, count = int.from_bytes(request[2:4], "big"), int.from_bytes(request[4:], "big")
+                self._obey(now, client, command, count)
+
+    def _obey(self, now: int, client: tuple[str, int], command: int, count: int) -> None:
+        if command in (STREAM, BUFFERED):
+            self._client, self._left, self._rdt = client, count or None, 0
+            self._due = now
+        elif command == STOP:
+            self._client = None
+        elif command == SET_BIAS:
+            self._bias, self._client = list(self._counts), None
+        elif command == RESET_LATCH:
+            self.status = 0 if self.status == 0x8001_0000 else self.status
+
+    def tick(self, now: int) -> None:
+        """Send all records that are due."""
+        while self._client and self._due <= now:
+            self._due += self._period
+            self._counts = _counts(self._plant)
+            self._ft = (self._ft + 1) % (1 << 32)
+            self._rdt = (self._rdt + 1) % (1 << 32)
+            if self._wrong.happens("ft_silent"):
+                continue
+            if self._wrong.happens("ft_drop"):
+                self.gone += 1
+                continue
+            self._send(now)
+
+    def gap(self, records: int) -> None:
+        """Leave out so many records at once."""
+        self._rdt, self._ft = self._rdt + records, self._ft + records
+        self.gone += records
+
+    def restart(self) -> None:
+        """Switch the box off and on: nobody listens, the counters and the bias are gone."""
+        self._client, self._rdt, self._ft, self._bias = None, 0, 0, [0] * 6
+
+    def _send(self, now: int) -> None:
+        values = tuple(c - b for c, b in zip(self._counts, self._bias, strict=True))
+        words = (self._rdt, self._ft, self.status, *(v % (1 << 32) for v in values))
+        try:
+            self.socket.sendto(b"".join(w.to_bytes(4, "big") for w in words), self._client or ("", 0))
+        except OSError:
+            self.gone += 1
+        if self.keep:
+            self.sent.append((now, values))
+        if self._left is not None:
+            self._left -= 1
+            if not self._left:
+                self._client = None
+
+
+def _counts(plant: Plant) -> list[int]:
+    wrench = plant.read().wrench or (0.0,) * 6
+    force = [round(value * COUNTS_PER_NEWTON) for value in wrench[:3]]
+    return force + [round(value * 1e3 * COUNTS_PER_NEWTON_MILLIMETRE) for value in wrench[3:]]
+
+
+def _serve_page(host: str, page: str) -> int:
+    """Serve the calibration from a thread; return its port."""
+
+    class Page(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            found = self.path == "/netftapi2.xml"
+            body = page.encode() if found else b""
+            self.send_response(200 if found else 404)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Say nothing."""
+
+    server = ThreadingHTTPServer((host, 0), Page)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    return int(server.server_address[1])

@@ -1,0 +1,144 @@
+"""The motor behind the wire: a control table with the rules of the real one, and a torque on the plant."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from rsea_ros.hardware.device import State
+from rsea_ros.hardware.peer.registers import EEPROM, MODELS, READ_ONLY, TABLE_SIZE
+
+FAILED, UNKNOWN, RANGE, LENGTH, LIMIT, ACCESS = 1, 2, 4, 5, 6, 7
+TORQUE_MODE = 0
+WATCHDOG_UNIT = 20_000_000
+"""ns"""
+TRIPPED = -1
+
+
+class Plant(Protocol):
+    """The mechanics: advance to now and measure; hold a torque (N m) from now on."""
+
+    def read(self) -> State:
+        """Return the newest measurement."""
+
+    def write(self, torque: float) -> None:
+        """Hold a torque."""
+
+
+class Motor:
+    """One motor. torque_constant: N m at the gear output per A. origin: counts where the plant is at 0 rad.
+
+    history: every change of the torque that acts, as (clock in ns, goal in counts, whether torque is on).
+    """
+
+    def __init__(self, number: int, plant: Plant, torque_constant: float, origin: int = 1234) -> None:
+        self.model, self._plant = MODELS[number], plant
+        self._constant, self._origin = torque_constant, origin
+        self.memory = bytearray(TABLE_SIZE)
+        self.history: list[tuple[int, int, bool]] = []
+        self._touched = 0
+        for name, register in self.model.registers.items():
+            self.put(name, register.start)
+        self.memory[0:2] = number.to_bytes(2, "little")
+        self.memory[6] = 38
+
+    def get(self, name: str) -> int:
+        """Return an item, signed."""
+        register = self.model.registers[name]
+        raw = self.memory[register.address : register.address + register.size]
+        return int.from_bytes(raw, "little", signed=register.signed)
+
+    def put(self, name: str, value: int) -> None:
+        """Set an item, whatever the rules for hosts say."""
+        register = self.model.registers[name]
+        modulus = 1 << 8 * register.size
+        data = (int(value) % modulus).to_bytes(register.size, "little")
+        self.memory[register.address : register.address + register.size] = data
+
+    @property
+    def alert(self) -> bool:
+        """Whether the hardware error status is set."""
+        return self.get("hardware_error") != 0
+
+    def serve(self, now: int) -> None:
+        """Look after the bus watchdog; a tripped one takes the torque away until it is set to 0."""
+        armed = self.get("watchdog") if "watchdog" in self.model.registers else 0
+        if armed > 0 and now - self._touched > armed * WATCHDOG_UNIT:
+            self.put("watchdog", TRIPPED)
+            self.put("goal", 0)
+            self._act(now)
+
+    def read(self, now: int, address: int, length: int) -> tuple[int, bytes]:
+        """Return error code and bytes, with what is measured brought up to date."""
+        self._touched = now
+        if not 0 < length <= TABLE_SIZE - address:
+            return LENGTH, b""
+        self._measure(now)
+        return 0, bytes(self.memory[address : address + length])
+
+    def write(self, now: int, address: int, data: bytes) -> int:
+        """Write bytes over whole items; return the error code. Nothing is written when one is not allowed."""
+        self._touched = now
+        items, at = [], address
+        while at < address + len(data):
+            name = next((n for n, r in self.model.registers.items() if r.address == at), "")
+            if not name:
+                return ACCESS
+            register = self.model.registers[name]
+            items.append((name, data[at - address : at - address + register.size]))
+            at += register.size
+        if at != address + len(data):
+            return LENGTH
+        error = next(filter(None, (self._refusal(name, raw) for name, raw in items)), 0)
+        for name, raw in items if not error else ():
+            register = self.model.registers[name]
+            self.memory[register.address : register.address + register.size] = raw
+            self._act(now)
+        return error
+
+    def _refusal(self, name: str, raw: bytes) -> int:
+        register = self.model.registers[name]
+        value = int.from_bytes(raw, "little", signed=register.signed)
+        if register.access is READ_ONLY or (register.access is EEPROM and self.get("torque_enable")):
+            return ACCESS
+        if name == "torque_enable" and value and self.alert:
+            return ACCESS
+        if not register.low <= value <= register.high or (name == "goal" and self._tripped()):
+            return RANGE
+        return LIMIT if name == "goal" and abs(value) > self.get("torque_limit") else 0
+
+    def _tripped(self) -> bool:
+        return "watchdog" in self.model.registers and self.get("watchdog") == TRIPPED
+
+    def shut_down(self, now: int, bits: int) -> None:
+        """Set hardware errors; those that the shutdown item names take the torque away until a reboot."""
+        self.put("hardware_error", self.get("hardware_error") | bits)
+        if bits & self.get("shutdown"):
+            self.put("torque_enable", 0)
+        self._act(now)
+
+    def reboot(self, now: int) -> None:
+        """Begin anew: RAM as after power-on, EEPROM kept, torque off."""
+        for name, register in self.model.registers.items():
+            if register.access is not EEPROM:
+                self.put(name, register.start)
+        self._act(now)
+
+    def torque(self) -> float:
+        """Return the torque that acts, N m."""
+        on = self.get("torque_enable") and self.get("mode") == TORQUE_MODE and not self._tripped()
+        return self.get("goal") * self.model.ampere * self._constant if on else 0.0
+
+    def _act(self, now: int) -> None:
+        entry = (now, self.get("goal"), bool(self.get("torque_enable")))
+        self.history.append(entry)
+        self._plant.write(self.torque())
+
+    def _measure(self, now: int) -> None:
+        state = self._plant.read()
+        model = self.model
+        self.put("position", self._origin + round(state.position / (2 * math.pi) * model.counts_per_turn))
+        self.put("velocity", round(state.velocity / model.radian_per_second))
+        self.put("current", round(state.motor_torque / self._constant / model.ampere))
+        if "tick" in model.registers:
+            self.put("tick", now // 1_000_000 % 32768)

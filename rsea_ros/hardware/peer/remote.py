@@ -1,0 +1,80 @@
+"""A bench in a process of its own, as whoever started it sees it: where it is, and requests to it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rsea_ros.errors import DeviceError
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+class RemoteBench:
+    """Start `rsea bench`; leave the block, and it is gone.
+
+    port, ft_port, page_port: where the motor, the RDT stream and the calibration are.
+    """
+
+    def __init__(self, path: Path, *options: object) -> None:
+        command = [sys.executable, "-m", "rsea_ros", "bench", "--port", str(path), "--requests"]
+        self._process = subprocess.Popen(
+            [*command, *map(str, options)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            start_new_session=True,
+        )  # fmt: skip
+        place = self._receive()
+        self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])
+
+    def __enter__(self) -> RemoteBench:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def parameters(self) -> dict[str, object]:
+        """Return what a driver node must be told to find it."""
+        return {
+            "device": "dynamixel_netft", "port": self.port, "ft_host": "127.0.0.1",
+            "ft_port": self.ft_port, "ft_page_port": self.page_port,
+        }  # fmt: skip
+
+    def ask(self, do: str, **values: object) -> dict[str, Any]:
+        """Send a request and return its answer. Raises DeviceError for one that it cannot do."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps({"do": do, **values}).encode() + b"\n")
+        self._process.stdin.flush()
+        answer = self._receive()
+        if "error" in answer:
+            raise DeviceError(f"bench: {answer['error']}")
+        return answer
+
+    def log(self, since: int = 0) -> dict[str, Any]:
+        """Return what the bench has seen and sent since an instant of the monotonic clock, ns."""
+        result: dict[str, Any] = self.ask("log", since=since)["result"]
+        return result
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        if self._process.poll() is None:
+            self._process.stdin.close()
+            try:
+                self._process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+        self._process.stdout.close()
+
+    def _receive(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise DeviceError(f"bench ended with status {self._process.wait()}, expected an answer")
+        answer: dict[str, Any] = json.loads(line)
+        return answer

@@ -1,0 +1,101 @@
+"""Requests to a running bench: one JSON object a line on stdin, one a line back on stdout."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.ft import SATURATED, ForceSensor
+from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
+from rsea_ros.hardware.peer.motor import Motor
+
+Request = Mapping[str, Any]
+LOWEST_VOLTAGE, VOLTAGE_ERROR = 18.0, 1
+
+
+class LineRequests:
+    """`{"do": NAME, …}`; the answer has `t`, the clock (ns) at which it was done, or `error`.
+
+    misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
+    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), watch (keep F/T records), log, quit.
+    """
+
+    def __init__(
+        self, motor: Motor, bus: Bus, sensor: ForceSensor, wrong: Misbehaviour, inlet: int, outlet: int
+    ) -> None:
+        self._motor, self._bus, self._sensor, self._wrong = motor, bus, sensor, wrong
+        self.descriptor, self._outlet, self._text = inlet, outlet, b""
+        self._does: dict[str, Callable[[int, Request], object]] = {
+            "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
+            "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(),
+            "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
+            "ft_restart": lambda now, r: sensor.restart(),
+            "ft_status": self._ft_status, "watch": self._watch, "log": self._log,
+        }  # fmt: skip
+
+    def serve(self, now: int) -> bool:
+        """Do what has arrived; return False at the end of input or on `quit`."""
+        data = os.read(self.descriptor, 65536)
+        self._text += data
+        *lines, self._text = self._text.split(b"\n")
+        for line in filter(None, lines):
+            answer = self._do(now, line)
+            if answer is None:
+                return False
+            self._tell(answer)
+        return bool(data)
+
+    def _tell(self, answer: dict[str, Any]) -> None:
+        text = memoryview(json.dumps(answer).encode() + b"\n")
+        while text:
+            text = text[os.write(self._outlet, text) :]
+
+    def _do(self, now: int, line: bytes) -> dict[str, Any] | None:
+        try:
+            request = json.loads(line)
+            if request["do"] == "quit":
+                return None
+            return {"t": now, "result": self._does[request["do"]](now, request)}
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            known = ", ".join(self._does)
+            return {"error": f"{line.decode(errors='replace')}: {error!r}, expected one of {known}, quit"}
+
+    def _misbehave(self, now: int, request: Request) -> None:
+        known = {field.name for field in fields(Misbehaviour)} - {"done"}
+        for name in set(request) - {"do"}:
+            if name not in known:
+                raise KeyError(name)
+            setattr(self._wrong, name, request[name])
+
+    def _set(self, now: int, request: Request) -> None:
+        for name in set(request) - {"do"}:
+            self._motor.put(name, int(request[name]))
+
+    def _alert(self, now: int, request: Request) -> None:
+        self._motor.shut_down(now, int(request["bits"]))
+
+    def _sag(self, now: int, request: Request) -> None:
+        self._motor.put("voltage", round(10 * float(request["voltage"])))
+        if float(request["voltage"]) < LOWEST_VOLTAGE:
+            self._motor.shut_down(now, VOLTAGE_ERROR)
+
+    def _ft_status(self, now: int, request: Request) -> None:
+        self._sensor.status = int(request.get("bits", SATURATED))
+
+    def _watch(self, now: int, request: Request) -> None:
+        self._sensor.keep = bool(request.get("on", True))
+
+    def _log(self, now: int, request: Request) -> dict[str, Any]:
+        since = int(request.get("since", 0))
+        return {
+            "torque": [entry for entry in self._motor.history if entry[0] >= since],
+            "replies": [(t, address, data.hex()) for t, address, data in self._bus.sent if t >= since],
+            "records": [entry for entry in self._sensor.sent if entry[0] >= since],
+            "ft_gone": self._sensor.gone,
+            "misbehaved": self._wrong.done,
+            "damaged_requests": self._bus.unknown,
+        }

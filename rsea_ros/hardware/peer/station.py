@@ -1,0 +1,59 @@
+"""The bench as one loop: serial line, F/T stream and requests of whoever runs it, at their instants."""
+
+from __future__ import annotations
+
+import select
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from rsea_ros.hardware.peer.bus import Bus
+from rsea_ros.hardware.peer.ft import ForceSensor
+from rsea_ros.hardware.peer.motor import Motor, Plant
+
+TICK = 1_000_000
+"""ns; the plant is advanced at least so often."""
+
+
+class Requests(Protocol):
+    """Where requests come from."""
+
+    descriptor: int
+
+    def serve(self, now: int) -> bool:
+        """Do what is asked; return False when the bench shall end."""
+
+
+class Station:
+    """Runs until its requests say so. Clocks are monotonic, ns."""
+
+    def __init__(self, plant: Plant, motor: Motor, bus: Bus, sensor: ForceSensor, requests: Requests) -> None:
+        self._plant, self._motor, self._bus, self._sensor = plant, motor, bus, sensor
+        self._requests = requests
+        self._tick = 0
+
+    def run(self, clock: Callable[[], int] = time.monotonic_ns) -> None:
+        """Serve everybody."""
+        while True:
+            ready = self._wait(clock)
+            now = clock()
+            if self._bus.descriptor in ready:
+                self._bus.serve(now)
+            if self._sensor.descriptor in ready:
+                self._sensor.serve(now)
+            self._sensor.tick(now)
+            self._bus.flush(now)
+            self._motor.serve(now)
+            if now >= self._tick:
+                self._plant.read()
+                self._tick = now + TICK
+            if self._requests.descriptor in ready and not self._requests.serve(now):
+                return
+
+    def _wait(self, clock: Callable[[], int]) -> list[int]:
+        due = min(filter(None, (self._tick, self._bus.next_due, self._sensor.next_due)), default=0)
+        places = [self._sensor.descriptor, self._requests.descriptor]
+        if self._bus.descriptor >= 0:
+            places.append(self._bus.descriptor)
+        ready, _, _ = select.select(places, (), (), max(0.0, (due - clock()) / 1e9))
+        return ready

@@ -1,0 +1,100 @@
+"""A bench on a wire in a process of its own, and the driver's loop without ROS in this one."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
+from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.peer.remote import RemoteBench
+
+PERIOD = 1.0 / 280.0
+STIFFNESS = 1530.456
+LATENCY, FT_TIMEOUT = 0.05, 0.2
+"""s; a machine that is busy with other tests must not look like a fault."""
+
+
+def device_on(bench, limits=None, **motor):
+    """The driver's device on a bench."""
+    settings = MotorSettings(bench.port, 4_000_000, latency=motor.pop("latency", LATENCY), **motor)
+    sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
+    return DynamixelNetft(settings, sensor, limits or Limits(68.0), STIFFNESS)
+
+
+class Loop:
+    """The driver's loop, run by the test: each cycle wants `torque`."""
+
+    def __init__(self, bench, limits=None, **motor):
+        self.bench = bench
+        self.device = device_on(bench, limits, **motor)
+        self.device.open()
+        self.guarded = Guarded(self.device, limits or Limits(68.0), 1.0 / PERIOD)
+        self.states = []
+
+    def cycle(self, torque, age=0.0):
+        """One cycle at about its pace; returns what was written."""
+        time.sleep(PERIOD)
+        state = self.guarded.read()
+        if state is not None:
+            self.states.append(state)
+        return self.guarded.write(torque, age)
+
+    def cycles(self, count, torque, age=0.0):
+        """Several; returns what was written in each."""
+        return [self.cycle(torque, age) for _ in range(count)]
+
+    def until_fault(self, torque, most=400):
+        """Run until a fault is latched; returns how many cycles that took."""
+        for count in range(1, most + 1):
+            self.cycle(torque)
+            if self.guarded.fault is not None:
+                return count
+        raise AssertionError(f"no fault in {most} cycles")
+
+    def close(self):
+        """End it."""
+        self.device.close()
+
+
+@pytest.fixture(scope="package")
+def benches(tmp_path_factory):
+    """A function that gives the running bench of a model, made on first use."""
+    made = {}
+
+    def bench(model=54024):
+        if model not in made:
+            path = tmp_path_factory.mktemp("bench") / f"tty{model}"
+            made[model] = RemoteBench(path, "--model", model)
+        return made[model]
+
+    yield bench
+    for each in made.values():
+        each.close()
+
+
+@pytest.fixture
+def loop(benches, request):
+    """An enabled loop that commands 10 N m, on the bench of the model that the test asks for."""
+    bench = benches(getattr(request, "param", 54024))
+    well_behaved(bench)
+    running = Loop(bench)
+    running.guarded.enable()
+    running.cycles(5, 10.0)
+    assert running.guarded.fault is None
+    yield running
+    well_behaved(bench)
+    running.close()
+
+
+def well_behaved(bench):
+    """Undo every misbehaviour."""
+    bench.ask("appear")
+    calm = dict.fromkeys(("drop", "delay", "corrupt", "truncate", "wrong_crc", "ft_drop"), 0.0)
+    bench.ask("misbehave", unstuffed=False, silent=False, ft_silent=False, **calm)
+    bench.ask("set", hardware_error=0, voltage=240, temperature=32)
+    bench.ask("ft_status", bits=0)

@@ -1,0 +1,139 @@
+"""Every fault on the wire: latched, torque zero in the cycle that sees it, over by its service."""
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+
+WITHIN = 3
+ALL = (54024, 54025, 2020)
+FAULTS = {
+    "silent": (("misbehave", {"silent": True}), ("misbehave", {"silent": False}), "no_reply"),
+    "wrong CRC": (("misbehave", {"wrong_crc": 1.0}), ("misbehave", {"wrong_crc": 0.0}), "no_reply"),
+    "truncated": (("misbehave", {"truncate": 1.0}), ("misbehave", {"truncate": 0.0}), "no_reply"),
+    "corrupt": (("misbehave", {"corrupt": 1.0}), ("misbehave", {"corrupt": 0.0}), "no_reply"),
+    "dropped": (("misbehave", {"drop": 1.0}), ("misbehave", {"drop": 0.0}), "no_reply"),
+    "late": (("misbehave", {"delay": 1.0, "late": 0.2}), ("misbehave", {"delay": 0.0}), "no_reply"),
+    "hot": (("set", {"temperature": 71}), ("set", {"temperature": 32}), "temperature"),
+    "F/T saturated": (("ft_status", {"bits": 0x80020000}), ("ft_status", {"bits": 0}), "ft"),
+    "port vanished": (("vanish", {}), ("appear", {}), "portlost"),
+}
+
+
+def torques(bench, since):
+    """Goal and whether torque is on, of each write that the motor has seen since."""
+    return [(goal, on) for _, goal, on in bench.log(since)["torque"]]
+
+
+def acting(bench, since):
+    """How many writes since then were of a torque that acts."""
+    return sum(goal != 0 and on for goal, on in torques(bench, since))
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_latched_within_its_cycles_and_cleared_by_the_service(loop, name):
+    (wrong, how), (right, back), cause = FAULTS[name]
+    since = loop.bench.ask(wrong, **how)["t"]
+    assert loop.until_fault(10.0) <= WITHIN + 1  # the one during which it began
+    assert loop.guarded.fault.cause == cause
+    assert loop.cycles(5, 10.0) == [0.0] * 5
+    if name != "port vanished":
+        assert torques(loop.bench, since)[-1][0] == 0
+        assert acting(loop.bench, since) <= WITHIN + 1
+    loop.bench.ask(right, **back)
+    loop.cycles(2, 10.0)
+    assert loop.guarded.fault.cause == cause, "it is latched"
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+    assert torques(loop.bench, since)[-1][0] != 0 and torques(loop.bench, since)[-1][1]
+
+
+@pytest.mark.parametrize("loop", ALL, indirect=True)
+def test_a_hardware_error_needs_a_reboot_and_is_over_after_it(loop):
+    since = loop.bench.ask("alert", bits=0x20)["t"]
+    assert loop.until_fault(10.0) <= WITHIN
+    assert str(loop.guarded.fault) == "hardware_error: overload"
+    assert loop.cycles(3, 10.0) == [0.0] * 3
+    assert torques(loop.bench, since)[-1] == (0, False)
+    with pytest.raises(DeviceError, match="hardware error overload, expected a reboot"):
+        loop.guarded.clear()
+    loop.guarded.reboot()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+    assert torques(loop.bench, since)[-1][1]
+
+
+def test_a_voltage_that_sags_is_the_motors_own_error(loop):
+    loop.bench.ask("sag", voltage=17.0)
+    assert loop.until_fault(10.0) <= WITHIN
+    assert str(loop.guarded.fault) == "hardware_error: voltage"
+    assert loop.states[-1].voltage == pytest.approx(17.0)
+    loop.guarded.reboot()
+    assert loop.cycles(2, 10.0) == [10.0] * 2
+
+
+def test_a_motor_that_rebooted_by_itself_gets_no_torque_until_it_is_cleared(loop):
+    loop.device._motor.bus.reboot()
+    assert loop.until_fault(10.0) <= WITHIN + 1
+    assert loop.guarded.fault.cause == "no_reply"
+    loop.guarded.reboot()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+@pytest.mark.parametrize("loop", (54025, 2020), indirect=True)
+def test_a_tripped_bus_watchdog_is_a_fault_and_cleared_by_the_service(loop):
+    since = loop.bench.ask("set", watchdog=-1)["t"]
+    assert loop.until_fault(10.0) <= WITHIN
+    assert loop.guarded.fault.cause == "refused"
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+    assert torques(loop.bench, since)[-1][0] != 0
+
+
+def test_an_ft_gap_is_counted_exactly_and_no_fault(loop):
+    loop.bench.ask("ft_gap", records=123)
+    loop.cycles(20, 10.0)
+    assert loop.guarded.fault is None
+    assert loop.device.health()["ft_lost"] == 123
+
+
+@pytest.mark.parametrize("how", [("misbehave", {"ft_silent": True}), ("ft_restart", {})])
+def test_a_lost_ft_stream_is_a_fault_after_its_time_out(loop, how):
+    loop.bench.ask(how[0], **how[1])
+    loop.until_fault(10.0)
+    assert loop.guarded.fault.cause == "ft"
+    assert loop.cycles(3, 10.0) == [0.0] * 3
+    loop.bench.ask("misbehave", ft_silent=False)
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+def test_the_condition_latch_alone_is_no_fault(loop):
+    loop.bench.ask("ft_status", bits=0x80010000)
+    loop.cycles(20, 10.0)
+    assert loop.guarded.fault is None
+
+
+def test_one_lost_reply_costs_one_cycle(loop):
+    for kind in ("drop", "corrupt", "truncate", "wrong_crc"):
+        read = len(loop.states)
+        loop.bench.ask("misbehave", **{kind: 1.0})
+        loop.cycle(10.0)
+        loop.bench.ask("misbehave", **{kind: 0.0})
+        loop.cycles(2, 10.0)
+        assert len(loop.states) == read + 2, kind
+    assert loop.guarded.fault is None
+    errors = loop.device.health()
+    assert errors["bus_lost"] + errors["bus_corrupt"] == 8  # a read and a write each
+
+
+def test_a_clear_that_finds_the_cause_still_there_is_refused(loop):
+    loop.bench.ask("ft_status", bits=0x80020000)
+    loop.until_fault(10.0)
+    with pytest.raises(DeviceError, match="saturation, status 0x80020000 is still there"):
+        loop.guarded.clear()
+    assert loop.guarded.fault.cause == "ft"
+
+
+def test_closing_leaves_torque_zero_and_off(loop):
+    since = loop.bench.ask("set", temperature=32)["t"]
+    loop.close()
+    assert torques(loop.bench, since)[-1] == (0, False)
