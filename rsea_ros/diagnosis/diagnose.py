@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.compare import misfits, spectrum
+from rsea_ros.diagnosis.experiment import amplitude_series, separating
 from rsea_ros.diagnosis.faults import Checked, check
 from rsea_ros.diagnosis.judge import gain
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected, Verdict
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search, Trial, fitted, search
 from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
 from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
@@ -106,6 +107,7 @@ def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], 
         misfit=where,
         causes=causes,
         rejected=tuple(_rejected(t, first.judged, found.cases, channel) for t in _latest(found.trials) if t.name not in named),
+        next_experiment=_next_experiment(found, stages, verdict, records[0]),
         remaining=misfits(case, last.outputs[0], channel, rig),
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
@@ -155,8 +157,19 @@ def _cause(found: Search, without: Stage, with_it: Stage, channel: str) -> Cause
         evidence=evidence_of(effect, speaks, without.judged.ratio(speaks), with_it.judged.ratio(speaks), held_out),
         equation=effect.equation,
         channel=speaks,
-        confusable_with=found.confusable.get(effect.name, ()),
+        confusable_with=tuple(m.causes[-1] for m in found.rivals.get(effect.name, ())),
     )
+
+
+def _next_experiment(found: Search, stages: Sequence[Stage], verdict: Verdict, record: Record) -> Experiment | None:
+    """Return the run that would tell what these data cannot; None when nothing is left to tell."""
+    for stage in stages[1:]:
+        rivals = found.rivals.get(stage.solution.problem.rig.effects[-1].name, ())
+        if rivals:
+            return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
+    if verdict in ("unexplained", "partly_explained"):
+        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
+    return None
 
 
 def _latest(trials: Sequence[Trial]) -> list[Trial]:

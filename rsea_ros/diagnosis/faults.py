@@ -43,6 +43,8 @@ def check(record: Record, rig: Rig) -> Checked:
         bad = np.zeros(len(channel), bool)
         for kind, find in FINDERS.items():
             found = find(channel, name) & ~bad
+            if kind == "frozen_samples":
+                found = while_others_moved(repaired, name, found)
             if found.mean() > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
                 faults.append(Fault(kind, name, float(found.mean())))
                 bad |= found
@@ -99,28 +101,39 @@ def _common(y: FloatArray, extreme: float) -> bool:
 
 
 def frozen(channel: Channel, name: str) -> BoolArray:
-    """Return which samples repeat the one before where the signal was moving.
+    """Return which samples repeat the one before more often than a quantum explains.
 
-    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then. Only a
-    surplus of repeats over that, at a place where the samples around move, is a frozen sensor.
+    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then.
     """
     if name in ("command", "reference"):
         return np.zeros(len(channel), bool)
     step = np.diff(channel.y, prepend=np.nan)
-    repeat = step == 0.0
+    repeat: BoolArray = step == 0.0
     moving = np.abs(step[np.isfinite(step) & ~repeat])
-    if not len(moving) or not repeat.any():
-        return np.zeros(len(channel), bool)
-    quantum = float(moving.min())
-    by_chance = int((moving < 1.5 * quantum).sum()) / 2
-    surplus = repeat.sum() - 1.5 * by_chance
-    if surplus < max(5.0, _SMALLEST_SHARE * len(channel)):
-        return np.zeros(len(channel), bool)
-    jump = np.abs(np.concatenate([channel.y[3:] - channel.y[:-3], np.full(3, np.nan)]))
-    around = np.nan_to_num(np.maximum(jump, np.roll(jump, 3)))
-    still: BoolArray = repeat & ((around > 6.0 * quantum) | (by_chance < 0.05 * repeat.sum()))
-    return still
+    if not len(moving):
+        return repeat
+    by_chance = float((moving < 1.5 * float(moving.min())).sum()) / 2.0
+    surplus = float(repeat.sum()) - 1.5 * by_chance
+    return repeat if surplus > max(5.0, _SMALLEST_SHARE * len(channel)) else np.zeros(len(channel), bool)
 
+
+def while_others_moved(record: Record, name: str, repeat: BoolArray) -> BoolArray:
+    """Return the repeats at which another sensor shows motion: a sensor that stands still with the machine is well.
+
+    Half of all samples move by more than the median; where a machine sticks few do.
+    """
+    witness = next((n for n in _WITNESSES.get(name, ()) if n in record and len(record[n]) > 1), None)
+    if witness is None or not repeat.any():
+        return repeat
+    t = record[name].t
+    seen = np.abs(np.diff(np.interp(t, record[witness].t, np.nan_to_num(record[witness].y)), prepend=np.nan))
+    moved = repeat & (seen > np.nanmedian(seen))
+    return repeat if moved.sum() > _MOVED * repeat.sum() else np.zeros(len(t), bool)
+
+
+_WITNESSES = {"position": ("ft", "velocity"), "ft": ("position", "velocity"), "velocity": ("ft", "position")}
+_MOVED = 0.3
+"""Share of the repeats that fall into motion when a sensor freezes at any time; by chance 0.5."""
 
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
     "nan": not_finite,

@@ -63,7 +63,6 @@ class Trial:
     round: int
     model: Model | None
     why: str
-    confusable: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Search:
     cases: tuple[Case, ...]
     models: tuple[Model, ...]
     trials: tuple[Trial, ...] = ()
-    confusable: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
 
     @property
     def last(self) -> Model:
@@ -122,7 +121,7 @@ def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell
     cases = requieted(cases, models[0])
     models = [fitted(cases, nominal, models[0].solution.theta)]
     trials: list[Trial] = []
-    confusable: dict[str, tuple[str, ...]] = {}
+    equals: dict[str, tuple[Model, ...]] = {}
     for number in range(MOST_CAUSES):
         if at_floor(models[-1], cases):
             break
@@ -130,12 +129,12 @@ def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell
         trials += tried
         if accepted is None:
             break
-        confusable[accepted.causes[-1]] = rivals
+        equals[accepted.causes[-1]] = rivals
         quieter = requieted(cases, accepted)
         accepted = fitted(quieter, accepted.solution.problem, accepted.solution.theta)
         models = [*(rescored(quieter, m) for m in models), accepted]
         cases = quieter
-    return without_needless(Search(cases, tuple(models), tuple(trials), confusable))
+    return without_needless(Search(cases, tuple(models), tuple(trials), equals))
 
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
@@ -144,7 +143,7 @@ def at_floor(model: Model, cases: Sequence[Case]) -> bool:
     return all(standing.ratio(n) < AT_FLOOR for n in standing.sums)
 
 
-def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Executor, tell: Tell) -> tuple[Model | None, list[Trial], tuple[str, ...]]:  # fmt: skip
+def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Executor, tell: Tell) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:  # fmt: skip
     """Try every effect that is not in the model; return the one to accept, all trials, and its equal rivals.
 
     All are screened and the promising fitted on short pieces; the best of those are fitted on all that fits.
@@ -185,8 +184,8 @@ def _share(number: int, within: float) -> float:
     return 1.0 - 0.5**number * (1.0 - 0.5 * within)
 
 
-def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[str, ...]]:
-    """Return the model to accept and the names that do as well with no more parameters.
+def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[Model, ...]]:
+    """Return the model to accept and those that do as well with no more parameters.
 
     Of all that are not surely and materially worse than the best, the simplest; of equals, the one that
     needs the least of what is known beforehand.
@@ -196,7 +195,7 @@ def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[str, ...]]:
     best = min(models, key=lambda m: float(m.choose.loss.sum()))
     contenders = [m for m in models if m is best or not compare(best.choose, m.choose).better]
     simplest = min(contenders, key=lambda m: (m.parameters, prior_cost(m.solution) + loss_excess(m, best)))
-    rivals = tuple(m.causes[-1] for m in contenders if m is not simplest and m.parameters <= simplest.parameters)
+    rivals = tuple(m for m in contenders if m is not simplest and m.parameters <= simplest.parameters)
     return simplest, rivals
 
 

@@ -1,6 +1,6 @@
 """What the friction effects share: the mean over a step of a friction torque, without limits on the step.
 
-The law is F tanh(w / w_c), which is F sign(w) but for a creep below w_c = CREEP (presliding). Over a step in
+The law is F tanh(w / w_c), which is F sign(w) but for a creep below w_c (presliding). Over a step in
 which w goes straight from w_0 to w_1 its mean is, exactly,
 
     F w_c (ln cosh(w_1 / w_c) - ln cosh(w_0 / w_c)) / (w_1 - w_0)
@@ -13,7 +13,13 @@ import math
 
 from numba import njit
 
+from rsea_ros.effects.effect import Parameter
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
+
+PRESLIDING = Parameter(
+    "creep_velocity", "rad/s", null=2e-3, low=3e-4, high=2e-2, typical=2e-3, logarithmic=True, optional=True
+)
+"""Below it a gear with friction creeps instead of standing still; every friction effect has it."""
 
 _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
 _TURNS = 3.0  # in creep velocities: below it the motion may turn, and its speed does not go straight there
@@ -21,15 +27,16 @@ _PARTS = 4  # of such a step
 
 
 @njit(inline="always")
-def mean_friction(s, size, last):  # type: ignore[no-untyped-def]
+def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
     """Return the mean friction torque (N m, against motion when positive) of this step.
 
     size: friction torque at speed, N m. last: what this function returned at its last evaluation, which is
-    already in the predicted end of the step.
+    already in the predicted end of the step. presliding: w_c, rad/s; s[CREEP] replaces it where that is set.
     """
-    start = (s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]) / s[CREEP]
-    predicted = (s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN]) / s[CREEP]
-    mobility = s[MOBILITY] / s[CREEP]
+    creep = s[CREEP] if s[CREEP] > 0.0 else presliding
+    start = (s[GEAR_VELOCITY] - 0.5 * s[GEAR_VELOCITY_SPAN]) / creep
+    predicted = (s[GEAR_VELOCITY] + 0.5 * s[GEAR_VELOCITY_SPAN]) / creep
+    mobility = s[MOBILITY] / creep
     free, gain = predicted + mobility * last, mobility * size
     if start > _SLIDES and free - gain > _SLIDES:
         return size

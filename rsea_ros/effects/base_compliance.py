@@ -54,7 +54,9 @@ EFFECT = Effect(
             starts=(0.05, 3.0),
             logarithmic=True,
         ),
-        Parameter("damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True),
+        Parameter(
+            "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True, optional=True
+        ),
     ),
     claims=Claims(
         "position", "odd", amplitude_exponent=1.0, passive=True, confusable_with=("structural_resonance",)

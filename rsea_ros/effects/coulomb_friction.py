@@ -2,11 +2,11 @@
 
     T = -torque * sign(w),   w the speed of the gear output against the housing
 
-The sign is smoothed below 2 mrad/s, see _friction.py. Source: Armstrong-Helouvry, Control of Machines with
+The sign is smoothed below creep_velocity (presliding), see _friction.py. Source: Armstrong-Helouvry, Control of Machines with
 Friction, 1991, ch. 2.
 """
 
-from rsea_ros.effects._friction import mean_friction
+from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
@@ -14,14 +14,14 @@ from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
-    x[0] = mean_friction(s, p[0], x[0])
+    x[0] = mean_friction(s, p[0], x[0], p[1])
     s[GEAR_TORQUE] -= x[0]
 
 
 EFFECT = Effect(
     name="coulomb_friction",
     port=Port.GEAR,
-    parameters=(Parameter("torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),),
+    parameters=(Parameter("torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0), PRESLIDING),
     claims=Claims(
         "velocity",
         "odd",
@@ -33,5 +33,5 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="friction torque of fixed size against the motion",
-    equation="T = -torque · sign(ω)",
+    equation="T = -torque · sign(ω), smooth below creep_velocity",
 )

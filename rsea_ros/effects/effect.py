@@ -35,6 +35,7 @@ class Parameter:
 
     null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
     may well have. starts: where fits begin besides `typical`, for problems with several minima.
+    optional: may be left out; then it is `null`.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Parameter:
     typical: float
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -107,12 +109,19 @@ class Effect:
         for name in parameters:
             if name not in names:
                 raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, {expected}")
+        full = self.complete(parameters)
         for name in names:
-            if name not in parameters:
-                raise ParameterError(f"effect {self.name}: parameter {name!r} is missing, {expected}")
-            if math.isnan(parameters[name]):
+            if name not in full:
+                raise ParameterError(
+                    f"effect {self.name}: parameter {name!r} is missing, expected {', '.join(names)}"
+                )
+            if math.isnan(full[name]):
                 raise ParameterError(f"effect {self.name}: {name} = nan, expected a number")
-        return tuple(float(parameters[name]) for name in names)
+        return tuple(float(full[name]) for name in names)
+
+    def complete(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters with the optional ones that were left out at their null value."""
+        return {p.name: p.null for p in self.parameters if p.optional} | dict(parameters)
 
 
 def compiled(function: Callable[[Any, Any, Any], None]) -> Any:

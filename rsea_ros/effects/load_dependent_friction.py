@@ -3,10 +3,10 @@
     T = -coefficient * |T_s| * sign(w)
 
 T_s is the torque in the spring, w the speed of the gear output against the housing; the sign is smoothed
-below 2 mrad/s, see _friction.py. Source: facts.md section 3 (no-load drag is a fraction of b_m).
+below creep_velocity (presliding), see _friction.py. Source: facts.md section 3 (no-load drag is a fraction of b_m).
 """
 
-from rsea_ros.effects._friction import mean_friction
+from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 
@@ -14,14 +14,14 @@ from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
-    x[0] = mean_friction(s, p[0] * abs(s[LOAD]), x[0])
+    x[0] = mean_friction(s, p[0] * abs(s[LOAD]), x[0], p[1])
     s[GEAR_TORQUE] -= x[0]
 
 
 EFFECT = Effect(
     name="load_dependent_friction",
     port=Port.GEAR,
-    parameters=(Parameter("coefficient", "1", null=0.0, low=0.0, high=1.0, typical=0.15),),
+    parameters=(Parameter("coefficient", "1", null=0.0, low=0.0, high=1.0, typical=0.15), PRESLIDING),
     claims=Claims(
         "velocity",
         "odd",
@@ -32,5 +32,5 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY, LOAD),
     about="friction that grows with the torque in the spring",
-    equation="T = -coefficient · |T_s| · sign(ω)",
+    equation="T = -coefficient · |T_s| · sign(ω), smooth below creep_velocity",
 )

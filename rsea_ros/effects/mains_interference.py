@@ -22,7 +22,16 @@ EFFECT = Effect(
     parameters=(
         Parameter("amplitude", "N m", null=0.0, low=0.0, high=10.0, typical=0.3),
         Parameter("frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,)),
-        Parameter("phase", "rad", null=0.0, low=-math.pi, high=math.pi, typical=0.0, starts=(-1.6, 1.6, 3.1)),
+        Parameter(
+            "phase",
+            "rad",
+            null=0.0,
+            low=-math.pi,
+            high=math.pi,
+            typical=0.0,
+            starts=(-1.6, 1.6, 3.1),
+            optional=True,
+        ),
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0),
     function=apply,

@@ -74,6 +74,6 @@ GEAR_VELOCITY_SPAN = 32  # rad/s, change of GEAR_VELOCITY over the step: it goes
 DEFLECTION_SPAN = 33  # rad, change of DEFLECTION over the step; 0 when COMMIT is 1
 MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to GEAR_VELOCITY at its end
 J_SC = 35  # kg m^2, spring chassis where it turns with the gear output; 0 behind a gear that gives
-CREEP = 36  # rad/s, below which friction creeps instead of standing still
+CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is not 0
 
 SIZE = 37

@@ -2,13 +2,13 @@
 
     T = -(coulomb_torque + stribeck_torque * exp(-(w / stribeck_velocity)^2)) * sign(w)
 
-w is the speed of the gear output against the housing; the sign is smoothed below 2 mrad/s, see
+w is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding), see
 _friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, eq. (3).
 """
 
 import math
 
-from rsea_ros.effects._friction import mean_friction
+from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
@@ -17,7 +17,7 @@ from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
     ratio = s[GEAR_VELOCITY] / p[2]
-    x[0] = mean_friction(s, p[0] + p[1] * math.exp(-ratio * ratio), x[0])
+    x[0] = mean_friction(s, p[0] + p[1] * math.exp(-ratio * ratio), x[0], p[3])
     s[GEAR_TORQUE] -= x[0]
 
 
@@ -30,6 +30,7 @@ EFFECT = Effect(
         Parameter(
             "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, logarithmic=True
         ),
+        PRESLIDING,
     ),
     claims=Claims(
         "velocity",
@@ -42,5 +43,5 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="friction that is larger near rest than at speed",
-    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω)",
+    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω), smooth below creep_velocity",
 )

@@ -83,8 +83,9 @@ def unknowns_of_effect(
     effect: Effect, start: Mapping[str, float], known: Collection[str] = ()
 ) -> tuple[Unknown, ...]:
     """Return the parameters of an effect from a start, without a prior; not those listed as known."""
+    complete = effect.complete(start)
     return tuple(
-        _effect_unknown(effect, p, start[p.name])
+        _effect_unknown(effect, p, complete[p.name])
         for p in effect.parameters
         if f"{effect.name}.{p.name}" not in known
     )
@@ -117,7 +118,8 @@ def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig
 
 
 def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
-    moved = {k: values.get(f"{setting.name}.{k}", v) for k, v in setting.parameters.items()}
+    names = (u for u in values if u.startswith(f"{setting.name}."))
+    moved = {**setting.parameters, **{n.split(".")[1]: values[n] for n in names}}
     return replace(setting, parameters=moved)
 
 

@@ -24,10 +24,6 @@ from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.signals import Channel, FloatArray, Record
 
-CREEP_VELOCITY = 2e-3
-"""rad/s. Below it a gear with friction creeps (presliding); standing still would make the step stiff."""
-
-
 _SENSORS = 1
 """Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
 
@@ -130,7 +126,6 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
-    table[st.CREEP] = CREEP_VELOCITY
     table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import independent
+import slow_equations
 import numpy as np
 import pytest
 from effect_bench import RIG, SIGNALS, command, record_of, rms, simulate
@@ -16,23 +16,23 @@ TOLERANCE = {"ft": 6e-3, "position": 1.5e-6, "velocity": 8e-5}
 
 
 def test_every_effect_has_an_independent_equation():
-    assert set(independent.LAWS) == set(catalogue())
+    assert set(slow_equations.LAWS) == set(catalogue())
 
 
 def test_the_two_benches_are_the_same():
     ours = (RIG["rotor.reflected_inertia"], RIG["chassis.inertia"], RIG["rotor.reflected_damping"],
             RIG["spring.stiffness"], RIG["spring.damping"], RIG["gear.ratio"])  # fmt: skip
-    theirs = (independent.J_M, independent.J_SC, independent.B_M,
-              independent.K_S, independent.B_S, independent.RATIO)  # fmt: skip
+    theirs = (slow_equations.J_M, slow_equations.J_SC, slow_equations.B_M,
+              slow_equations.K_S, slow_equations.B_S, slow_equations.RATIO)  # fmt: skip
     assert ours == theirs
 
 
 @pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
 def test_simulation_obeys_the_equation(effect: Effect):
-    commanded = command(rate=280.0, duration=independent.DURATION)
+    commanded = command(rate=280.0, duration=slow_equations.DURATION)
     simulated = simulate(drive_from(record_of(commanded)), effect.name, effect.typical)
     nominal = simulate(drive_from(record_of(commanded)))
-    true = independent.solve(effect.name, effect.typical, commanded.y, commanded.t[1])
+    true = slow_equations.solve(effect.name, effect.typical, commanded.y, commanded.t[1])
     changed = [n for n in SIGNALS if not np.array_equal(simulated[n], nominal[n])]
     assert changed
     for name in SIGNALS:
