@@ -1,8 +1,8 @@
 """Gauss-Newton with Marquardt's damping on output errors and priors.
 
 The cost is ||r(theta)||^2 + sum ((theta - theta_0) / doubt)^2: residuals over their noise, priors over
-their doubt. Derivatives by forward differences of the simulation; those of the clocks from the time
-derivative of the simulated channels.
+their doubt. Derivatives by forward differences of the simulation; those of the clocks by central ones, of
+all sensors at once.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.unknowns import CLOCK, Unknown, start_vector
+from rsea_ros.identification.problem import Problem, simulated
+from rsea_ros.identification.unknowns import CLOCK, Unknown, apply, start_vector
 from rsea_ros.signals import FloatArray
 
 _DIFFERENCE = 1e-4
+_CLOCK_DIFFERENCE = 1e-6
+"""s. Sensors are read so much earlier and later for the derivatives by their clocks."""
 _SMALLEST_GAIN = 1e-6
 
 
@@ -51,21 +53,23 @@ def in_pool(pool: Executor) -> Map:
     return lambda function, items: list(pool.map(function, items))
 
 
-def jacobian(
-    problem: Problem, theta: FloatArray, residual: FloatArray, outputs: Outputs, run: Map = serial
-) -> FloatArray:
+def jacobian(problem: Problem, theta: FloatArray, residual: FloatArray, run: Map = serial) -> FloatArray:
     """Return d residual / d theta, shape (m, n)."""
-    return jacobian_columns(problem, theta, residual, range(len(theta)), outputs, run)
+    return jacobian_columns(problem, theta, residual, range(len(theta)), run)
 
 
-def jacobian_columns(problem: Problem, theta: FloatArray, residual: FloatArray, which: Sequence[int],
-                     outputs: Outputs | None = None, run: Map = serial) -> FloatArray:  # fmt: skip
-    """Return columns of d residual / d theta, shape (m, len(which)). outputs: at theta, for the clocks."""
+def jacobian_columns(
+    problem: Problem, theta: FloatArray, residual: FloatArray, which: Sequence[int], run: Map = serial
+) -> FloatArray:
+    """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta."""
+
+    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if _is_clock(problem.unknowns[i])}
+    rates = _rates(problem, theta) if clocks else []
 
     def column(i: int) -> FloatArray:
+        if i in clocks:
+            return _clock_column(problem, rates, clocks[i])
         unknown = problem.unknowns[i]
-        if unknown.name.startswith(CLOCK + ".") and outputs is not None:
-            return _clock_column(problem, outputs, unknown.name.split(".")[1])
         moved = theta.copy()
         step = _DIFFERENCE * unknown.scale
         beyond = theta[i] + step > unknown.inner(unknown.high)
@@ -76,16 +80,32 @@ def jacobian_columns(problem: Problem, theta: FloatArray, residual: FloatArray, 
     return np.column_stack(list(run(column, which))) if len(which) else np.empty((len(residual), 0))
 
 
-def _clock_column(problem: Problem, outputs: Outputs, channel: str) -> FloatArray:
+def _is_clock(unknown: Unknown) -> bool:
+    return unknown.name.startswith(CLOCK + ".")
+
+
+def _rates(problem: Problem, theta: FloatArray) -> Outputs:
+    """Return how fast every channel changes at its stamps, per s, from a little later and a little earlier.
+
+    The samples themselves are too far apart to be differentiated.
+    """
+    rig, offsets = apply(problem.rig, problem.unknowns, theta)
+    later, earlier = (
+        simulated(
+            problem.cases, rig, {n: offsets.get(n, 0.0) + shift for n in problem.channels}, ride=problem.ride
+        )
+        for shift in (_CLOCK_DIFFERENCE, -_CLOCK_DIFFERENCE)
+    )
+    span = 2.0 * _CLOCK_DIFFERENCE
+    return [{n: (b[n] - a[n]) / span for n in b} for a, b in zip(earlier, later, strict=True)]
+
+
+def _clock_column(problem: Problem, rates: Outputs, channel: str) -> FloatArray:
     parts = []
-    for case, out in zip(problem.cases, outputs, strict=True):
+    for case, rate in zip(problem.cases, rates, strict=True):
         for name in problem.present(case):
-            rate = (
-                np.gradient(out[name], case.t[name]) / case.noise[name]
-                if name == channel
-                else np.zeros(len(out[name]))
-            )
-            parts.append(np.nan_to_num(rate[case.mask[name]]))
+            counted = rate[name][case.mask[name]] / case.noise[name]
+            parts.append(counted if name == channel else np.zeros(len(counted)))
     return np.concatenate(parts)
 
 
@@ -100,10 +120,9 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         total = float(r @ r) + float(np.sum((weight * (at - start)) ** 2))
         return total if np.isfinite(total) else np.inf
 
-    outputs = problem.outputs(theta)
-    residual = problem.residual_of(outputs)
+    residual = problem.residual(theta)
     cost, damping = cost_of(residual, theta), 1e-7
-    matrix = jacobian(problem, theta, residual, outputs, run)
+    matrix = jacobian(problem, theta, residual, run)
     for _ in range(iterations):
         normal = matrix.T @ matrix + np.diag(weight**2)
         slope = matrix.T @ residual + weight**2 * (theta - start)
@@ -111,8 +130,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         for _ in range(8):
             scaled = normal + damping * np.diag(np.diag(normal) + 1e-12)
             trial = bounded_step(problem, theta, scaled, slope)
-            trial_outputs = problem.outputs(trial)
-            trial_residual = problem.residual_of(trial_outputs)
+            trial_residual = problem.residual(trial)
             trial_cost = cost_of(trial_residual, trial)
             if trial_cost < cost:
                 accepted = True
@@ -121,9 +139,9 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         if not accepted:
             break
         fall = (cost - trial_cost) / cost
-        theta, residual, outputs, cost = trial, trial_residual, trial_outputs, trial_cost
+        theta, residual, cost = trial, trial_residual, trial_cost
         damping = max(damping / 10.0, 1e-10)
-        matrix = jacobian(problem, theta, residual, outputs, run)
+        matrix = jacobian(problem, theta, residual, run)
         if fall < gain:
             break
     return Solution(problem, theta, residual, matrix, cost)
@@ -131,14 +149,13 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
 
 def linearised(problem: Problem, theta: FloatArray) -> Solution:
     """Return where a problem stands at theta, without a step."""
-    outputs = problem.outputs(theta)
-    residual = problem.residual_of(outputs)
+    residual = problem.residual(theta)
     prior = sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(theta, problem.unknowns, strict=True))
     return Solution(
         problem,
         theta,
         residual,
-        jacobian(problem, theta, residual, outputs),
+        jacobian(problem, theta, residual),
         float(residual @ residual + prior),
     )
 
