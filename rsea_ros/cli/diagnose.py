@@ -11,7 +11,7 @@ from msg_adapters.overlay import write_overlay
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
-from rsea_ros.errors import BagError, ParameterError
+from rsea_ros.errors import ParameterError
 from rsea_ros.signals import Record
 
 HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
@@ -71,11 +71,14 @@ def directory(path: str | Path) -> Path:
 
 
 def readable(bag: str, topics: TopicMap) -> Record:
-    """Return a run with all its faults, which are findings. Raises BagError for one without commands."""
+    """Return a run with all its faults, which are findings.
+
+    Raises BagError or IdentificationError for one that cannot be diagnosed at all.
+    """
+    from rsea_ros.diagnosis.usable import check_diagnosable
+
     record = read_record([bag], topics=topics, strict=False)
-    if "command" not in record:
-        wanted = topics.topic("torque_command")
-        raise BagError(f"{bag}: no torque on {wanted}, expected the commands that drove the run")
+    check_diagnosable(record)
     return record
 
 

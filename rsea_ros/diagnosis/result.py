@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from rsea_ros.identification.problem import BoolArray
+import numpy as np
+import numpy.typing as npt
+
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -121,4 +123,4 @@ class Diagnosis:
     after: tuple[Overlay, ...] = ()
     spectra: tuple[Spectrum, ...] = ()
     statements: tuple[str, ...] = field(default=())
-    masked: Mapping[str, BoolArray] = field(default_factory=dict)
+    masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)

@@ -1,0 +1,38 @@
+"""What a record must have to be diagnosed at all; everything less is a fault to be reported, not refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.signals import Channel, Record
+
+SHORTEST = 8.0
+"""s of commands: two of every kind of block (see split.py), so that a gain has an interval."""
+
+
+def check_diagnosable(record: Record) -> None:
+    """Raise IdentificationError for a record without commands, too short, without motion or in reverse."""
+    if "command" not in record:
+        have = ", ".join(record.channels) or "nothing"
+        raise IdentificationError(
+            f"{record.source}: no command, expected the torques that drove the run beside {have}"
+        )
+    for name, channel in record.channels.items():
+        if len(channel) < 2 or np.median(np.diff(channel.t)) <= 0.0:
+            raise IdentificationError(
+                f"{record.source}: {name}: {len(channel)} samples, expected rising stamps"
+            )
+    length = float(np.ptp(record["command"].t))
+    if length < SHORTEST:
+        raise IdentificationError(
+            f"{record.source}: {length:.3g} s of commands, expected {SHORTEST:g} s or more"
+        )
+    measured = [c for n, c in record.channels.items() if n not in ("command", "reference")]
+    if all(_constant(c) for c in measured):
+        raise IdentificationError(f"{record.source}: every measured channel holds one value, expected motion")
+
+
+def _constant(channel: Channel) -> bool:
+    finite = channel.y[np.isfinite(channel.y)]
+    return not len(finite) or float(np.ptp(finite)) == 0.0
