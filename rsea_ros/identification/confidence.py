@@ -16,6 +16,7 @@ import numpy.typing as npt
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import CLOCK, Unknown
+from rsea_ros.model.rig import FIELDS
 from rsea_ros.signals import FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -115,11 +116,12 @@ def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tup
     sentences = [_bound_sentence(unknowns[i], float(theta[i])) for i in stuck]
     if not index:
         return tuple(sentences)
-    reach, scale = (np.array([getattr(unknowns[i], key) for i in index]) for key in ("reach", "scale"))
+    reach = np.array([unknowns[i].reach for i in index])
+    size = np.array([_size(unknowns[i], float(theta[i])) for i in index])
     scaled = _without_the_rest(confidence.information, index) * np.outer(reach, reach)
     values, vectors = np.linalg.eigh(scaled)
     for vector in vectors[:, values < 1.0].T:
-        moved = np.abs(vector * reach / scale)
+        moved = np.abs(vector * reach / size)
         involved = [unknowns[index[k]] for k in np.flatnonzero(moved > _INVOLVED * moved.max())]
         sentences.append(_sentence(involved, moved[moved > _INVOLVED * moved.max()]))
     return tuple(sentences)
@@ -137,6 +139,11 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
     return result
 
 
+def _size(unknown: Unknown, coordinate: float) -> float:
+    """Return what a change of the coordinate is measured against: the value, or near 0 its typical size."""
+    return 1.0 if unknown.logarithmic else max(abs(coordinate), 0.1 * unknown.scale)
+
+
 def _bound_sentence(unknown: Unknown, coordinate: float) -> str:
     return (
         f"{unknown.name} ran to its bound, {unknown.outer(coordinate):.3g} {unknown.unit}: "
@@ -145,7 +152,7 @@ def _bound_sentence(unknown: Unknown, coordinate: float) -> str:
 
 
 def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
-    """Return what cannot be told of unknowns that move together. moved: how far each, in its scale."""
+    """Return what cannot be told of unknowns that move together. moved: how far each, relatively."""
     names = [u.name for u in unknowns]
     if len(names) == 1:
         prior = np.isfinite(unknowns[0].doubt)
@@ -153,7 +160,7 @@ def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
         remedy = _REMEDY.get(names[0], _MEASURE)
         return f"{names[0]} is not identifiable from these data: {source}. {remedy}"
     listed = ", ".join(names[:-1]) + " and " + names[-1]
-    if all(u.logarithmic for u in unknowns) and moved.min() > _ALIKE * moved.max():
+    if all(u.name in FIELDS for u in unknowns) and moved.min() > _ALIKE * moved.max():
         return (
             f"Only ratios of {listed} are identifiable from these data: a common factor is taken from the "
             "rig. A measured spring stiffness, the encoder (position), or a known inertia would fix it."

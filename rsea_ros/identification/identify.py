@@ -12,11 +12,19 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
 from rsea_ros.identification.problem import Case, Problem, case_from, weighted
-from rsea_ros.identification.responses import responses_of
-from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
+from rsea_ros.identification.responses import model_response, responses_of
+from rsea_ros.identification.result import FrequencyResponse, Identification, Overlay, ParameterEstimate
 from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
+from rsea_ros.identification.start import start_from
 from rsea_ros.identification.statics import statics_of
-from rsea_ros.identification.unknowns import Unknown, apply, clocks, unknowns_of_effect, unknowns_of_rig
+from rsea_ros.identification.unknowns import (
+    Unknown,
+    apply,
+    clocks,
+    start_vector,
+    unknowns_of_effect,
+    unknowns_of_rig,
+)
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
@@ -37,11 +45,15 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     for record in records:
         check_usable(record)
     cases = tuple(case_from(record, rig) for record in records)
-    report("fitting", 0.2)
+    report("frequency responses", 0.2)
+    responses = responses_of(records[0], rig)
+    report("fitting", 0.4)
     with ThreadPoolExecutor(2) as pool:
-        solution = fit(cases, rig, run=in_pool(pool))
-    report("frequency responses", 0.7)
-    result = _result(solution, records, cases)
+        solution = fit(
+            cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
+        )
+    report("confidence", 0.8)
+    result = _result(solution, records, cases, responses)
     report("done", 1.0)
     return result
 
@@ -65,15 +77,15 @@ def check_usable(record: Record) -> None:
             )
 
 
-def fit(cases: Sequence[Case], rig: Rig, run: Map = serial) -> Solution:
+def fit(cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None) -> Solution:
     """Fit the rig's free values, its effects and the sensors' clocks; weights follow where the model misfits.
 
     Where a channel's residual stays above its noise the weight becomes that residual, as maximum likelihood
-    with unknown noise has it.
+    with unknown noise has it. start: where to begin, should the records fit it better than `rig`.
     """
     unknowns = unknowns_of(rig, cases)
     problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
-    solution = solve(problem, run=run)
+    solution = solve(problem, _better_start(problem, start), run=run)
     for _ in range(_REWEIGHTINGS):
         ratios = misfit_ratios(solution)
         if max(ratios.values()) < _MISFIT:
@@ -81,6 +93,17 @@ def fit(cases: Sequence[Case], rig: Rig, run: Map = serial) -> Solution:
         problem = replace(problem, cases=tuple(_reweighted(c, ratios) for c in problem.cases))
         solution = solve(problem, solution.theta, run=run)
     return solution
+
+
+def _better_start(problem: Problem, start: Rig | None) -> FloatArray:
+    """Return the coordinates of `start` where the residual is smaller there than at the rig's own values."""
+    own = start_vector(problem.unknowns)
+    if start is None:
+        return own
+    values = start.values()
+    other = np.array([u.inner(values.get(u.name, u.start)) for u in problem.unknowns])
+    costs = [float(r @ r) for r in (problem.residual(own), problem.residual(other))]
+    return other if costs[1] < costs[0] else own
 
 
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
@@ -108,14 +131,18 @@ def _reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
     return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})
 
 
-def _result(solution: Solution, records: Sequence[Record], cases: Sequence[Case]) -> Identification:
+def _result(
+    solution: Solution,
+    records: Sequence[Record],
+    cases: Sequence[Case],
+    responses: tuple[FrequencyResponse, ...],
+) -> Identification:
     """Gather the result. cases: as they were before any weight followed a misfit."""
     problem = solution.problem
     confidence = confidence_of(solution)
     outputs = problem.outputs(solution.theta)
     errors = errors_by_channel(problem, outputs)
     rig = identified_rig(solution, confidence)
-    responses, models = responses_of(records[0], rig)
     return Identification(
         rig=rig,
         sources=tuple(r.source for r in records),
@@ -127,7 +154,7 @@ def _result(solution: Solution, records: Sequence[Record], cases: Sequence[Case]
         noise_rms={n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in errors},
         fit_percent={n: fit_percent(e, y) for n, (e, y) in errors.items()},
         responses=responses,
-        models=models,
+        models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
         statements=what_is_not_told(problem.unknowns, confidence),

@@ -12,11 +12,10 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
 
-def responses_of(record: Record, rig: Rig) -> tuple[tuple[FrequencyResponse, ...], tuple[ComplexArray, ...]]:
-    """Return the measured responses of a record's sensors to the command, and the rig's model of each."""
+def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
+    """Return the measured responses of a record's sensors to the command."""
     outputs = [n for n in ("ft", "position") if n in record and not (n == "ft" and rig.rigid_spring)]
-    measured = tuple(estimate_response(record, n) for n in outputs)
-    return measured, tuple(model_response(rig, r.output, r.frequency) for r in measured)
+    return tuple(estimate_response(record, n) for n in outputs)
 
 
 def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray:

@@ -18,6 +18,10 @@ CLOCK_DOUBT = 1e-4
 """s, one sigma. How far the stamps of a sensor may lie from the instant at which it measured."""
 
 
+WELL_KNOWN = 0.3
+"""Relative prior spread up to which a fit works on the logarithm of a value."""
+
+
 @dataclass(frozen=True)
 class Unknown:
     """One number that a fit may move.
@@ -73,10 +77,16 @@ def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
 
 
 def _rig_unknown(rig: Rig, name: str) -> Unknown:
-    value, spread = rig[name], rig.spread(name)
-    if value > 0.0:
-        return Unknown(name, value, rig.unit(name), value * 1e-4, value * 1e4, True, spread, 1.0)
-    return Unknown(name, value, rig.unit(name), FIELDS[name].low, math.inf, False, math.inf, 1.0)
+    """Return a value of the rig as an unknown: on its logarithm where it is known well enough to stay away from 0.
+
+    A value that may well be near zero (a damping) moves on its own scale: its logarithm would never get back.
+    """
+    value, spread, unit = rig[name], rig.spread(name), rig.unit(name)
+    if value > 0.0 and spread <= WELL_KNOWN:
+        return Unknown(name, value, unit, value * 1e-4, value * 1e4, True, spread, 1.0)
+    doubt = spread * value if value > 0.0 else math.inf
+    low = FIELDS[name].low if FIELDS[name].low_allowed else 1e-4 * value
+    return Unknown(name, value, unit, low, math.inf, False, doubt, value or 1.0)
 
 
 def unknowns_of_effect(

@@ -118,11 +118,16 @@ def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
 def _initial(record: Record) -> tuple[float, float]:
     """Return position and velocity at the start: rest, unless the first samples say otherwise.
 
-    The first sample comes a period after the first command; what the command did until then is not in it.
+    The first sample comes a period after the first command; what the command may have done until then, the
+    largest change from sample to sample, is no motion of before.
     """
-    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
-    moved = abs(position[0]) > AT_REST * np.std(position) or abs(velocity[0]) > AT_REST * np.std(velocity)
+    position, velocity = (record[n].y if n in record else np.zeros(2) for n in ("position", "velocity"))
+    moved = _moved(position) or _moved(velocity)
     return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
+
+
+def _moved(y: FloatArray) -> bool:
+    return bool(abs(y[0]) > max(AT_REST * np.std(y), np.max(np.abs(np.diff(y)))))
 
 
 def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:

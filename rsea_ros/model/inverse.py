@@ -10,6 +10,7 @@ torques, filtered alike:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -26,6 +27,9 @@ from rsea_ros.signals import Channel, FloatArray, Record
 
 CUT_OFF = 20.0
 """Hz, of the Butterworth filter of fourth order that runs both ways over motion and torque."""
+
+FINE = 5e-4
+"""s. Longest step of the grid on which motions are differentiated and torques held."""
 
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
@@ -56,13 +60,17 @@ def motion_from(record: Record) -> Motion:
             f"{record.source}: no position channel, expected one: "
             "a rig without a spring is judged by its motion"
         )
+    from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
+
     position = record["position"]
     period = 1.0 / position.rate
-    t = np.arange(position.t[0], position.t[-1] + 0.5 * period, period)
-    q = smoothed(np.interp(t, position.t, position.y), period)
-    torque = np.interp(t, acted(record).t, acted(record).y)
-    v = np.gradient(q, period)
-    return Motion(t, q, v, np.gradient(v, period), smoothed(torque, period))
+    finer = max(1, math.ceil(period / FINE))
+    step = period / finer
+    t = np.arange(position.t[0], position.t[-1] + 0.5 * step, step)
+    q = smoothed(CubicSpline(position.t, position.y)(t), step)
+    v = np.gradient(q, step)
+    all_five = (t, q, v, np.gradient(v, step), smoothed(_torque_at(record, t), step))
+    return Motion(*(values[::finer] for values in all_five))
 
 
 def acted(record: Record) -> Channel:
@@ -70,9 +78,28 @@ def acted(record: Record) -> Channel:
     return record["motor_torque" if "motor_torque" in record else "command"]
 
 
+def _torque_at(record: Record, t: FloatArray) -> FloatArray:
+    """Return the motor torque that acted at instants.
+
+    A command is held from its stamp on. A measured torque that shows the command before its stamp was taken
+    at the end of a hold, and counts for the whole of it; any other is taken for what it is, at its stamp.
+    """
+    command = record["command"]
+    hold = np.searchsorted(command.t, t, side="right") - 1
+    if "motor_torque" not in record:
+        return command.y[np.maximum(hold, 0)]
+    torque = record["motor_torque"]
+    ended, begun = (np.searchsorted(command.t, torque.t, side=side) - 1 for side in ("left", "right"))
+    off = [float(np.std(torque.y - command.y[np.maximum(k, 0)])) for k in (ended, begun)]
+    if off[1] <= off[0]:
+        return np.interp(t, torque.t, torque.y)
+    shown = np.searchsorted(ended, hold, side="left")
+    return torque.y[np.minimum(shown, len(torque) - 1)]
+
+
 def smoothed(values: FloatArray, period: float) -> FloatArray:
     """Return values behind the Butterworth filter, run both ways. period: s, between samples."""
-    from scipy.signal import butter, filtfilt  # 0.4 s that rigs with a spring need not wait for
+    from scipy.signal import butter, filtfilt
 
     result: FloatArray = filtfilt(*butter(4, min(CUT_OFF * 2.0 * period, 0.8)), values)
     return result
