@@ -1,23 +1,31 @@
-"""identify: gathers a record from the topics and identifies the actuator, as `rsea identify` does."""
+"""identify: gathers a record from the topics and identifies the actuator, as `rsea identify` does.
+
+~/diagnose does with what was heard what `rsea diagnose` does with a bag.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 
 from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import Trigger, message_type
 from msg_adapters.topics import AXES, ROLES, TYPES, TopicMap
+from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, Report
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
+from rsea_ros.signals import Record
 
 TABLE = (
     Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
@@ -28,6 +36,9 @@ TABLE = (
     Parameter(
         "quiet", 1.0, "finish so long after the last command, once nobody publishes any", "s", 0.1, 1e3
     ),
+    Parameter(
+        "stay", False, "wait for ~/finish also when the commands are over, so that ~/diagnose can be asked"
+    ),
     Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
 )
 
@@ -36,7 +47,8 @@ class Identify:
     """Taps into the contract's topics; the identification begins when the commands are over.
 
     They are over when some have come, none has for `quiet` seconds, and torque_command has no publisher any
-    more (the replay or the excitation has ended), or when ~/finish is called.
+    more (the replay or the excitation has ended), or when ~/finish is called; with `stay` only then. A
+    diagnosis that is under way is waited for.
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -47,6 +59,10 @@ class Identify:
         self._contents = Contents()
         self._commanded, self._asked, self._done = 0.0, False, False
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
+        self._diagnosing = Diagnosing(self._rig, Path(values["out"]) / "diagnosis")
+        self._answering = 0
+        group = ReentrantCallbackGroup()
+        self._diagnose = node.create_service(Trigger, "~/diagnose", self._on_diagnose, callback_group=group)
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell)
 
@@ -69,11 +85,25 @@ class Identify:
         response.success, response.message = True, f"identifying from {self._gathered()}"
         return response
 
+    async def _on_diagnose(self, request: Any, response: Any) -> Any:
+        """Answer with the verdict in a sentence, once it is known; other callbacks run meanwhile."""
+        self._answering += 1
+        try:
+            diagnosis = await self._diagnosing.begin(self._record(strict=False))
+            response.success, response.message = True, diagnosis.sentence
+        except (RseaError, OSError) as error:
+            response.success, response.message = False, " ".join(str(error).split())
+        finally:
+            self._answering -= 1
+        self._node.get_logger().info(response.message)
+        self._health.publish()
+        return response
+
     def finished(self) -> bool:
-        """Tell whether the commands are over."""
+        """Tell whether the commands are over and every diagnosis has been answered."""
         waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
         over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
-        self._done = self._asked or over
+        self._done = (self._asked or (over and not self._values["stay"])) and not self._answering
         return self._done
 
     def conclude(self) -> None:
@@ -85,18 +115,23 @@ class Identify:
             return
         log = self._node.get_logger()
         log.info(f"identifying from {self._gathered()}")
-        record = record_from(self._contents, self._topics.topic("torque_command"), self._topics)
-        result = identify([record], self._rig, self._progress)
+        result = identify([self._record()], self._rig, self._progress)
         report = write_results(result, self._values["out"])
         for p in result.parameters:
             log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")
+
+    def _record(self, strict: bool = True) -> Record:
+        """Return what was heard. Raises BagError where no record can be made of it."""
+        source = self._topics.topic("torque_command")
+        return record_from(self._contents, source, self._topics, strict=strict)
 
     def _progress(self, step: str, share: float) -> None:
         self._node.get_logger().info(f"{share:.0%} {step}")
 
     def close(self) -> None:
         """Leave nothing behind."""
+        self._diagnosing.close()
 
     def _gathered(self) -> str:
         lost = sum(tap.lost for tap in self._taps.values())
@@ -111,6 +146,8 @@ class Identify:
     def _report(self) -> Report:
         lost = sum(tap.lost for tap in self._taps.values())
         counts = {role: tap.count for role, tap in self._taps.items()}
+        if (told := self._diagnosing.report()) is not None:
+            return Report(told.level, told.summary, {**counts, **told.values})
         return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
 
 

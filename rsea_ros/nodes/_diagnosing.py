@@ -1,0 +1,99 @@
+"""A diagnosis in a thread of its own, while the node goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from pathlib import Path
+
+from msg_adapters.overlay import write_overlay
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.usable import check_diagnosable
+from rsea_ros.errors import RseaError
+from rsea_ros.model.rig import Rig
+from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.signals import Record
+
+_POLL = 0.02
+"""s that the executor rests between two looks at a thread that still works."""
+
+
+class Diagnosing:
+    """At most one diagnosis at a time; its files go to `out`."""
+
+    def __init__(self, rig: Rig, out: Path) -> None:
+        self._rig, self._out = rig, out
+        self._pool = ThreadPoolExecutor(1, "diagnosis")
+        self._work: Future[Diagnosis] | None = None
+        self._step, self._stopped = "", False
+
+    @property
+    def busy(self) -> bool:
+        """Whether a diagnosis is under way."""
+        return self._work is not None and not self._work.done()
+
+    def begin(self, record: Record) -> Waiting:
+        """Start on a record and return what a coroutine can await.
+
+        Raises RseaError for a record that cannot be diagnosed, and while a diagnosis is under way.
+        """
+        if self.busy:
+            raise RseaError(f"a diagnosis is under way ({self._step}), expected its end first")
+        check_diagnosable(record)
+        self._work = self._pool.submit(self._diagnose, record)
+        return Waiting(self._work)
+
+    def report(self) -> Report | None:
+        """Return what /diagnostics shall say: the step, then the verdict; None before the first diagnosis."""
+        if self._work is None:
+            return None
+        if not self._work.done():
+            return Report(OK, f"diagnosing: {self._step}", {})
+        if error := self._work.exception():
+            return Report(WARN, f"diagnosis failed: {error}", {})
+        return report_of(self._work.result(), self._out)
+
+    def close(self) -> None:
+        """Stop at the next step and wait for that."""
+        self._stopped = True
+        self._pool.shutdown()
+
+    def _diagnose(self, record: Record) -> Diagnosis:
+        from rsea_ros.diagnosis.diagnose import diagnose
+        from rsea_ros.report.diagnosis_files import write_diagnosis
+
+        result = diagnose([record], self._rig, progress=self._tell)
+        write_diagnosis(result, record, self._out, write_overlay)
+        return result
+
+    def _tell(self, step: str, share: float) -> None:
+        if self._stopped:
+            raise RseaError("the node is closing")
+        self._step = step
+
+
+class Waiting:
+    """Await a thread's result in a coroutine of rclpy's executor, which resumes it over and over."""
+
+    def __init__(self, work: Future[Diagnosis]) -> None:
+        self._work = work
+
+    def __await__(self) -> Generator[None, None, Diagnosis]:
+        """Rest a little, and let the executor do whatever else is there, until the thread is done."""
+        while not self._work.done():
+            wait([self._work], _POLL)
+            yield
+        return self._work.result()
+
+
+def report_of(diagnosis: Diagnosis, out: Path) -> Report:
+    """Return verdict and causes with their sizes and gains as the values of a diagnostic."""
+    values: dict[str, object] = {
+        "verdict": diagnosis.verdict,
+        "causes": ", ".join(c.name for c in diagnosis.causes),
+    }
+    for cause in diagnosis.causes:
+        values |= {f"{cause.name}.{name}": f"{p.value:.6g} {p.unit}" for name, p in cause.parameters.items()}
+        values[f"{cause.name}.gain"] = f"{cause.gain_holdout:.4f}"
+    level = OK if diagnosis.verdict == "nothing_wrong" else WARN
+    return Report(level, diagnosis.sentence, {**values, "report": out / "report.html"})
