@@ -8,13 +8,13 @@ larger than the noise (White, Econometrica 48, 1980; Newey and West 1987). Never
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import CLOCK, Unknown
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.signals import FloatArray
@@ -26,6 +26,8 @@ BLOCK = 1.0
 _Z95 = 1.959964
 _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
+_WEAK = 100.0
+"""Of the prior's information: below it forward differences may take curvature for information."""
 _INVOLVED = 0.2
 """A parameter moves along with an untold direction when it moves at least so much of the largest."""
 _ALIKE = 0.8
@@ -65,6 +67,9 @@ def confidence_of(solution: Solution) -> Confidence:
     doubt = np.array([u.reach for u in solution.problem.unknowns])
     prior = np.diag(1.0 / doubt**2)
     information = solution.jacobian.T @ solution.jacobian
+    if np.linalg.eigvalsh(information * np.outer(doubt, doubt))[0] < _WEAK:
+        solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
+        information = solution.jacobian.T @ solution.jacobian
     inverse = np.linalg.pinv(information + prior, hermitian=True)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(covariance), 1e-300)))

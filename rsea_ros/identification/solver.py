@@ -80,6 +80,16 @@ def jacobian_columns(
     return np.column_stack(list(run(column, which))) if len(which) else np.empty((len(residual), 0))
 
 
+def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
+    """Return d residual / d theta by central differences, which leave no trace of curvature, shape (m, n)."""
+    columns = []
+    for i, unknown in enumerate(problem.unknowns):
+        step = np.zeros(len(theta))
+        step[i] = _CLOCK_DIFFERENCE if _is_clock(unknown) else _DIFFERENCE * unknown.scale
+        columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
+    return np.column_stack(columns)
+
+
 def _is_clock(unknown: Unknown) -> bool:
     return unknown.name.startswith(CLOCK + ".")
 

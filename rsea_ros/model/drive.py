@@ -71,7 +71,7 @@ def drive_from(
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
-    the bag's command has beside the measured motor torque is then an outside disturbance.
+    the bag's command has beside the measured motor torque, where there is one, is an outside disturbance.
     from_rest: the bench began at zero, whatever the first samples say.
     """
     command = record["command"]
@@ -86,7 +86,8 @@ def drive_from(
     count = math.ceil((stop - start) / step - 1e-6)
     knots, torque = _in_steps(command.t, start, step), command.y
     if closed_loop:
-        torque = torque - np.interp(command.t, *_ty(record["motor_torque"]))
+        made = "motor_torque" if "motor_torque" in record else "command"
+        torque = torque - np.interp(command.t, *_ty(record[made]))
     held = _mean_of_held(knots, torque, count)
     at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
     ends = start + step * np.arange(1, count + 1)

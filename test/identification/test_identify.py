@@ -1,0 +1,129 @@
+"""Truth recovered, with intervals that hold it as often as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benches import bench, only, recorded
+from scipy.stats import binom
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.result import Identification
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+
+SEEDS = range(24)
+
+
+def standard_errors(result: Identification, true: dict[str, float]) -> dict[str, float]:
+    """Return by parameter the error in units of its standard deviation."""
+    return {
+        p.name: (p.value - true[p.name]) / ((p.ci95[1] - p.ci95[0]) / (2.0 * 1.96))
+        for p in result.parameters
+        if p.name in true
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "duration"),
+    [
+        ("paper_high_impedance", "white_noise", 10.0),
+        ("paper_high_impedance", "chirp", 20.0),
+        ("paper_moving_output", "white_noise", 20.0),
+        ("prototype_knee", "white_noise", 20.0),
+        ("bare_drive", "chirp", 20.0),
+    ],
+)
+def test_intervals_hold_the_truth_as_often_as_they_say(name, kind, duration):
+    errors: dict[str, list[float]] = {}
+    for seed in SEEDS:
+        nominal, true = bench(name, seed)
+        result = identify([recorded(true, seed, duration, kind)], nominal)
+        for parameter, error in standard_errors(result, true.values()).items():
+            errors.setdefault(parameter, []).append(error)
+    assert set(errors) == set(load_rig(name).free())
+    for parameter, values in errors.items():
+        inside = int(np.sum(np.abs(values) <= 1.96))
+        assert binom.cdf(inside, len(SEEDS), 0.95) > 1e-3, (parameter, inside, values)
+        assert np.std(values) > 0.3, f"{parameter}: intervals {1.0 / np.std(values):.1f} times too wide"
+
+
+def test_the_residual_is_the_noise_and_the_values_are_narrow():
+    nominal, true = bench("paper_high_impedance", 1)
+    result = identify([recorded(true, 1, 20.0)], nominal)
+    for channel, residual in result.residual_rms.items():
+        assert 0.75 < residual / result.noise_rms[channel] < 1.1, channel
+    assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-4)
+    assert result.rig["rotor.reflected_inertia"] == pytest.approx(true["rotor.reflected_inertia"], rel=1e-3)
+    assert min(result.fit_percent.values()) > 98.0
+    assert result.statements == ()
+
+
+def test_torque_alone_tells_only_ratios():
+    """Facts, section 3: from T_d / T_m alone K_s / J_eff and b_eff / J_eff, and no absolute value."""
+    nominal, true = bench("paper_high_impedance", 2)
+    result = identify([only(recorded(true, 2, 20.0), "ft")], nominal)
+    told = {p.name: p.told_by_data for p in result.parameters}
+    assert all(told[name] < 0.01 for name in nominal.free()), told
+    (sentence,) = result.statements
+    assert sentence.startswith("Only ratios of ")
+    assert all(name in sentence for name in nominal.free())
+    assert "encoder" in sentence
+    found = result.rig
+    for name in ("rotor.reflected_damping", "spring.stiffness"):
+        ratio = found[name] / (found["rotor.reflected_inertia"] + found["chassis.inertia"])
+        expected = true[name] / (true["rotor.reflected_inertia"] + true["chassis.inertia"])
+        assert ratio == pytest.approx(expected, rel=0.01)
+    assert abs(found["spring.stiffness"] / true["spring.stiffness"] - 1.0) > 0.01
+
+
+def test_with_the_encoder_all_are_told():
+    nominal, true = bench("paper_high_impedance", 2)
+    result = identify([only(recorded(true, 2, 20.0), "ft", "position")], nominal)
+    assert all(p.told_by_data > 0.99 for p in result.parameters if p.name in nominal.free())
+    assert result.statements == ()
+    assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-3)
+
+
+def test_the_encoder_alone_does_not_tell_the_dampings_apart():
+    nominal, true = bench("paper_high_impedance", 3)
+    result = identify([only(recorded(true, 3, 10.0), "position")], nominal)
+    (sentence,) = result.statements
+    assert sentence.startswith("spring.damping")
+    both = [rig["rotor.reflected_damping"] + rig["spring.damping"] for rig in (result.rig, true)]
+    assert both[0] == pytest.approx(both[1], rel=0.01)
+
+
+def test_an_effect_that_the_rig_lists_is_fitted():
+    nominal, true = bench("paper_high_impedance", 4)
+    saturated = EffectSetting("torque_saturation", {"limit": 18.0})
+    start = EffectSetting("torque_saturation", {"limit": 25.0})
+    record = recorded(true.with_effects(saturated), 4, 20.0)
+    result = identify([record], nominal.with_effects(start))
+    limit = next(p for p in result.parameters if p.name == "torque_saturation.limit")
+    assert limit.ci95[0] <= 18.0 <= limit.ci95[1]
+    assert limit.value == pytest.approx(18.0, rel=1e-3)
+    assert result.rig.effects[0].parameters["limit"] == limit.value
+
+
+def test_an_effect_that_never_shows_is_not_told():
+    nominal, true = bench("paper_high_impedance", 5)
+    start = EffectSetting("torque_saturation", {"limit": 100.0})
+    result = identify([recorded(true, 5)], nominal.with_effects(start))
+    limit = next(p for p in result.parameters if p.name == "torque_saturation.limit")
+    assert limit.told_by_data < 0.01
+    assert limit.ci95 == (0.5, 200.0)
+    assert (
+        "torque_saturation.limit is not identifiable from these data: they do not show it"
+        in result.statements[0]
+    )
+
+
+def test_a_rig_that_the_record_contradicts_is_refused():
+    _, true = bench("paper_high_impedance", 6)
+    record = recorded(true, 6)
+    with pytest.raises(IdentificationError, match="no position channel, expected one"):
+        identify([only(record, "ft")], load_rig("bare_drive"))
+    with pytest.raises(IdentificationError, match="no ft, position or velocity channel for rig"):
+        identify([only(record, "motor_torque")], load_rig("paper_high_impedance"))

@@ -1,0 +1,147 @@
+"""Records as they come: other stamps, jitter, missing samples, several bags, a controller in the loop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benches import RATE, bench, recorded
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.identify import identify
+from rsea_ros.model.rig import Controller, Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import measure, simulate
+from rsea_ros.signals import Channel, Record
+
+PERIOD = 1.0 / RATE
+
+
+def sampled(true: Rig, record: Record, stamps: dict[str, np.ndarray], seed: int) -> Record:
+    """Return the record with some channels measured at other instants, and stamped with them."""
+    rng = np.random.default_rng(seed)
+    asked = record.with_channels(**{n: Channel(t, np.zeros(len(t))) for n, t in stamps.items()})
+    values = simulate(true, asked)
+    return asked.with_channels(**{n: Channel(t, measure(true, n, values[n], rng)) for n, t in stamps.items()})
+
+
+def agree(result, true: Rig, sigmas: float = 4.0) -> None:
+    for p in result.parameters:
+        if p.name in true.quantities:
+            sd = (p.ci95[1] - p.ci95[0]) / (2.0 * 1.96)
+            assert abs(p.value - true[p.name]) < sigmas * sd, (p.name, p.value, true[p.name], sd)
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Rig, Rig, Record]:
+    nominal, true = bench("paper_high_impedance", 7)
+    return nominal, true, recorded(true, 7, 10.0)
+
+
+def test_the_ft_sensor_stamped_half_a_sample_later_gives_the_same_parameters(case):
+    nominal, true, record = case
+    later = sampled(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
+    on_grid, off_grid = identify([record], nominal), identify([later], nominal)
+    for a, b in zip(on_grid.parameters, off_grid.parameters, strict=True):
+        sd = np.hypot(a.ci95[1] - a.ci95[0], b.ci95[1] - b.ci95[0]) / (2.0 * 1.96)
+        assert abs(a.value - b.value) < 4.0 * sd, a.name
+    agree(off_grid, true)
+
+
+def test_stamps_count_not_places(case):
+    """A sensor read half a sample later but stamped as if not is late: the residual shows it."""
+    nominal, true, record = case
+    later = sampled(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
+    wrong = later.with_channels(ft=Channel(record["ft"].t, later["ft"].y))
+    result = identify([wrong], nominal)
+    assert result.residual_rms["ft"] > 2.0 * result.noise_rms["ft"]
+    assert identify([later], nominal).residual_rms["ft"] < 1.1 * result.noise_rms["ft"]
+
+
+@pytest.mark.parametrize("deviation", [5e-5, 3e-4])
+def test_jitter(case, deviation):
+    nominal, true, record = case
+    rng = np.random.default_rng(9)
+    names = ("ft", "position", "velocity")
+    stamps = {n: record[n].t + deviation * rng.standard_normal(len(record[n])) for n in names}
+    result = identify([sampled(true, record, stamps, 10)], nominal)
+    agree(result, true, sigmas=6.0)
+    assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=2e-4)
+
+
+def test_missing_samples(case):
+    nominal, true, record = case
+    rng = np.random.default_rng(11)
+    keep = {
+        n: np.sort(rng.permutation(len(record[n]))[: int(0.9 * len(record[n]))]) for n in ("ft", "position")
+    }
+    keep["ft"] = keep["ft"][(keep["ft"] < 1000) | (keep["ft"] > 1300)]
+    thinned = record.with_channels(**{n: Channel(record[n].t[k], record[n].y[k]) for n, k in keep.items()})
+    agree(identify([thinned], nominal), true)
+
+
+def test_sensors_of_other_rates(case):
+    nominal, true, record = case
+    stamps = {"ft": np.arange(0.003, 9.9, 1.0 / 1000.0), "position": np.arange(0.01, 9.9, 1.0 / 100.0)}
+    agree(identify([sampled(true, record, stamps, 12)], nominal), true)
+
+
+def test_several_bags_tell_more_than_one(case):
+    nominal, true, record = case
+    second = recorded(true, 13, 10.0)
+    one, two = identify([record], nominal), identify([record, second], nominal)
+    agree(two, true)
+    widths = [[p.ci95[1] - p.ci95[0] for p in r.parameters if p.name in nominal.free()] for r in (one, two)]
+    assert np.all(np.array(widths[1]) < 0.9 * np.array(widths[0]))
+    assert two.duration == pytest.approx(one.duration + 10.0, abs=0.1)
+    assert len(two.sources) == 2
+
+
+def test_a_controller_in_the_loop():
+    """The bag's command is what the loop made; the rig names the controller and the bag has the reference."""
+    nominal, true = bench("paper_high_impedance", 14)
+    loop = Controller(k_p=30.0, k_v=20.0)
+    nominal, true = (replace(rig, controller=loop) for rig in (nominal, true))
+    record = closed_loop(true, 14)
+    result = identify([record], nominal)
+    agree(result, true)
+    for channel in ("ft", "position"):
+        assert result.residual_rms[channel] < 1.3 * result.noise_rms[channel]
+
+
+def closed_loop(rig: Rig, seed: int) -> Record:
+    """Return what a bench logs while its controller follows a random reference."""
+    n = int(20.0 * RATE)
+    t = np.arange(n) * PERIOD
+    rng = np.random.default_rng(seed)
+    reference = 0.02 * np.convolve(rng.standard_normal(n), np.ones(8) / 8.0, "same")
+    names = ("ft", "position", "velocity", "motor_torque")
+    blank = {k: Channel(t + PERIOD, np.zeros(n)) for k in names}
+    command = Channel(t, np.zeros(n))
+    asked = Record({"command": command, "reference": Channel(t, reference), **blank}, source="loop")
+    values = simulate(rig, asked)
+    measured = {k: Channel(t + PERIOD, measure(rig, k, values[k], rng)) for k in names[:-1]}
+    made = Channel(t, values["motor_torque"])
+    return Record({"command": made, "reference": asked["reference"], **measured}, source="loop")
+
+
+def test_a_sensor_without_a_known_zero(case):
+    nominal, true, record = case
+    sensors = {**nominal.sensors, "position": replace(nominal.sensors["position"], zero_unknown=True)}
+    shifted = record.with_channels(position=Channel(record["position"].t, record["position"].y + 0.7))
+    floating = identify([shifted], replace(nominal, sensors=sensors))
+    agree(floating, true)
+    assert floating.residual_rms["position"] < 1.1 * floating.noise_rms["position"]
+
+
+def test_nan_and_stamps_that_go_back_are_refused(case):
+    nominal, _, record = case
+    y = record["ft"].y.copy()
+    y[5] = np.nan
+    with pytest.raises(IdentificationError, match=r"ft\[5\] at 0.0214 s = nan, expected a finite value"):
+        identify([record.with_channels(ft=Channel(record["ft"].t, y))], nominal)
+    t = record["ft"].t.copy()
+    t[6] = t[4]
+    with pytest.raises(IdentificationError, match=r"ft stamp 6 = .* expected rising stamps"):
+        identify([record.with_channels(ft=Channel(t, record["ft"].y))], load_rig("paper_high_impedance"))
