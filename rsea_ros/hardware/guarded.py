@@ -20,6 +20,7 @@ class Guarded:
         self.enabled = False
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
+        self._taring = False
         self._lost = {"read": 0, "write": 0}
 
     @property
@@ -41,7 +42,7 @@ class Guarded:
 
     def write(self, wanted: float, age: float | None) -> float:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
-        torque = self.guard.allowed(wanted, age if self.enabled else None)
+        torque = self.guard.allowed(wanted, age if self.enabled and not self._taring else None)
         try:
             self.device.write(torque)
         except DeviceError as error:
@@ -68,7 +69,11 @@ class Guarded:
         """Tare the F/T sensor. Raises DeviceError while torque is commanded."""
         if self.guard.torque != 0.0:
             raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N m is commanded, expected 0 N m")
-        self.device.zero_ft()
+        self._taring = True
+        try:
+            self.device.zero_ft()
+        finally:
+            self._taring = False
 
     def clear(self) -> None:
         """Connect again if need be and forget the fault. Raises DeviceError while its cause is there."""

@@ -34,9 +34,10 @@ class Polled(CallbackGroup):
 class Bench:
     """Publishes readings, and puts what comes on `torque_command` into a queue."""
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self.commands = CommandQueue()
+    def __init__(self, node: Node, *, strict: bool = False, every_record: bool = False) -> None:
+        """strict: see CommandQueue. every_record: ft gets all that came since the last reading, not one."""
+        self._node, self._every_record = node, every_record
+        self.commands = CommandQueue(strict=strict)
         self._told = (0, 0, 0)
         self._states = node.create_publisher(JointState, "joint_states", MEASUREMENT)
         self._ft = node.create_publisher(WrenchStamped, "ft", MEASUREMENT)
@@ -57,7 +58,10 @@ class Bench:
         self._states.publish(
             joint_state_message(state.stamp, state.position, state.velocity, state.motor_torque)
         )
-        if state.wrench is not None:
+        if self._every_record:
+            for stamp, wrench in state.wrenches:
+                self._ft.publish(wrench_message(stamp, wrench))
+        elif state.wrench is not None:
             self._ft.publish(wrench_message(state.ft_stamp, state.wrench))
 
     def report(self, cycle: Cycle) -> Report:
@@ -81,6 +85,7 @@ class Bench:
         try:
             stamp, torque = effort_of(message)
         except ParameterError as error:
+            self.commands.refused += 1
             self._node.get_logger().error(f"torque_command: {error}", throttle_duration_sec=1.0)
             return
         self.commands.add(stamp, torque, received)

@@ -16,9 +16,12 @@ class CommandQueue:
     A command takes effect at its stamp. One whose stamp is over takes effect at once (`late` counts them);
     one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`). Not-a-number is
     dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
+    strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
+    is none, and the last torque stays in force: to end it is the work of the machine's limits.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, strict: bool = False) -> None:
+        self._strict = strict
         self._lock = threading.Lock()
         self._waiting: list[tuple[int, float]] = []
         self._taken_until = 0
@@ -29,7 +32,8 @@ class CommandQueue:
     def add(self, stamp: int, torque: float, now: int) -> None:
         """Put in a command (N m) with its stamp; now: when it arrived, ns."""
         with self._lock:
-            if not math.isfinite(torque):
+            strange = self._strict and stamp != 0 and abs(stamp - now) > HORIZON
+            if not math.isfinite(torque) or strange:
                 self.refused += 1
                 return
             if abs(stamp - now) > HORIZON:
@@ -48,7 +52,7 @@ class CommandQueue:
             self._taken_until = until
             if changes:
                 self._newest, self.torque = changes[-1]
-            elif self._newest is not None and until - self._newest > WATCHDOG:
+            elif not self._strict and self._newest is not None and until - self._newest > WATCHDOG:
                 self.expired += self.torque != 0.0
                 changes = [(until, 0.0)] if self.torque != 0.0 else []
                 self._newest, self.torque = None, 0.0

@@ -7,7 +7,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.lifecycle import LifecycleNode
 
-from msg_adapters.ros import JointState, torque_command_message
+from msg_adapters.ros import JointState, Trigger, torque_command_message
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes import driver
@@ -65,6 +65,7 @@ def test_configured_it_measures_and_lets_no_command_through(remote):
 def test_active_it_follows_commands_and_deactivated_the_torque_is_zero(remote):
     assert remote.change(Transition.TRANSITION_ACTIVATE) == (True, "active")
     remote.push(10.0, lambda: remote.torque() > 9.0)
+    remote.push(0.0, lambda: abs(remote.torque()) < 1.0)
     assert remote.change(Transition.TRANSITION_DEACTIVATE) == (True, "inactive")
     remote.push(10.0, lambda: abs(remote.torque()) < 1.0)
     count = len(remote.states)
@@ -104,6 +105,25 @@ class Spy:
     def write(self, torque):
         self.written.append(torque)
 
+    def enable(self):
+        self.on = True
+
+    def disable(self):
+        self.written.append(0.0)
+        self.on = False
+
+    def zero_ft(self):
+        self.zeroed = True
+
+    def recover(self):
+        if self.fault is not None:
+            raise self.fault
+
+    reboot = recover
+
+    def health(self):
+        return {}
+
     def close(self):
         if self.opened:
             self.written.append(0.0)
@@ -116,7 +136,8 @@ def spied(listener, monkeypatch):
     spy = Spy()
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spy})
     node = LifecycleNode("spied", namespace="spied")
-    program = driver.Driver(node, {"device": "simulated", "rate": 200.0, "autostart": True})
+    values = {parameter.name: parameter.default for parameter in driver.TABLE}
+    program = driver.Driver(node, values | {"rate": 200.0, "autostart": True, "command_timeout": 5.0})
     listener._executor.add_node(node)
     publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
 
@@ -144,14 +165,36 @@ def test_closing_writes_zero_and_lets_go(spied):
     assert spy.written[-1] == 0.0 and not spy.opened
 
 
-def test_a_fault_of_the_device_closes_it_at_zero_torque_and_can_be_configured_away(spied, listener):
+def test_a_fault_of_the_device_zeroes_the_torque_until_it_is_cleared(spied, listener):
     spy, program, node = spied
     spy.fault = DeviceError("no answer from ID 1 within 5 ms")
+    listener.until(lambda: program._guarded.fault is not None)
+    listener.until(lambda: spy.written[-1] == 0.0)
+    assert program._report()[1] == "fault deviceerror: no answer from ID 1 within 5 ms"
+    clear = listener.node.create_client(Trigger, "/spied/spied/clear_fault")
+    listener.until(clear.service_is_ready)
+    assert not _called(clear, listener).success
+    spy.fault = None
+    assert _called(clear, listener).success
+    assert program._guarded.fault is None and spy.on
+    assert node._state_machine.current_state[1] == "active"
+
+
+def test_an_exception_closes_the_device_at_zero_torque_and_can_be_configured_away(spied, listener):
+    spy, program, node = spied
+    spy.fault = ZeroDivisionError("a mistake in the program")
     listener.until(lambda: not spy.opened)
     assert spy.written[-1] == 0.0
     program.finished()
     assert node._state_machine.current_state[1] == "unconfigured"
-    assert program._report()[1] == "no answer from ID 1 within 5 ms"
+    assert program._report()[1] == "a mistake in the program"
     spy.fault = None
     node.trigger_configure()
     assert node._state_machine.current_state[1] == "inactive" and spy.opened
+
+
+def _called(client, listener):
+    """The answer of a service."""
+    future = client.call_async(Trigger.Request())
+    listener.until(future.done)
+    return future.result()

@@ -111,7 +111,7 @@ def test_impossible_commands_change_nothing_and_are_told(bench):
     bench.commands.publish(two)
     bench.commands.publish(torque_command_message(0, float("nan")))
     count = len(bench.states)
-    told = bench.listener.until(lambda: _values(bench.health[-1]).get("refused_commands") == "1")
+    told = bench.listener.until(lambda: _values(bench.health[-1]).get("refused_commands") == "2")
     assert told and all(m.effort[0] == 0.0 for m in bench.states[count:])
     assert any("2 joints (a, b), expected one" in line for line in bench.process.output)
 

@@ -65,7 +65,6 @@ class Motor:
         self._port = Port(settings.path, settings.baud, settings.latency)
         self.bus = Bus(self._port, settings.identity)
         self._supervisor: Supervisor | None = None
-        self._on = False
         self._longer = 0
         self.table: ControlTable | None = None
         self.torque_limit = math.nan
@@ -97,13 +96,13 @@ class Motor:
         if table.bus_watchdog is not None:
             self._put(table.bus_watchdog, round(WATCHDOG / WATCHDOG_UNIT))
         self._put(table.torque_enable, 1)
-        self._on = True
 
     def disable(self) -> None:
         """Command zero torque and switch it off."""
-        self._on = False
         if self.table is not None:
             self._stop()
+            if self._supervisor is not None:
+                self._supervisor.beat(False)
 
     def read(self) -> Sample:
         """Read everything that is measured, once. Raises NoReply, PortLost, Refused.
@@ -136,7 +135,7 @@ class Motor:
     def write(self, torque: float) -> None:
         """Command a torque (N m). Raises NoReply, PortLost, Refused."""
         if self._supervisor is not None:
-            self._supervisor.beat(self._on)
+            self._supervisor.beat(torque != 0.0)
         table = self._known
         self.bus.put(table.goal_torque, round(torque / self._settings.torque_constant / table.ampere))
 
@@ -173,7 +172,7 @@ class Motor:
 
     def close(self) -> None:
         """Zero torque, off, port closed; where the motor does not acknowledge it the supervisor goes on."""
-        self._on, safe = False, False
+        safe = False
         try:
             if self.table is not None:
                 self._stop()

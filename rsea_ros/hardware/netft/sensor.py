@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
@@ -19,7 +20,11 @@ SETTLE, FIRST = 0.1, 3.0
 QUIET_CYCLES = 3
 TARED = 6.0
 """Standard deviations that the mean may be off after a tare: the bias is one record, with its noise."""
+STREAM_AGAIN = 0.02
+"""s until records come with the new bias."""
 AXES = ("Fx in N", "Fy in N", "Fz in N", "Tx in N m", "Ty in N m", "Tz in N m")
+
+Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -63,17 +68,21 @@ class Sensor:
         return [(a.stamp, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
 
     def zero(self) -> None:
-        """Let the sensor take its present load for zero. Raises DeviceError when it does not."""
+        """Let the sensor take its present load for zero. Raises DeviceError when the load is not at rest."""
+        self._expect_small(np.ptp(self._collect(), axis=0), 2.0, "swings by", "before the tare")
         self._receiver.send(SET_BIAS)
-        time.sleep(0.02)
-        values = self._collect()
-        quantum = np.array([self._calibration.force] * 3 + [self._calibration.torque] * 3)
-        excess = np.abs(values.mean(axis=0)) / (TARED * np.array(self.noise) + quantum)
-        if np.any(excess > 1.0):
-            axis = int(np.argmax(excess))
-            mean = values[:, axis].mean()
-            raise DeviceError(f"F/T sensor: {AXES[axis]} is {mean:.4g} after the tare, expected about 0")
+        time.sleep(STREAM_AGAIN)
+        self._expect_small(np.abs(self._collect().mean(axis=0)), 1.0, "is", "after the tare")
         self._restart_watch()
+
+    def _expect_small(self, values: Values, times: float, verb: str, when: str) -> None:
+        """Raise DeviceError when an axis is beyond so many times the noise."""
+        quantum = np.array([self._calibration.force] * 3 + [self._calibration.torque] * 3)
+        limit = times * (TARED * np.array(self.noise) + quantum)
+        axis = int(np.argmax(values / limit))
+        if values[axis] > limit[axis]:
+            expected = f"expected at most {limit[axis]:.3g}"
+            raise DeviceError(f"F/T sensor: {AXES[axis]} {verb} {values[axis]:.3g} {when}, {expected}")
 
     def recover(self) -> None:
         """Wait for the stream to be sound. Raises DeviceError when it is not."""
@@ -91,7 +100,7 @@ class Sensor:
         """End the stream."""
         self._receiver.close()
 
-    def _collect(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    def _collect(self) -> Values:
         """Return the wrenches of the next SETTLE seconds, one a row. Raises DeviceError without any."""
         self._receiver.take()
         deadline = time.monotonic() + FIRST
@@ -131,6 +140,6 @@ def _complaint(arrivals: list[Arrival]) -> str:
     return ""
 
 
-def _six(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Wrench:
+def _six(values: Values) -> Wrench:
     fx, fy, fz, tx, ty, tz = (float(value) for value in values)
     return fx, fy, fz, tx, ty, tz

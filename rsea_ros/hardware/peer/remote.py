@@ -59,6 +59,11 @@ class RemoteBench:
         result: dict[str, Any] = self.ask("log", since=since)["result"]
         return result
 
+    def torque(self) -> tuple[int, bool]:
+        """Return the goal in counts and whether torque is on."""
+        goal, on = self.ask("torque")["result"]
+        return int(goal), bool(on)
+
     def close(self) -> None:
         """End the process."""
         assert self._process.stdin is not None and self._process.stdout is not None

@@ -1,0 +1,259 @@
+"""The driver node on the bench on a wire: what it publishes, its services, zero torque on every way out."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, WrenchStamped, torque_command_message
+from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENT = {"rate": 100.0, "latency": 0.05, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
+"""A machine that is busy with other tests must not look like a fault."""
+WAIT = 20.0
+"""s for what normally takes one."""
+
+
+class Driven:
+    """A driver on a bench, in a namespace of its own."""
+
+    def __init__(self, bench, listener, name, begin):
+        self.bench, self.name, self._listener = bench, name, listener
+        self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
+        self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **PATIENT)
+
+    def push(self, condition, torque=10.0):
+        """Command a torque until the condition holds."""
+        deadline = time.monotonic() + WAIT
+
+        def pushed():
+            assert time.monotonic() < deadline, self.process.output[-5:]
+            self._commands.publish(torque_command_message(0, torque))
+            return condition()
+
+        self._listener.until(pushed)
+
+    def drive(self):
+        """Wait until the motor has its torque."""
+        self.push(self._driving)
+
+    def _driving(self):
+        goal, on = self.goal()
+        return goal != 0 and on
+
+    def goal(self):
+        """The goal in counts that the motor got last, and whether its torque is on."""
+        return self.bench.torque()
+
+    def counts(self, torque):
+        """A torque (N m) in counts of the goal, on 54024."""
+        return round(torque / 6.826 / TABLES[54024].ampere)
+
+    def call(self, kind, service, request):
+        """Call a service of the driver; return its answer."""
+        client = self._listener.node.create_client(kind, f"/{self.name}/driver/{service}")
+        self._listener.until(client.service_is_ready)
+        future = client.call_async(request)
+        self._listener.until(future.done)
+        return future.result()
+
+    def trigger(self, service):
+        """Call a Trigger service."""
+        return self.call(Trigger, service, Trigger.Request())
+
+    def change(self, transition):
+        """Ask for a transition of the lifecycle."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return self.call(ChangeState, "change_state", request)
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A function that gives the bench with a motor of a model."""
+    made = {}
+
+    def place(model):
+        if model not in made:
+            made[model] = RemoteBench(tmp_path_factory.mktemp("wire") / "tty", "--model", model)
+        return made[model]
+
+    yield place
+    for each in made.values():
+        each.close()
+
+
+@pytest.fixture(scope="module")
+def wire(bench, start, listener):
+    """One driver on 54024 for most tests, in their order."""
+    return Driven(bench(54024), listener, "main", start)
+
+
+def test_it_publishes_what_the_bench_has_sent_and_follows_commands(wire, listener):
+    states = listener.hear(JointState, "/main/joint_states", MEASUREMENT)
+    wrenches = listener.hear(WrenchStamped, "/main/ft", MEASUREMENT)
+    wire.push(lambda: len(states) > 50 and len(wrenches) > 50 and states[-1].effort[0] > 9.0)
+    assert wire.goal() == (wire.counts(10.0), True)
+    table = TABLES[54024]
+    start = table.sample[0]
+    sent = [bytes.fromhex(data) for t, at, data in wire.bench.log()["replies"] if at == start]
+    origin = table.position.value(sent[0], start)
+    velocities = {round(table.velocity.value(data, start) * table.radian_per_second, 12) for data in sent}
+    positions = {table.position.value(data, start) - origin for data in sent}
+    for message in states:
+        assert round(message.position[0] * table.pulses / 6.283185307179586) in positions
+        assert round(message.velocity[0], 12) in velocities
+    assert 8.0 < wrenches[-1].wrench.torque.z < 12.0
+
+
+def test_commands_beyond_the_limit_are_cut_down_and_counted(wire, listener):
+    wire.push(lambda: wire.goal()[0] == wire.counts(68.0), torque=500.0)
+    listener.until(lambda: any("commands limited to 68 N m" in line for line in wire.process.output))
+    wire.push(lambda: wire.goal()[0] == wire.counts(10.0))
+
+
+def test_not_a_number_and_strange_stamps_change_nothing_and_are_counted(wire, listener):
+    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+    now = time.time_ns()
+    for stamp, torque in ((0, float("nan")), (now - 10**9, 30.0), (now + 10**9, 30.0)):
+        wire._commands.publish(torque_command_message(stamp, torque))
+    wire.push(lambda: _value(health, "main", "refused_commands") == "3")
+    assert wire.goal()[0] == wire.counts(10.0)
+
+
+def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire, listener):
+    wire.drive()
+    answer = wire.trigger("zero_ft")
+    assert not answer.success and "N m is commanded, expected 0 N m" in answer.message
+    wire.push(lambda: wire.goal()[0] == 0, torque=0.0)
+    wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
+
+
+def test_a_fault_is_told_on_diagnostics_and_ends_by_service(wire, listener):
+    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+    wire.drive()
+    wire.bench.ask("set", temperature=90)
+    wire.push(lambda: wire.goal() == (0, True))
+    told = "temperature: 90 °C, limit 70 °C"
+    wire.push(lambda: _value(health, "main", "fault") == told)
+    refused = wire.change(Transition.TRANSITION_DEACTIVATE), wire.change(Transition.TRANSITION_ACTIVATE)
+    assert [answer.success for answer in refused] == [True, False]
+    wire.bench.ask("set", temperature=30)
+    assert wire.trigger("clear_fault").success
+    assert wire.change(Transition.TRANSITION_ACTIVATE).success
+    wire.drive()
+
+
+def test_a_shutdown_of_the_motor_ends_by_reboot(wire):
+    wire.drive()
+    wire.bench.ask("alert", bits=0x20)
+    wire.push(lambda: wire.goal() == (0, False))
+    answer = wire.trigger("clear_fault")
+    assert not answer.success and "hardware error overload, expected a reboot" in answer.message
+    assert wire.trigger("reboot").success
+    wire.drive()
+
+
+def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire):
+    wire.drive()
+    wire.bench.ask("vanish")
+    answer = wire.trigger("clear_fault")
+    assert not answer.success and "port" in answer.message
+    wire.bench.ask("appear")
+    answer = wire.trigger("clear_fault")
+    assert answer.success, answer.message
+    wire.drive()
+
+
+def test_deactivated_the_torque_is_zero_and_off(wire):
+    wire.drive()
+    assert wire.change(Transition.TRANSITION_DEACTIVATE).success
+    assert wire.goal() == (0, False)
+    assert wire.change(Transition.TRANSITION_ACTIVATE).success
+
+
+def test_sigint_leaves_torque_zero_and_off(wire):
+    wire.drive()
+    assert wire.process.stop(signal.SIGINT) == 0
+    assert wire.goal() == (0, False)
+
+
+def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener, tmp_path):
+    """The real driver, whose code for limits breaks after a while."""
+    code = (
+        "import sys\nfrom rsea_ros.hardware import limits\nfrom rsea_ros.nodes import driver\n"
+        "look, count = limits.Guard.look, [0]\n"
+        "def broken(self, state):\n    count[0] += self.torque != 0.0\n"
+        "    if count[0] > 50:\n        raise ZeroDivisionError('a mistake')\n    look(self, state)\n"
+        "limits.Guard.look = broken\nsys.exit(driver.main())\n"
+    )
+    program = tmp_path / "broken.py"
+    program.write_text(code)
+    wire = Driven(bench(54024), listener, "broken", lambda name, remaps, **p: Script(program, remaps, p))
+    wire.drive()
+    wire.push(lambda: wire.goal() == (0, False))
+    wire.process.kill()
+
+
+def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, listener):
+    wire = Driven(bench(54025), listener, "shutdown", start)
+    wire.drive()
+    assert wire.change(Transition.TRANSITION_ACTIVE_SHUTDOWN).success
+    assert wire.goal() == (0, False)
+    assert wire.process.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("model", "number", "status", "end"),
+    [
+        (54025, signal.SIGTERM, 0, (0, False)),
+        (54024, signal.SIGKILL, -signal.SIGKILL, (0, False)),
+        (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
+    ],
+)
+def test_killed_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
+    """By the driver itself; by the supervisor; by the motor's own watchdog, which leaves it on at zero."""
+    victim = Driven(bench(model), listener, f"{number.name}_{model}".lower(), start)
+    victim.drive()
+    assert victim.process.stop(number) == status
+    listener.until(lambda: victim.goal() == end)
+
+
+class Script:
+    """A driver made of a script, as `start` gives one."""
+
+    def __init__(self, program, remaps, parameters):
+        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={_text(value)}")]
+        words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
+        self._process = subprocess.Popen(
+            [sys.executable, str(program), "--ros-args", *words],
+            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    output = ()
+
+    def kill(self):
+        """End it without asking."""
+        self._process.kill()
+        self._process.wait()
+
+
+def _text(value):
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _value(health, namespace, key):
+    """The newest value that a driver's diagnostics have."""
+    for message in reversed(health):
+        if message.status[0].name == f"/{namespace}/driver":
+            return {pair.key: pair.value for pair in message.status[0].values}.get(key)
+    return None
