@@ -78,7 +78,13 @@ def table_2(name: str) -> float:
 
 def claims() -> tuple[Claim, ...]:
     """Return every number of the paper that can be recomputed from others of it."""
-    return (*_from_the_fit(), *_from_the_parts(), *_from_the_springs(), *_from_the_bandwidth())
+    return (
+        *_from_the_fit(),
+        *_from_the_parts(),
+        *_from_the_springs(),
+        *_from_the_bandwidth(),
+        *_from_the_prototype(),
+    )
 
 
 def _from_the_fit() -> Iterator[Claim]:
@@ -88,6 +94,8 @@ def _from_the_fit() -> Iterator[Claim]:
         "Eq. (10)", "K_s/J_eff of the numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator"
     )
     yield Claim("Eq. (10)", "gain at rest, as Eq. (4) has it", "1.000", c_0 / c_2, "1", "1560.436 / 1638.783")
+    yield Claim("Table 2", "J_m + J_sc", "0.957", j_eff, "kg m^2", "Eq. (10): K_s / mean of both K_s/J_eff")
+    yield Claim("Table 2", "b_m + b_s", "26.088", b_eff, "N m s/rad", "Eq. (10): 27.267 J_eff")
     j_m, b_m = j_eff - table_2("J_sc"), b_eff - table_2("b_s")
     yield Claim(
         "Table 2", "J_m", TABLE_2["J_m"][0], j_m, "kg m^2", "Eq. (10), both K_s/J_eff averaged, less J_sc"
@@ -121,6 +129,12 @@ def _from_the_parts() -> Iterator[Claim]:
 
 
 def _from_the_springs() -> Iterator[Claim]:
+    for where, what, printed, inches in (
+        ("3.2.1", "separation, platform", "127", 5.0),
+        ("3.2.2", "link of the pendulum", "114", 4.5),
+        ("4.1", "separation, prototype", "50.8", 2.0),
+    ):
+        yield Claim(where, what, printed, 25.4 * inches, "mm", f"{inches:g} in")
     nominal = paper.eq_9_spring_stiffness(SPRING_RATE, ARM, 0.0)
     yield Claim(
         "3.2.1", "K_s, nominal", "1690.5", nominal, "N m/rad", "Eq. (9) with r_s = 0, which is not printed"
@@ -137,26 +151,21 @@ def _from_the_bandwidth() -> Iterator[Claim]:
         "Eq. (7)", "factor", "0.292", 1.0 - 10.0 ** (-3.0 / 20.0), "1", "+3 dB to the letter, undamped"
     )
     yield Claim("Eq. (7)", "factor", "0.292", paper.EXACT_FACTOR, "1", "+3.01 dB, a factor √2, undamped")
-    hz = paper.eq_7_bandwidth(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA)
+
+
+def _from_the_prototype() -> Iterator[Claim]:
+    k_s, j_sc, where = PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA, "4.1, Fig. 20"
+    undamped = paper.eq_6_distal_per_proximal(k_s, j_sc, 0.0)
+    what = "bandwidth of the prototype"
+    yield Claim(where, what, "55.5", paper.eq_7_bandwidth(k_s, j_sc), "Hz", "Eq. (7)")
+    yield Claim(where, what, "55.5", flat_band(undamped), "Hz", "Eq. (6) undamped, +3 dB")
+    yield Claim("4.1", "torque the spring carries", "150", k_s / 2.0, "N m", "Eq. (8) at 45°: K_s/2")
+    radians = KNEE_TORQUE / k_s
     yield Claim(
-        "4.1, Fig. 20",
-        "bandwidth of the prototype",
-        "55.5",
-        hz,
-        "Hz",
-        "Eq. (7), 260 N·m/rad and 6.169e-4 kg·m²",
+        "3.1.2",
+        "largest deflection",
+        "5",
+        math.degrees(radians),
+        "deg",
+        "150 N·m / 260 N·m/rad, as if linear",
     )
-    undamped = flat_band(paper.eq_6_distal_per_proximal(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA, 0.0))
-    yield Claim(
-        "4.1, Fig. 20", "bandwidth of the prototype", "55.5", undamped, "Hz", "Eq. (6) undamped, +3 dB"
-    )
-    yield Claim(
-        "4.1",
-        "torque the prototype's spring can carry",
-        "150",
-        PROTOTYPE_STIFFNESS / 2.0,
-        "N m",
-        "Eq. (8) at 45°: K_s/2",
-    )
-    degrees = math.degrees(KNEE_TORQUE / PROTOTYPE_STIFFNESS)
-    yield Claim("3.1.2", "largest deflection", "5", degrees, "deg", "150 N·m / 260 N·m/rad, taken as linear")

@@ -1,0 +1,108 @@
+"""`rsea paper`: every table and figure of the paper recomputed beside the printed value."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._progress import progress
+from rsea_ros.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rsea_ros.report.paper_page import PaperTests
+    from rsea_ros.signals import Record
+
+HELP = "every equation, table and figure of the paper recomputed beside the printed value"
+MOVING = {
+    "paper_moving_output": ("ft",),
+    "two_moving_outputs": ("ft", "position"),
+    "separate_stiffnesses": ("ft", "position"),
+}
+"""Rigs of the moving-output tests, the paper's first, and what the fit sees."""
+SHORTEST = 20.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("out/paper"),
+        help="directory for paper.json, report.html and the simulated bags (default %(default)s)",
+    )
+    parser.add_argument(
+        "--duration", type=float, default=160.0, help="s, of each simulated test (default %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=5, help="of benches, commands and noise (default %(default)s)"
+    )
+    parser.add_argument("--json", action="store_true", help="print paper.json to stdout and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate the tests, recompute the paper, write the results."""
+    from rsea_ros.report.paper_json import paper_json
+    from rsea_ros.report.paper_page import paper_report
+    from rsea_ros.report.results import write_json, write_text
+
+    if not args.duration >= SHORTEST:
+        raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
+    args.out.mkdir(parents=True, exist_ok=True)
+    with progress("paper") as tell:
+        tests = _tests(args, tell)
+        tell("page", 0.95)
+        results = paper_json(tests)
+        path = write_json(args.out / "paper.json", results)
+        report = write_text(args.out / "report.html", paper_report(tests))
+    if args.json:
+        print(path.read_text(encoding="utf-8"), end="")
+        return 0
+    agree = sum(c["agrees"] for c in results["claims"])
+    print(f"{agree} of {len(results['claims'])} printed numbers come out to the last digit")
+    for name, models in results["moving_output"].items():
+        shares = ", ".join(
+            f"{m} {100 * j['explained']:.1f} % ({j['sensor']})" for m, rows in models.items() for j in rows
+        )
+        print(f"{name}: held-out torque explained: {shares}")
+    print(f"report: {report}")
+    return 0
+
+
+def _tests(args: argparse.Namespace, tell: Callable[[str, float], None]) -> PaperTests:
+    """Simulate the paper's tests, each through a bag."""
+    import numpy as np
+
+    from rsea_ros.identification.excitation import Settings, excitation
+    from rsea_ros.identification.frequency_response import estimate_response
+    from rsea_ros.identification.moving_output import RATE, moving_output
+    from rsea_ros.model.rig_file import load_rig
+    from rsea_ros.model.simulation import synthesize
+    from rsea_ros.report.paper_page import PaperTests
+    from rsea_ros.signals import Channel
+
+    def bag(name: str, record: Record) -> Record:
+        return through_bag(args.out / f"{name}.mcap", record)
+
+    tell("high impedance", 0.0)
+    values = excitation("chirp", Settings(rate=RATE, duration=args.duration, seed=args.seed))
+    command = Channel(np.arange(len(values)) / RATE, values)
+    rig = load_rig("paper_high_impedance")
+    clamped = estimate_response(bag(rig.name, synthesize(rig, command, seed=args.seed)), "ft")
+    moving = {}
+    for i, (name, channels) in enumerate(MOVING.items()):
+        tell(name.replace("_", " "), 0.1 + 0.28 * i)
+        moving[name] = moving_output(
+            load_rig(name), bag, duration=args.duration, seed=args.seed, channels=channels
+        )
+    return PaperTests(clamped, moving)
+
+
+def through_bag(path: Path, record: Record) -> Record:
+    """Write a record as a bag (over an older one) and return what is read back."""
+    from msg_adapters import read_record, write_record
+
+    path.unlink(missing_ok=True)
+    write_record(record, path)
+    return read_record([path])

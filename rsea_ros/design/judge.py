@@ -1,0 +1,153 @@
+"""Judge a spring stiffness against a requirement, and find the least one that meets it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsea_ros.design import mechanism
+from rsea_ros.design.catalogue import MotorGear
+from rsea_ros.design.requirement import Requirement
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.bandwidth import end_to_end, flat_band
+from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
+from rsea_ros.model.rig import END_NAMES, Quantity, Rig
+from rsea_ros.model.spring import spring_rate
+
+DAMPING_RATIO = 0.025
+"""Of spring and chassis, assumed: that of the prototype's rig. The paper states none."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A demand and what the design has of it. least: the demand is a lower limit, else an upper one."""
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    least: bool = True
+
+    @property
+    def met(self) -> bool:
+        """Whether the design has it; a value that does not exist (nan) does not."""
+        return self.value >= self.limit if self.least else self.value <= self.limit
+
+
+@dataclass(frozen=True)
+class Design:
+    """A spring for a requirement.
+
+    stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the torque asked for,
+    nan where it cannot carry it. linear: rad, T / K_s. error: share by which Eq. (8) falls short of linear at
+    the deflection limit. resonance: Hz, with the rotor's spin. bands: Hz.
+    """
+
+    requirement: Requirement
+    unit: MotorGear
+    stiffness: float
+    rate: float
+    deflection: float
+    linear: float
+    error: float
+    resonance: float
+    band_eq_7: float
+    band_exact: float
+    checks: tuple[Check, ...]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every check is met."""
+        return all(check.met for check in self.checks)
+
+
+def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design:
+    """Return what a stiffness (N m/rad) gives. Raises ParameterError for one that is not above 0."""
+    if not (math.isfinite(stiffness) and stiffness > 0.0):
+        raise ParameterError(
+            f"design: stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad"
+        )
+    inner = requirement.inertia + unit.spin
+    exact = flat_band(
+        end_to_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg
+    )
+    band = eq_7_bandwidth(stiffness, requirement.inertia)
+    theta = float(mechanism.deflection(stiffness, requirement.torque))
+    return Design(
+        requirement=requirement,
+        unit=unit,
+        stiffness=stiffness,
+        rate=spring_rate(stiffness, requirement.arm, requirement.spring_radius),
+        deflection=theta,
+        linear=float(mechanism.linear_deflection(stiffness, requirement.torque)),
+        error=float(mechanism.linearity_error(requirement.deflection)),
+        resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi),
+        band_eq_7=band,
+        band_exact=exact,
+        checks=_checks(requirement, unit, stiffness, theta, band, exact),
+    )
+
+
+def _checks(
+    r: Requirement, unit: MotorGear, stiffness: float, theta: float, band: float, exact: float
+) -> tuple[Check, ...]:
+    carries, turns = float(mechanism.largest_torque(stiffness)), math.degrees(theta)
+    return (
+        Check("Bandwidth by Eq. (7), as the paper has it", band, r.bandwidth, "Hz"),
+        Check("Bandwidth with the rotor's spin, exact", exact, r.bandwidth, "Hz"),
+        Check("Torque that the mechanism carries, K_s/2", carries, r.torque, "N m"),
+        Check("Deflection at that torque, Eq. (8)", turns, math.degrees(r.deflection), "deg", False),
+        Check("Peak torque of motor and gear", unit.strongest, r.torque, "N m"),
+    )  # fmt: skip
+
+
+def stiffness_bounds(requirement: Requirement, unit: MotorGear) -> dict[str, float]:
+    """Return the least K_s, N m/rad, that each demand asks for."""
+    omega_2 = (2.0 * math.pi * requirement.bandwidth) ** 2 / PAPER_FACTOR
+    return {
+        "Bandwidth by Eq. (7)": omega_2 * requirement.inertia,
+        "Bandwidth with the rotor's spin": least_for_band(requirement, unit),
+        "Torque, K_s/2": 2.0 * requirement.torque,
+        "Deflection": mechanism.stiffness_for_deflection(requirement.torque, requirement.deflection),
+    }
+
+
+def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
+    """Return the least K_s, N m/rad, whose exact band reaches the one asked for; bisection in log K_s."""
+
+    def reaches(k_s: float) -> bool:
+        function = end_to_end(rig_of(requirement, unit, k_s))
+        return (
+            flat_band(function, requirement.tolerance_db, requirement.tolerance_deg) >= requirement.bandwidth
+        )
+
+    low, high = 1.0, 2.0
+    while not reaches(high):
+        low, high = high, 2.0 * high
+    for _ in range(24):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if reaches(middle) else (middle, high)
+    return high
+
+
+def least_stiffness(requirement: Requirement, unit: MotorGear) -> float:
+    """Return the least K_s, N m/rad, that meets every demand on the spring."""
+    return max(stiffness_bounds(requirement, unit).values())
+
+
+def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
+    """Return the actuator as a rig with both ends clamped."""
+    damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * requirement.inertia)
+    values = {
+        "rotor.reflected_inertia": unit["reflected_inertia"],
+        "rotor.reflected_damping": unit["reflected_damping"],
+        "gear.ratio": unit["ratio"],
+        "chassis.inertia": requirement.inertia,
+        "spring.stiffness": stiffness,
+        "spring.damping": damping,
+    }
+    return Rig(
+        name=f"{unit.name}, {stiffness:.0f} N m/rad",
+        quantities={name: Quantity(value) for name, value in values.items()},
+        clamped=frozenset(END_NAMES),
+    )

@@ -1,0 +1,71 @@
+"""What is asked of an actuator."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsea_ros.errors import ParameterError
+
+_LARGEST = 45.0
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """The defaults are the paper's knee (section 4.1), with the deflection limit of section 3.1.2.
+
+    torque: N m. bandwidth: Hz. inertia, mass, diameter: of the spring chassis, kg m^2, kg, m. separation:
+    between two springs, twice the arm, m. spring_radius: m. deflection: rad. tolerance_db, tolerance_deg: of
+    T_d / T_p.
+    """
+
+    torque: float = 150.0
+    bandwidth: float = 50.0
+    inertia: float = 6.169e-4
+    mass: float = 0.245
+    diameter: float = 0.12
+    separation: float = 0.0508
+    spring_radius: float = 0.0131
+    deflection: float = math.radians(5.0)
+    tolerance_db: float = 3.0
+    tolerance_deg: float = 90.0
+
+    def __post_init__(self) -> None:
+        for name, unit in _UNITS.items():
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"design: {name} = {value:g} {unit}, expected a finite value > 0 {unit}")
+        if self.deflection > math.radians(_LARGEST):
+            raise ParameterError(
+                f"design: deflection = {math.degrees(self.deflection):g} deg, expected at most "
+                f"{_LARGEST:g} deg"
+            )
+        if self.separation > self.diameter:
+            raise ParameterError(
+                f"design: separation = {self.separation:g} m, expected within the diameter of "
+                f"{self.diameter:g} m"
+            )
+
+    @property
+    def arm(self) -> float:
+        """R, m: half the separation."""
+        return 0.5 * self.separation
+
+
+_UNITS = {
+    "torque": "N m",
+    "bandwidth": "Hz",
+    "inertia": "kg m^2",
+    "mass": "kg",
+    "diameter": "m",
+    "separation": "m",
+    "spring_radius": "m",
+    "deflection": "rad",
+    "tolerance_db": "dB",
+    "tolerance_deg": "deg",
+}
+
+
+def gyration(requirement: Requirement) -> float:
+    """Return the chassis' radius of gyration over its outer radius: 0.71 is a full disc, 1 a thin ring."""
+    return math.sqrt(requirement.inertia / requirement.mass) / (0.5 * requirement.diameter)

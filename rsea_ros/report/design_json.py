@@ -1,0 +1,56 @@
+"""design.json: what a design says, for programs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rsea_ros.design.judge import Design, stiffness_bounds
+from rsea_ros.design.margins import margins
+
+
+def design_json(asked: Design, least: Design, robust: Design | None) -> dict[str, Any]:
+    """Return the result file. Angles in rad; null where a design cannot carry the torque."""
+    r = asked.requirement
+    return {
+        "schema": 1,
+        "requirement": {name: getattr(r, name) for name in r.__dataclass_fields__},
+        "unit": asked.unit.name,
+        "least_stiffness_by_demand": stiffness_bounds(r, asked.unit),
+        "asked": _design(asked),
+        "least": _design(least),
+        "robust": _design(robust) if robust else None,
+    }
+
+
+def _design(d: Design) -> dict[str, Any]:
+    return {
+        "stiffness": d.stiffness,
+        "spring_rate": d.rate,
+        "arm": d.requirement.arm,
+        "largest_torque": 0.5 * d.stiffness,
+        "deflection": _finite(d.deflection),
+        "linear_deflection": d.linear,
+        "linearity_error_at_limit": d.error,
+        "resonance_hz": d.resonance,
+        "bandwidth_eq_7_hz": d.band_eq_7,
+        "bandwidth_exact_hz": d.band_exact,
+        "feasible": d.feasible,
+        "checks": [
+            {"name": c.name, "value": _finite(c.value), "limit": c.limit, "unit": c.unit, "met": c.met}
+            for c in d.checks
+        ],
+        "margins": [
+            {
+                "name": m.name,
+                "percentiles_5_50_95": [_finite(v) for v in m.percentiles],
+                "limit": _finite(m.limit),
+                "share": m.share,
+            }
+            for m in margins(d)
+        ],
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

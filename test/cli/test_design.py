@@ -1,0 +1,51 @@
+"""`rsea design` and `rsea paper` as a user runs them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from rsea_ros.cli.main import main
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_design_without_arguments_is_the_papers_example(here, capsys):
+    assert main(["design", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["asked"]["bandwidth_eq_7_hz"] == pytest.approx(55.83, abs=5e-3)
+    assert result["asked"]["largest_torque"] == 130.0
+    assert result["asked"]["deflection"] is None
+    assert not result["asked"]["feasible"]
+    assert result["least"]["feasible"]
+    page = (here / "out/design/report.html").read_text(encoding="utf-8")
+    for said in ("55.8 Hz by Eq. (7)", "130 N·m at 45°", "33°", "2743"):
+        assert said in page
+
+
+def test_design_tells_by_status_when_it_is_asked_to(here):
+    assert main(["design", "--fail-on", "unmet"]) == 1
+    assert main(["design", "--fail-on", "unmet", "--stiffness", "4000"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--stiffness", "0"], "design: stiffness = 0 N m/rad, expected a finite value > 0 N m/rad"),
+        (["--unit", "none"], "unit 'none', expected one of h54-200-s500-r, rd85x13-hd_cpl-25a-160"),
+        (["--torque", "nan"], "design: torque = nan N m, expected a finite value > 0 N m"),
+        (
+            ["--catalogue", "absent.yaml"],
+            "absent.yaml: No such file or directory, expected a catalogue in YAML",
+        ),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(here, capsys, arguments, message):
+    assert main(["design", *arguments]) == 2
+    assert capsys.readouterr().err == f"rsea design: {message}\n"
+    assert not (here / "out").exists()

@@ -1,0 +1,154 @@
+"""The design method: the paper's example comes out, and what the paper does not say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.design import mechanism
+from rsea_ros.design.bands import bands
+from rsea_ros.design.catalogue import catalogue, unit_named
+from rsea_ros.design.judge import judge, least_stiffness, rig_of, stiffness_bounds
+from rsea_ros.design.margins import SPREADS, margins, robust_stiffness
+from rsea_ros.design.requirement import Requirement, gyration
+from rsea_ros.errors import ParameterError
+from rsea_ros.model import outputs
+from rsea_ros.model.paper_formulas import eq_8_spring_torque, eq_9_spring_stiffness
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig_file import load_rig
+
+PAPER = Requirement()
+UNIT = unit_named("rd85x13-hd_cpl-25a-160")
+ASKED = judge(PAPER, UNIT, 260.0)
+
+
+OTHERS = "continuous_torque: {}, reflected_inertia: {}, reflected_damping: {}"
+
+
+def met(design):
+    return [check.met for check in design.checks]
+
+
+def test_the_papers_example():
+    """150 N m, above 50 Hz, 6.169e-4 kg m^2: 260 N m/rad reach 55.8 Hz by Eq. (7)."""
+    assert ASKED.band_eq_7 == pytest.approx(55.83, abs=5e-3)
+    assert ASKED.checks[0].met
+    assert 260.0 > stiffness_bounds(PAPER, UNIT)["Bandwidth by Eq. (7)"] == pytest.approx(208.5, abs=0.05)
+    assert ASKED.rate == pytest.approx(185185.0, rel=1e-3)
+
+
+def test_what_the_paper_does_not_say():
+    assert float(mechanism.largest_torque(260.0)) == 130.0 < PAPER.torque
+    assert math.isnan(ASKED.deflection)
+    assert ASKED.linear == pytest.approx(0.577, abs=5e-4)
+    assert math.degrees(ASKED.linear) == pytest.approx(33.0, abs=0.1)
+    assert ASKED.band_exact == pytest.approx(15.39, abs=5e-3)
+    assert met(ASKED) == [True, False, False, False, True]
+
+
+def test_the_least_stiffness_meets_all_and_a_little_less_does_not():
+    k_s = least_stiffness(PAPER, UNIT)
+    assert judge(PAPER, UNIT, k_s).feasible
+    assert not judge(PAPER, UNIT, 0.999 * k_s).feasible
+    soft = replace(PAPER, bandwidth=5.0)
+    assert judge(soft, UNIT, least_stiffness(soft, UNIT)).feasible
+    assert math.degrees(judge(soft, UNIT, least_stiffness(soft, UNIT)).deflection) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("degrees", [0.5, 5.0, 30.0, 45.0])
+def test_deflection_turns_eq_8_round(degrees):
+    theta = math.radians(degrees)
+    torque = eq_8_spring_torque(185185.0, 0.0254, 0.0131, theta)
+    k_s = eq_9_spring_stiffness(185185.0, 0.0254, 0.0131)
+    assert float(mechanism.deflection(k_s, torque)) == pytest.approx(theta, rel=1e-6)
+    assert 1.0 - torque / (k_s * theta) == pytest.approx(float(mechanism.linearity_error(theta)))
+
+
+def test_no_deflection_carries_more_than_half_the_stiffness():
+    theta = np.linspace(0.0, math.pi / 2, 10001)
+    torque = [eq_8_spring_torque(1e5, 0.03, 0.01, float(t)) for t in theta]
+    k_s = eq_9_spring_stiffness(1e5, 0.03, 0.01)
+    assert max(torque) == pytest.approx(k_s / 2)
+    assert theta[int(np.argmax(torque))] == pytest.approx(math.pi / 4, abs=2e-4)
+
+
+def test_monte_carlo_is_the_spread_of_the_formulas():
+    """Eq. (7) goes as sqrt(K / J): log-normal spreads in closed form, arm and spring radius exact."""
+    spreads = {**dict.fromkeys(SPREADS, 0.0), "rate": 0.06, "inertia": 0.08}
+    row = margins(ASKED, spreads)[0]
+    sigma = 0.5 * math.hypot(0.06, 0.08)
+    expected = [ASKED.band_eq_7 * math.exp(1.6449 * s * sigma) for s in (-1, 0, 1)]
+    assert row.percentiles == pytest.approx(expected, rel=0.004)
+
+
+def test_without_spread_a_margin_is_all_or_nothing():
+    shares = [m.share for m in margins(ASKED, dict.fromkeys(SPREADS, 0.0))]
+    assert shares == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+
+
+def test_robust_is_stiffer_and_impossible_where_the_motor_is_too_weak():
+    k_s = robust_stiffness(PAPER, UNIT)
+    assert k_s > least_stiffness(PAPER, UNIT)
+    assert margins(judge(PAPER, UNIT, k_s))[-1].share == pytest.approx(0.95, abs=3e-3)
+    assert robust_stiffness(PAPER, unit_named("h54-200-s500-r")) == math.inf
+
+
+def test_amplitudes_of_the_bands():
+    """The motor's limit over T_d/T_m of the clamped rig; 5 degrees of a spring by Eq. (8)."""
+    rig = load_rig("paper_high_impedance")
+    found = bands(rig, 44.2)
+    gain = abs(frequency_response(rig, outputs.distal(rig), np.array([10.0]))[0])
+    assert found.motor_limit[10.0] == pytest.approx(44.2 * gain)
+    assert found.spring_limit == pytest.approx(1530.456 / 2 * math.sin(math.radians(10.0)))
+    assert found.eq_7 == pytest.approx(53.20, abs=5e-3)
+    assert found.rows[1].hz[0] == pytest.approx(112.1, abs=0.05)
+
+
+def test_the_design_as_a_rig_has_its_band():
+    rig = rig_of(PAPER, UNIT, 260.0)
+    assert rig["chassis.inertia"] + rig["rotor.reflected_inertia"] / rig["gear.ratio"] == pytest.approx(
+        8.117e-3, rel=1e-4
+    )
+
+
+def test_chassis_is_between_a_disc_and_a_ring():
+    assert math.sqrt(0.5) < gyration(PAPER) < 1.0
+
+
+def test_every_number_of_the_catalogue_has_a_source():
+    for unit in catalogue().values():
+        assert all(unit.sources[name] for name in unit.values)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: {ratio: {value: 5, unit: N m, source: x}}", r"a.continuous_torque is missing"),
+        ("a: 3", r"a = 3, expected a mapping"),
+        ("[", "not YAML"),
+        (f"a: {{ratio: {{value: 5, unit: m, source: x}}, {OTHERS}}}", r"a.ratio.unit = 'm', expected '1'"),
+        ("a: {speed: 3}", r"unknown key 'speed'"),
+    ],
+)  # fmt: skip
+def test_bad_catalogues_are_refused(tmp_path, text, message):
+    path = tmp_path / "units.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ParameterError, match=f"units.yaml: .*{message}"):
+        catalogue(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"torque": -1.0}, r"torque = -1 N m, expected a finite value > 0 N m"),
+        ({"bandwidth": math.nan}, r"bandwidth = nan Hz"),
+        ({"deflection": 1.0}, r"deflection = 57.2958 deg, expected at most 45 deg"),
+        ({"separation": 0.2}, r"separation = 0.2 m, expected within the diameter of 0.12 m"),
+    ],
+)
+def test_impossible_requirements_are_refused(change, message):
+    with pytest.raises(ParameterError, match=message):
+        replace(PAPER, **change)
