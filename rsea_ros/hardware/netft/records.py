@@ -89,7 +89,7 @@ class Sequence:
             if _WORD - ft_step <= REORDERED:
                 kind = "reordered"
             else:
-                self._restart(record, ft_step)
+                self._restart(record)
                 return False
         if kind:
             self.counts[kind] += 1
@@ -98,6 +98,7 @@ class Sequence:
         self.counts["received"] += 1
         self.counts["frozen"] += ft_step == 0
         self._rdt, self._ft = record.sequence, record.ft_sequence
+        self._stray, self._strays = None, 0
         return True
 
     def _another_stream(self, record: Record) -> bool:
@@ -107,9 +108,9 @@ class Sequence:
         self._stray = record.sequence
         return self._strays >= RESYNCHRONISE
 
-    def _restart(self, record: Record, ft_step: int) -> None:
-        """Follow a counter that went back to about zero; take any other jump for damage."""
-        back = record.ft_sequence < LONGEST_GAP and ft_step > _WORD // 2
+    def _restart(self, record: Record) -> None:
+        """Follow a counter that begins anew at about zero; take any other jump for damage."""
+        back = record.ft_sequence < LONGEST_GAP
         self.counts["restarted" if back else "damaged"] += 1
         if back:
             self._rdt, self._ft = record.sequence, record.ft_sequence

@@ -1,0 +1,128 @@
+"""Limits against plain arithmetic: what is cut down, what trips, and how the torque ends."""
+
+import math
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import NoReply, Refused, State
+from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.limits import Guard, Limits
+
+PERIOD = 0.01
+
+
+def guard(**limits):
+    return Guard(Limits(68.0, **limits), PERIOD)
+
+
+def test_torque_is_cut_at_its_limit_either_way_and_counted():
+    limited = guard(slew=1e6)
+    assert [limited.allowed(w, 0.0) for w in (500.0, -500.0, 20.0)] == [68.0, -68.0, 20.0]
+    assert limited.limited == 2
+
+
+def test_the_slew_limit_is_per_second_whatever_the_rate():
+    limited = guard(slew=300.0)
+    assert [limited.allowed(10.0, 0.0) for _ in range(5)] == [3.0, 6.0, 9.0, 10.0, 10.0]
+    assert limited.limited == 3
+
+
+def test_without_a_command_there_is_no_torque():
+    assert guard().allowed(10.0, None) == 0.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_commands_that_cease_end_in_a_ramp_and_a_fault(sign):
+    late = guard(slew=1e6, command_timeout=0.05, ramp=0.04)
+    assert late.allowed(sign * 40.0, 0.05) == sign * 40.0
+    assert [late.allowed(sign * 40.0, 0.06) for _ in range(5)] == [sign * t for t in (30, 20, 10, 0, 0)]
+    assert str(late.fault) == "command_timeout: 60 ms, limit 50 ms"
+    assert late.allowed(sign * 40.0, 0.0) == 0.0, "it is latched"
+    late.clear()
+    assert late.allowed(sign * 40.0, 0.0) == sign * 40.0
+
+
+def test_zero_commands_that_cease_are_no_fault():
+    quiet = guard()
+    quiet.allowed(0.0, 0.0)
+    quiet.allowed(0.0, 9.0)
+    assert quiet.fault is None
+
+
+@pytest.mark.parametrize(
+    ("reading", "told"),
+    [
+        ({"position": -0.1}, "deflection: 0.1 rad, limit 0.08727 rad"),
+        ({"temperature": 71.0}, "temperature: 71 °C, limit 70 °C"),
+        ({"current": -13.0}, "current: 13 A, limit 12 A"),
+        ({"voltage": 19.0}, "voltage: 19 V, limit 20 V too low"),
+        ({"hardware_error": "overload"}, "hardware_error: overload"),
+        ({"ft_trouble": "saturation"}, "ft: saturation"),
+    ],
+)
+def test_a_reading_beyond_a_limit_names_cause_value_and_limit(reading, told):
+    seen = guard(current=12.0, voltage=20.0)
+    seen.allowed(30.0, 0.0)
+    seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
+    assert str(seen.fault) == told
+    assert seen.allowed(30.0, 0.0) == 0.0
+
+
+def test_what_is_not_measured_trips_nothing():
+    blind = guard(current=12.0, voltage=20.0)
+    blind.look(State(0, 0.0, 0.0, 0.0))
+    assert blind.fault is None and math.isnan(State(0, 0.0, 0.0, 0.0).voltage)
+
+
+def test_the_first_fault_is_the_one_that_is_told():
+    first = guard()
+    first.look(State(0, 1.0, 0.0, 0.0, hardware_error="encoder"))
+    assert first.fault.cause == "hardware_error"
+
+
+class Flaky:
+    """A device whose next answers are given; None is a reading."""
+
+    def __init__(self):
+        self.answers, self.written = [], []
+
+    def read(self):
+        answer = self.answers.pop(0) if self.answers else None
+        if answer is not None:
+            raise answer
+        return State(0, 0.0, 0.0, 0.0)
+
+    def write(self, torque):
+        self.written.append(torque)
+
+    def enable(self):
+        """Be enabled."""
+
+
+def cycles(answers, count):
+    """The fault after each of some cycles on a flaky device."""
+    device = Flaky()
+    device.answers = answers
+    guarded = Guarded(device, Limits(68.0), 100.0)
+    guarded.enable()
+    faults = []
+    for _ in range(count):
+        guarded.read()
+        guarded.write(5.0, 0.0)
+        faults.append(guarded.fault.cause if guarded.fault else "")
+    return faults, device.written
+
+
+def test_two_lost_replies_are_none_and_three_in_a_row_a_fault():
+    lost = NoReply("no reply")
+    assert cycles([lost, lost, None, lost, lost], 6)[0] == [""] * 6
+    faults, written = cycles([lost, lost, lost], 5)
+    assert faults == ["", "", "no_reply", "no_reply", "no_reply"]
+    assert written == [5.0, 5.0, 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("error", [Refused("access denied"), DeviceError("anything else")])
+def test_any_other_error_is_a_fault_at_once(error):
+    faults, written = cycles([error], 2)
+    assert faults[0] == type(error).__name__.lower() and written == [0.0, 0.0]

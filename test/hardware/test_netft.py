@@ -1,0 +1,179 @@
+"""RDT and the calibration page: what is lost is counted exactly, what is no record is refused."""
+
+import math
+import random
+import socket
+import struct
+import time
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.netft.calibration import parse
+from rsea_ros.hardware.netft.receiver import Receiver
+from rsea_ros.hardware.netft.records import RESYNCHRONISE, Record, Sequence, decode, request, trouble
+
+
+def datagram(sequence, ft_sequence=None, status=0, values=(1, -2, 3, -4, 5, -6)):
+    words = (sequence % 2**32, (sequence if ft_sequence is None else ft_sequence) % 2**32, status)
+    return struct.pack(">3I6i", *words, *values)
+
+
+def record(sequence, ft_sequence=None):
+    return decode(datagram(sequence, ft_sequence))
+
+
+def test_a_record_and_a_request_are_as_the_manual_says():
+    assert request(2, 5) == bytes.fromhex("1234 0002 00000005")
+    packed = "00000007 00000009 80020000 00000001 fffffffe 00000003 fffffffc 00000005 fffffffa"
+    assert decode(bytes.fromhex(packed)) == Record(7, 9, 0x80020000, (1, -2, 3, -4, 5, -6))
+
+
+@pytest.mark.parametrize("first", [5, 2**32 - 3])
+def test_gaps_are_counted_exactly_across_the_rollover(first):
+    sequence = Sequence()
+    steps = [1, 1, 4, 1, 2, 1, 300]
+    at = first
+    assert sequence.accept(record(at))
+    for step in steps:
+        at += step
+        assert sequence.accept(record(at))
+    assert sequence.counts["lost"] == sum(step - 1 for step in steps)
+    assert sequence.counts["received"] == len(steps) + 1
+
+
+def test_duplicates_and_overtaken_records_are_left_out():
+    sequence = Sequence()
+    taken = [sequence.accept(record(n)) for n in (1, 2, 2, 4, 3, 5)]
+    assert taken == [True, True, False, True, False, True]
+    assert (sequence.counts["duplicate"], sequence.counts["reordered"]) == (1, 1)
+
+
+def test_a_sensor_that_was_switched_off_and_one_that_stands_still_are_seen():
+    sequence = Sequence()
+    assert sequence.accept(record(1, 10**9 * 3)) and sequence.accept(record(2, 10**9 * 3))
+    assert sequence.counts["frozen"] == 1
+    sequence.begin()
+    sequence.accept(record(1, 1))
+    assert sequence.counts["restarted"] == 1
+    assert sequence.accept(record(2, 2))
+
+
+def test_a_wild_jump_is_damage_until_others_follow_it():
+    sequence = Sequence()
+    sequence.accept(record(1))
+    assert not sequence.accept(record(2**30))
+    assert sequence.accept(record(2))
+    others = [sequence.accept(record(2**30 + k, 3 + k)) for k in range(10, 10 + RESYNCHRONISE)]
+    assert others == [False] * (RESYNCHRONISE - 1) + [True]
+    assert sequence.counts["lost"] == 0
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [(0, ""), (0x80010000, ""), (0x80020000, "saturation"), (0x80030000, "saturation"), (1 << 31, "status")],
+)
+def test_status_bits_are_read_as_the_manual_says(status, words):
+    assert trouble(status) == words
+
+
+def test_random_and_mutated_datagrams_give_no_record_that_was_not_sent():
+    """Values have no check of their own in RDT, that is UDP's; length and counters are looked at here."""
+    rng, sequence = random.Random(6), Sequence()
+    for at in range(1, 20_001):
+        whole = datagram(at)
+        assert sequence.accept(decode(whole))
+        noise, cut = rng.randbytes(rng.randrange(80)), whole[: rng.randrange(36)]
+        flipped = bytearray(whole)
+        flipped[rng.randrange(2)] ^= 1 << rng.randrange(8)  # a step of at least 65536
+        flipped[0] |= 0x40
+        for damaged in (noise, cut, whole + whole[:4], bytes(flipped)):
+            found = decode(damaged)
+            assert found is None or not sequence.accept(found), damaged.hex()
+    assert sequence.counts["received"] == 20_000 and sequence.counts["lost"] == 0
+
+
+PAGE = "<netft><cfgcpf>{}</cfgcpf><cfgcpt>{}</cfgcpt><scfgfu>{}</scfgfu><scfgtu>{}</scfgtu></netft>"
+
+
+@pytest.mark.parametrize(
+    ("counts", "units", "force", "torque"),
+    [
+        ((1_000_000, 1000), ("N", "N-mm"), 1e-6, 1e-6),
+        ((4448.2216152605, 112.9848290276167), ("lbf", "lbf-in"), 1e-3, 1e-3),
+        ((1000, 1000), ("kN", "N-m"), 1.0, 1e-3),
+    ],
+)
+def test_the_calibration_is_counts_per_unit(counts, units, force, torque):
+    calibration = parse(PAGE.format(*counts, *units).encode())
+    expected = (force, 2 * force, 3 * force, torque, 2 * torque, 3 * torque)
+    assert calibration.wrench((1, 2, 3, 1, 2, 3)) == pytest.approx(expected)
+    assert math.isnan(calibration.rate)
+
+
+@pytest.mark.parametrize(
+    ("page", "message"),
+    [
+        (PAGE.format(0, 1, "N", "N-m"), "cfgcpf = '0', expected a number above 0"),
+        (PAGE.format(1, "many", "N", "N-m"), "cfgcpt = 'many'"),
+        (PAGE.format(1, 1, "N", "furlong"), "scfgtu = 'furlong', expected one of N-m"),
+        ("<netft/>", "scfgfu = ''"),
+        ("<html>", "not XML"),
+    ],
+)
+def test_a_calibration_that_cannot_be_is_refused(page, message):
+    with pytest.raises(DeviceError, match=message):
+        parse(page.encode())
+
+
+@pytest.fixture
+def streamed():
+    """A receiver and the socket of its sensor, with the address that asked."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sensor:
+        sensor.bind(("127.0.0.1", 0))
+        sensor.settimeout(10.0)
+        receiver = Receiver(*sensor.getsockname())
+        receiver.open()
+        asked, client = sensor.recvfrom(64)
+        assert asked == request(2)
+        yield receiver, sensor, client
+        receiver.close()
+
+
+def _until(condition):
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def test_the_socket_is_drained_and_every_record_has_the_stamp_of_its_arrival(streamed):
+    receiver, sensor, client = streamed
+    before = time.time_ns()
+    for n in range(1, 201):
+        sensor.sendto(datagram(n), client)
+    after = time.time_ns()
+    _until(lambda: receiver.newest is not None and receiver.newest.record.sequence == 200)
+    arrivals = receiver.take()
+    assert [a.record.sequence for a in arrivals] == list(range(1, 201))
+    stamps = [a.stamp for a in arrivals]
+    assert stamps == sorted(stamps) and before <= stamps[0] and stamps[-1] <= after
+
+
+def test_records_of_a_stranger_are_not_taken(streamed):
+    receiver, sensor, client = streamed
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.sendto(datagram(1), client)
+    sensor.sendto(datagram(77), client)
+    _until(lambda: receiver.newest is not None)
+    assert [a.record.sequence for a in receiver.take()] == [77]
+
+
+def test_a_stream_that_falls_silent_is_asked_for_again(streamed):
+    receiver, sensor, client = streamed
+    sensor.sendto(datagram(9, 9), client)
+    assert sensor.recvfrom(64)[0] == request(2)
+    _until(lambda: receiver.newest is not None)
+    sensor.sendto(datagram(1, 20), client)
+    _until(lambda: receiver.newest.record.ft_sequence == 20)
+    assert receiver.sequence.counts["lost"] == 0
