@@ -1,20 +1,55 @@
-"""An identification made by hand from a simulated record, so that reports are tested apart from the fit."""
+"""What reports are tested with: an identification made by hand, a real diagnosis, and a browser."""
 
 from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from msg_adapters.overlay import write_overlay
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate, synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.report.diagnosis_files import write_diagnosis
+from rsea_ros.signals import Channel, Record
 
 DURATION, RATE = 160.0, 280.0
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--enable-logging=stderr", "--virtual-time-budget=20000", "--window-size=1200,4000",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def opened() -> Callable[[str, Path], tuple[str, str]]:
+    """Return a function that gives a page after its scripts have run, and what the browser logged."""
+
+    def open_page(html: str, folder: Path) -> tuple[str, str]:
+        if CHROMIUM is None:
+            pytest.skip("chromium not installed: apt-get install chromium")
+        path = folder / "page.html"
+        path.write_text(html, encoding="utf-8")
+        done = subprocess.run(
+            [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
+            capture_output=True, text=True, timeout=120, check=True,
+        )  # fmt: skip
+        return done.stdout, done.stderr
+
+    return open_page
 
 
 @pytest.fixture(scope="session")
@@ -49,3 +84,30 @@ def identification() -> Identification:
         overlays=tuple(Overlay(n, record[n].t, record[n].y, simulated[n]) for n in sensors),
         statements=("spring.damping is not identifiable from these data.",),
     )
+
+
+SHORT, FRICTION = 16.0, 3.0
+EPOCH = 1_700_000_000_123_456_789
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A record of a bench with Coulomb friction, what was said of it, and where the files are."""
+
+    record: Record
+    diagnosis: Diagnosis
+    out: Path
+
+
+@pytest.fixture(scope="session")
+def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
+    command = excitation("chirp", Settings(rate=RATE, duration=SHORT, seed=3))
+    bench = load_rig("paper_high_impedance").with_effects(
+        EffectSetting("coulomb_friction", {"torque": FRICTION})
+    )
+    record = synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=5)
+    record = replace(record, epoch_ns=EPOCH, source="runs/bench & <friends>")
+    diagnosis = diagnose([record], load_rig("paper_high_impedance"))
+    out = tmp_path_factory.mktemp("diagnosed") / "new" / "out"
+    write_diagnosis(diagnosis, record, out, write_overlay)
+    return Diagnosed(record, diagnosis, out)

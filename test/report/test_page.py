@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-
-import pytest
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.identification_page import identification_report, verdict
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--enable-logging=stderr", "--virtual-time-budget=20000", "--window-size=1200,4000",
-)  # fmt: skip
+Browser = Callable[[str, Path], tuple[str, str]]
 FIGURES = 8
 """Two Bode figures, then time and spectrum of three channels."""
 ZOOM = """<script>setTimeout(() => {
@@ -30,20 +22,9 @@ ZOOM = """<script>setTimeout(() => {
 }, 3000);</script></body>"""
 
 
-def opened(html: str, folder: Path) -> tuple[str, str]:
-    """Return the document after its scripts have run, and what the browser logged."""
-    if CHROMIUM is None:
-        pytest.skip("chromium not installed: apt-get install chromium")
-    path = folder / "report.html"
-    path.write_text(html, encoding="utf-8")
-    done = subprocess.run(
-        [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", "--dump-dom", path.as_uri()],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
-    return done.stdout, done.stderr
-
-
-def test_browser_draws_every_figure_without_an_error(identification: Identification, tmp_path: Path) -> None:
+def test_browser_draws_every_figure_without_an_error(
+    identification: Identification, opened: Browser, tmp_path: Path
+) -> None:
     document, log = opened(identification_report(identification).replace("</body>", ZOOM), tmp_path)
     assert "CONSOLE" not in log
     assert document.count('data-drawn="yes"') == FIGURES

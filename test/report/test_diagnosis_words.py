@@ -1,0 +1,102 @@
+"""What page and terminal say, and where the residual is laid out, against values known beforehand."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from rsea_ros.diagnosis.result import Estimate, Fault, Misfit, Rejected
+from rsea_ros.identification.result import Overlay
+from rsea_ros.report import diagnosis_words as say
+from rsea_ros.report.diagnosis_profile import BINS, profiles
+from rsea_ros.report.diagnosis_terminal import terminal_lines
+from rsea_ros.report.diagnosis_where import finding
+
+
+def terminal(diagnosis):
+    """Return what a pipe gets."""
+    console = Console(file=io.StringIO(), width=80)
+    for line in terminal_lines(diagnosis):
+        console.print(line, soft_wrap=True, highlight=False)
+    return console.file.getvalue().splitlines()
+
+
+def test_the_terminal_says_the_essence_in_about_ten_lines(diagnosed):
+    lines = terminal(diagnosed.diagnosis)
+    assert lines[0] == "Coulomb friction (3.00 N·m) is what the simulation lacks; with it, only noise is left"
+    assert lines[1].startswith("residual    F/T torque ")
+    assert lines[2].startswith("cause       coulomb_friction: torque ")
+    assert len(lines) <= 12
+
+
+def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
+    d = diagnosed.diagnosis
+    d = replace(
+        d,
+        causes=(replace(d.causes[0], confusable_with=("stribeck_friction",)),),
+        rejected=(Rejected("backlash", 0.25, "coulomb_friction explains more"),),
+        faults=(Fault("frozen_samples", "ft", 0.05),),
+        misfit=(Misfit("velocity", -0.1, 0.0, "rad/s", 48.0, "ft"),),
+    )
+    lines = terminal(d)
+    assert "rejected    backlash: Coulomb friction explains more" in lines
+    assert "not told    Coulomb friction: these data do not tell it from Stribeck friction." in lines
+    assert "data        frozen samples in F/T torque, 5.0 % of the samples" in lines
+    assert "wrong at    speed −0.10 to 0 rad/s (48 times)" in lines
+
+
+@pytest.mark.parametrize(
+    ("estimate", "text"),
+    [
+        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", "0.0030", "mrad")),
+        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", "20", "µs")),
+        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", "0.50", "N·m")),
+        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", "0.010", "")),
+    ],
+)
+def test_small_angles_and_times_have_a_prefix(estimate, text):
+    assert say.estimate(estimate) == text
+
+
+def test_a_number_without_unit_is_named(diagnosed):
+    cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
+                    parameters={"gain": Estimate(1.05, "1", (1.04, 1.06))})  # fmt: skip
+    assert say.named([cause]) == "F/T gain error (gain 1.05)"
+
+
+def laid_out(diagnosed, residual):
+    """Return the profiles of a diagnosis whose residual before is a function of speed and time, after none."""
+    d, channels = diagnosed.diagnosis, diagnosed.record.channels
+    t, speed = channels["ft"].t, channels["velocity"].y
+    before = [Overlay(n, c.t, c.y, c.y) for n, c in channels.items() if n != "command"]
+    shifted = channels["ft"].y - d.noise_rms["ft"] * residual(speed, t - t[0])
+    wrong = [Overlay("ft", t, channels["ft"].y, shifted) if o.channel == "ft" else o for o in before]
+    return {p.what: p for p in profiles(replace(d, before=tuple(wrong), after=tuple(before)), "ft")}
+
+
+def test_a_residual_at_high_speed_is_found_there(diagnosed):
+    limit = float(np.quantile(diagnosed.record["velocity"].y, 1.0 - 1.0 / BINS))
+    found = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
+    assert set(found) == {"amplitude", "velocity", "angle", "time"}
+    assert found["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
+    assert found["velocity"].before[:-2] == pytest.approx(2.0)
+    assert found["velocity"].after == pytest.approx(0.0)
+    assert finding(list(found.values())).startswith("The residual depends most on speed: ")
+
+
+def test_faulty_samples_count_for_nothing(diagnosed):
+    d, t = diagnosed.diagnosis, diagnosed.record["ft"].t
+    faulty = (t > 5.0) & (t < 6.0)
+    diagnosis = replace(d, masked={"ft": faulty})
+    masked = laid_out(replace(diagnosed, diagnosis=diagnosis), lambda speed, t: np.where(faulty, 1e3, 1.0))
+    for profile in masked.values():
+        assert np.nanmax(profile.before) == pytest.approx(1.0)
+
+
+def test_a_residual_alike_everywhere_is_said_to_be(diagnosed):
+    found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
+    assert finding(list(found.values())) == "The residual is alike at every load, speed or rotor angle"
