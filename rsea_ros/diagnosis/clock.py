@@ -41,7 +41,12 @@ def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channe
     surplus = float(channel.t[-1] - channel.t[0]) - expected if expected else 0.0
     forward = np.zeros(len(step), bool)
     largest = int(np.argmax(step))
-    if expected and surplus > _GAP * period and step[largest] > _GAP * period and abs(step[largest] - period - surplus) < 2.0 * period:
+    if (
+        expected
+        and surplus > _GAP * period
+        and step[largest] > _GAP * period
+        and abs(step[largest] - period - surplus) < 2.0 * period
+    ):
         forward[largest] = True
     at = back | forward
     if not at.any():

@@ -23,7 +23,9 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
     keep, t = case.mask[channel], case.t[channel]
     for what, unit, values in _respects(case, channel, rig):
         found += _worst(_binned(what, unit, values[keep], residual[keep], case.noise[channel], channel))
-    found += _worst(_binned("time", "s", (t - case.start)[keep], residual[keep], case.noise[channel], channel, equal=True))
+    found += _worst(
+        _binned("time", "s", (t - case.start)[keep], residual[keep], case.noise[channel], channel, equal=True)
+    )
     return tuple(found)
 
 
@@ -37,11 +39,22 @@ def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         inside = (frequency >= low) & (frequency < high)
         if inside.any():
-            bands.append(Misfit("frequency_band", float(low), float(high), "Hz", float(np.sqrt(level[inside].mean() / white)), channel))
+            bands.append(
+                Misfit(
+                    "frequency_band",
+                    float(low),
+                    float(high),
+                    "Hz",
+                    float(np.sqrt(level[inside].mean() / white)),
+                    channel,
+                )
+            )
     return bands
 
 
-def spectrum(case: Case, before: dict[str, FloatArray], after: dict[str, FloatArray], channel: str) -> Spectrum:
+def spectrum(
+    case: Case, before: dict[str, FloatArray], after: dict[str, FloatArray], channel: str
+) -> Spectrum:
     """Return the residual's amplitude density before and after, with the noise floor's."""
     rate = 1.0 / float(np.median(np.diff(case.t[channel])))
     densities = []
@@ -49,7 +62,9 @@ def spectrum(case: Case, before: dict[str, FloatArray], after: dict[str, FloatAr
         residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
         frequency, level = signal.welch(residual, rate, nperseg=min(2048, len(residual)))
         densities.append(np.sqrt(level))
-    return Spectrum(channel, frequency[1:], densities[0][1:], densities[1][1:], case.noise[channel] / np.sqrt(0.5 * rate))
+    return Spectrum(
+        channel, frequency[1:], densities[0][1:], densities[1][1:], case.noise[channel] / np.sqrt(0.5 * rate)
+    )
 
 
 def _respects(case: Case, channel: str, rig: Rig) -> list[tuple[str, str, FloatArray]]:
@@ -66,13 +81,28 @@ def _respects(case: Case, channel: str, rig: Rig) -> list[tuple[str, str, FloatA
     return respects
 
 
-def _binned(what: str, unit: str, values: FloatArray, residual: FloatArray, noise: float, channel: str, equal: bool = False) -> list[Misfit]:
+def _binned(
+    what: str,
+    unit: str,
+    values: FloatArray,
+    residual: FloatArray,
+    noise: float,
+    channel: str,
+    equal: bool = False,
+) -> list[Misfit]:
     if len(values) < 4 * _BINS:
         return []
-    edges = np.linspace(values.min(), values.max(), _BINS + 1) if equal else np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))
+    edges = (
+        np.linspace(values.min(), values.max(), _BINS + 1)
+        if equal
+        else np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))
+    )
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     power = np.bincount(which, residual**2, _BINS) / np.maximum(np.bincount(which, minlength=_BINS), 1)
-    return [Misfit(what, float(edges[i]), float(edges[i + 1]), unit, float(np.sqrt(power[i])) / noise, channel) for i in range(_BINS)]
+    return [
+        Misfit(what, float(edges[i]), float(edges[i + 1]), unit, float(np.sqrt(power[i])) / noise, channel)
+        for i in range(_BINS)
+    ]
 
 
 def _worst(items: list[Misfit]) -> list[Misfit]:

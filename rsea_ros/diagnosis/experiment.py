@@ -54,7 +54,9 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     names = " and ".join(r.problem.rig.effects[-1].name for r in rivals)
     cause = accepted.problem.rig.effects[-1].name
     if not isinstance(case.drive, Drive):
-        return Experiment(f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {})
+        return Experiment(
+            f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {}
+        )
     present = float(np.max(np.abs(case.drive.command)))
     tried = []
     for candidate in sorted(CANDIDATES, key=lambda c: c.cost):
@@ -70,7 +72,10 @@ def _worded(cause: str, names: str, told: float, best: Candidate, present: float
     run: dict[str, float | str] = {"kind": best.kind, "amplitude": round(best.relative * present, 3), "unit": "N m",
                                    "low": best.low, "high": best.high, "duration": _DURATION, "separation_times_noise": round(told, 3)}  # fmt: skip
     if told > _ENOUGH:
-        return Experiment(f"{cause} and {names} do as well on these data; this run makes them differ by {told:.1f} times the noise", run)
+        return Experiment(
+            f"{cause} and {names} do as well on these data; this run makes them differ by {told:.1f} times the noise",
+            run,
+        )
     return Experiment(
         f"{cause} and {names} make the same motion under every excitation tried (at most {told:.2f} times the noise apart): "
         "only a value measured apart tells them, such as the spring stiffness by a known weight",
@@ -78,7 +83,9 @@ def _worded(cause: str, names: str, told: float, best: Candidate, present: float
     )
 
 
-def _separation(accepted: Solution, rival: Solution, candidate: Candidate, present: float, rate: float) -> float:
+def _separation(
+    accepted: Solution, rival: Solution, candidate: Candidate, present: float, rate: float
+) -> float:
     """Return what a rival cannot follow of the accepted model under an excitation, over the noise."""
     try:
         case = _played(accepted, candidate, candidate.relative * present, rate)
@@ -100,7 +107,13 @@ def _played(accepted: Solution, candidate: Candidate, amplitude: float, rate: fl
     drive = drive_from(Record({"command": Channel(t, values), **blank}))
     rig, _ = apply(accepted.problem.rig, accepted.problem.unknowns, accepted.theta)
     outputs = simulate_drive(rig, drive)
-    return Case(drive, {n: c.t for n, c in blank.items()}, outputs, old.noise, {n: np.ones(len(t), bool) for n in outputs})
+    return Case(
+        drive,
+        {n: c.t for n, c in blank.items()},
+        outputs,
+        old.noise,
+        {n: np.ones(len(t), bool) for n in outputs},
+    )
 
 
 def _left_over(problem: Problem, theta: FloatArray) -> float:
@@ -113,7 +126,10 @@ def _left_over(problem: Problem, theta: FloatArray) -> float:
     slope = matrix.T @ residual + prior**2 * (theta - start_vector(problem.unknowns))
     moved = problem.outputs(bounded_step(problem, theta, normal, slope))
     case = problem.cases[0]
-    rms = [np.sqrt(np.mean(((moved[0][n] - case.measured[n]) / case.noise[n]) ** 2)) for n in problem.present(case)]
+    rms = [
+        np.sqrt(np.mean(((moved[0][n] - case.measured[n]) / case.noise[n]) ** 2))
+        for n in problem.present(case)
+    ]
     return float(min(max(rms), np.sqrt(np.mean(residual**2)) * len(rms)))
 
 
@@ -123,4 +139,14 @@ def amplitude_series(amplitude: float) -> Experiment:
         "nothing in the catalogue explains the residual: repeat at half the amplitude with an odd multisine, "
         "whose empty lines show distortion apart from noise; what scales with the command is linear, what does not is friction-like"
     )
-    return Experiment(why, {"kind": "multisine", "amplitude": round(0.5 * amplitude, 3), "unit": "N m", "low": 0.1, "high": 120.0, "duration": 60.0})
+    return Experiment(
+        why,
+        {
+            "kind": "multisine",
+            "amplitude": round(0.5 * amplitude, 3),
+            "unit": "N m",
+            "low": 0.1,
+            "high": 120.0,
+            "duration": 60.0,
+        },
+    )

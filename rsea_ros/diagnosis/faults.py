@@ -69,7 +69,9 @@ def outliers(channel: Channel, name: str) -> BoolArray:
     """
     if name == "command" or len(channel) < 2 * _AROUND:
         return np.zeros(len(channel), bool)
-    padded = np.pad(np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect")
+    padded = np.pad(
+        np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect"
+    )
     around = np.delete(np.lib.stride_tricks.sliding_window_view(padded, _AROUND + 1), _AROUND // 2, axis=1)
     middle = np.median(around, axis=1)
     spread = np.partition(np.abs(around - middle[:, None]), _AROUND - 3, axis=1)[:, _AROUND - 3]
@@ -87,7 +89,11 @@ def clipping(channel: Channel, name: str) -> BoolArray:
     for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):
         at = channel.y == extreme
         in_a_row = at[1:] & at[:-1]
-        if at.sum() >= _CLIPPED and in_a_row.sum() >= _CLIPPED // 2 and not _common(channel.y, float(extreme)):
+        if (
+            at.sum() >= _CLIPPED
+            and in_a_row.sum() >= _CLIPPED // 2
+            and not _common(channel.y, float(extreme))
+        ):
             bad |= at
     return bad
 
@@ -96,7 +102,11 @@ def _common(y: FloatArray, extreme: float) -> bool:
     """Tell whether values just inside the extreme are as common as the extreme itself (a coarse quantum)."""
     values, counts = np.unique(y[np.isfinite(y)], return_counts=True)
     k = int(np.argmin(np.abs(values - extreme)))
-    inside = counts[max(k - 3, 0) : k].max(initial=0) if k > len(values) // 2 else counts[k + 1 : k + 4].max(initial=0)
+    inside = (
+        counts[max(k - 3, 0) : k].max(initial=0)
+        if k > len(values) // 2
+        else counts[k + 1 : k + 4].max(initial=0)
+    )
     return bool(counts[k] < 4 * max(int(inside), 1))
 
 
@@ -148,6 +158,8 @@ def _filled(record: Record, masked: Mapping[str, BoolArray]) -> Record:
     channels = {}
     for name, channel in record.channels.items():
         good = ~masked[name] & np.isfinite(channel.y)
-        bridged = np.interp(channel.t, channel.t[good], channel.y[good]) if good.any() else np.zeros(len(channel))
+        bridged = (
+            np.interp(channel.t, channel.t[good], channel.y[good]) if good.any() else np.zeros(len(channel))
+        )
         channels[name] = Channel(channel.t, np.where(good, channel.y, bridged))
     return record.with_channels(**channels)

@@ -25,11 +25,15 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
     """Return the parameters from which fits of an effect begin."""
     starts = [dict(effect.typical)]
     for p in effect.parameters:
-        alternatives = list(p.starts) + ([-p.typical] if p.low < 0.0 and not p.logarithmic and p.unit != "rad" else [])
+        alternatives = list(p.starts) + (
+            [-p.typical] if p.low < 0.0 and not p.logarithmic and p.unit != "rad" else []
+        )
         starts += [{**effect.typical, p.name: value} for value in alternatives]
     names = {p.name: p.unit for p in effect.parameters}
     if "cycles_per_revolution" in names:
         return [{**effect.typical, **hint} for hint in _cycle_hints(case, rig)] or starts
+    if {"stiffness", "inertia"} <= set(names):
+        return starts + _mode_hints(effect, case, rig, outputs)
     if "Hz" in names.values():
         frequency = next(n for n, unit in names.items() if unit == "Hz")
         channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
@@ -38,11 +42,37 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
     return starts
 
 
-def _line_hints(case: Case, channel: str, simulated: FloatArray, names: dict[str, str], frequency: str, effect: Effect) -> list[dict[str, float]]:
+def _mode_hints(
+    effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]
+) -> list[dict[str, float]]:
+    """Return starts of a part on a spring of its own whose mode, with the actuator's spring, is at a peak of the residual."""
+    if rig.rigid_spring:
+        return []
+    channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
+    stiffness = next(p for p in effect.parameters if p.name == "stiffness")
+    peaks = _line_hints(case, channel, outputs[channel], {}, "frequency", effect)
+    return [
+        {
+            **effect.typical,
+            "stiffness": k,
+            "inertia": (k + rig["spring.stiffness"]) / (2.0 * math.pi * peak["frequency"]) ** 2,
+        }
+        for k in (*stiffness.starts[:1], stiffness.typical)
+        for peak in peaks
+    ]
+
+
+def _line_hints(
+    case: Case, channel: str, simulated: FloatArray, names: dict[str, str], frequency: str, effect: Effect
+) -> list[dict[str, float]]:
     t, residual = case.t[channel], np.where(case.mask[channel], case.measured[channel] - simulated, 0.0)
     rate = 1.0 / float(np.median(np.diff(t)))
     sine = "amplitude" in names
-    bins, level = signal.periodogram(residual, rate, window="hann") if sine else signal.welch(residual, rate, nperseg=min(1024, len(residual)))
+    bins, level = (
+        signal.periodogram(residual, rate, window="hann")
+        if sine
+        else signal.welch(residual, rate, nperseg=min(1024, len(residual)))
+    )
     level = np.where((bins > 1.0) & (bins < 0.49 * rate), level, 0.0)
     hints = []
     for peak in _peaks(level, width=max(3, int(0.5 / (bins[1] - bins[0]))) if sine else 12):
@@ -105,11 +135,23 @@ def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None
 
     J_m a + b_m v + T - T_m with all but the command measured; None without a position, or for a free housing.
     """
-    if not isinstance(case.drive, Drive) or "position" not in case.measured or "housing_end" not in rig.clamped:
+    if (
+        not isinstance(case.drive, Drive)
+        or "position" not in case.measured
+        or "housing_end" not in rig.clamped
+    ):
         return None
     t, q = case.t["position"], case.measured["position"]
-    v = np.interp(t, case.t["velocity"], case.measured["velocity"]) if "velocity" in case.measured else np.gradient(q, t)
-    load = np.interp(t, case.t["ft"], case.measured["ft"]) if "ft" in case.measured else rig["spring.stiffness"] * q
+    v = (
+        np.interp(t, case.t["velocity"], case.measured["velocity"])
+        if "velocity" in case.measured
+        else np.gradient(q, t)
+    )
+    load = (
+        np.interp(t, case.t["ft"], case.measured["ft"])
+        if "ft" in case.measured
+        else rig["spring.stiffness"] * q
+    )
     acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
     steps = np.clip(((t[1:-1] - case.start) / case.drive.step).astype(int), 0, len(case.drive.command) - 1)
     width = max(1, int(round(float(np.median(np.diff(t))) / case.drive.step)))

@@ -12,15 +12,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rsea_ros.diagnosis.hints import starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
 from rsea_ros.diagnosis.windows import windows_of
-from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, linearised, solve
-from rsea_ros.identification.unknowns import CLOCK, Unknown
+from rsea_ros.identification.unknowns import CLOCK, Unknown, start_vector
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
@@ -31,6 +31,8 @@ _CLOSE = 1.1
 _FIT_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 MOST_CAUSES = 4
+ENOUGH = 0.1
+"""Relative fall of a channel's residual that makes an effect a cause where the floor is not reached."""
 DELAY = "command_delay.delay"
 
 Tell = Callable[[str, float], None]
@@ -134,7 +136,8 @@ def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell
         accepted = fitted(quieter, accepted.solution.problem, accepted.solution.theta)
         models = [*(rescored(quieter, m) for m in models), accepted]
         cases = quieter
-    return without_needless(Search(cases, tuple(models), tuple(trials), equals))
+    tell("looking for a simpler model", 0.9)
+    return sequenced(with_simpler(without_needless(Search(cases, tuple(models), tuple(trials), equals))))
 
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
@@ -151,7 +154,9 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
     effects = [e for n, e in catalogue().items() if n not in present.causes]
     rig, outputs = present.solution.problem.rig, present.outputs[0]
     pieces = tuple(w for c in cases for w in windows_of(c))
-    there = linearised(replace(present.solution.problem, cases=pieces), present.solution.theta)
+    there = linearised(
+        *without_clocks(replace(present.solution.problem, cases=pieces), present.solution.theta)
+    )
 
     def try_one(i: int) -> Hypothesis | None:
         tell(f"round {number + 1}: {effects[i].name}", _share(number, 0.4 * i / len(effects)))
@@ -164,24 +169,61 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
 
     def fit_all(h: Hypothesis) -> Model:
         tell(f"round {number + 1}: fitting {h.name} on everything", _share(number, 0.8))
-        return fitted(cases, replace(h.problem, cases=cases), h.theta, iterations=_FULL_ITERATIONS)
+        return fitted(
+            cases,
+            *with_clocks(replace(h.problem, cases=cases), h.theta, present.solution.problem),
+            iterations=_FULL_ITERATIONS,
+        )
 
-    screened = sorted((h for h in pool.map(try_one, range(len(effects))) if h is not None), key=lambda h: h.cost)
+    screened = sorted(
+        (h for h in pool.map(try_one, range(len(effects))) if h is not None), key=lambda h: h.cost
+    )
     worth = [h for h in screened if h.cost < there.cost][:_FITS_ON_PIECES]
     close = sorted(pool.map(fit_pieces, worth), key=lambda h: h.cost)
-    finalists = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost][: 2 * _FULL_FITS]
+    finalists = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost][
+        : 2 * _FULL_FITS
+    ]
     models = list(pool.map(fit_all, finalists))
-    better = [m for m in models if compare(m.choose, present.choose, m.parameters - present.parameters).better]
+    better = [m for m in models if is_progress(m, present)]
     chosen, rivals = choose(better)
     accepted, final = {id(m) for m in better}, {h.name for h in finalists}
-    trials = [Trial(h.name, number, None, "far behind the best on the data that it was fitted to") for h in screened if h.name not in final]
+    trials = [
+        Trial(h.name, number, None, "far behind the best on the data that it was fitted to")
+        for h in screened
+        if h.name not in final
+    ]
     trials += [_trial(m, number, id(m) in accepted, chosen) for m in models if m is not chosen]
     return chosen, trials, rivals
+
+
+def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with all clocks taken as right.
+
+    Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
+    """
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(CLOCK + ".")]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
+def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with the clocks of another problem free again, at zero."""
+    clocks = tuple(u for u in model.unknowns if u.name.startswith(CLOCK + "."))
+    return replace(problem, unknowns=(*problem.unknowns, *clocks)), np.concatenate(
+        [theta, np.zeros(len(clocks))]
+    )
 
 
 def _share(number: int, within: float) -> float:
     """Return the share done for the progress bar: rounds are taken to halve what is left."""
     return 1.0 - 0.5**number * (1.0 - 0.5 * within)
+
+
+def is_progress(model: Model, present: Model) -> bool:
+    """Tell whether a model is surely better, and by enough: a tenth of some channel's residual, or all that is left."""
+    if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
+        return False
+    fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
+    return fall > ENOUGH or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
 
 
 def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[Model, ...]]:
@@ -202,17 +244,27 @@ def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[Model, ...]]:
 def prior_cost(solution: Solution) -> float:
     """Return what the fit paid for leaving the values that were known beforehand."""
     unknowns: Sequence[Unknown] = solution.problem.unknowns
-    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(solution.theta, unknowns, strict=True) if np.isfinite(u.doubt)))
+    return float(
+        sum(
+            ((t - u.inner(u.start)) / u.doubt) ** 2
+            for t, u in zip(solution.theta, unknowns, strict=True)
+            if np.isfinite(u.doubt)
+        )
+    )
 
 
 def loss_excess(model: Model, best: Model) -> float:
     """Return how much more a model loses than the best on the blocks that choose, in units of its scale."""
-    return float(model.choose.loss.sum() - best.choose.loss.sum()) / max(1.0, max(best.choose.ratio(n) for n in best.choose.sums) ** 2)
+    return float(model.choose.loss.sum() - best.choose.loss.sum()) / max(
+        1.0, max(best.choose.ratio(n) for n in best.choose.sums) ** 2
+    )
 
 
 def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
     """Return the cases with the noise lowered where a model's residual shows that it is less than thought."""
-    return tuple(_requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True))
+    return tuple(
+        _requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True)
+    )
 
 
 def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> Case:
@@ -229,33 +281,78 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
 def rescored(cases: Sequence[Case], model: Model) -> Model:
     """Return the model with its score against the cases' present noise."""
     problem = replace(model.solution.problem, cases=tuple(part(c, FIT) for c in cases))
-    return Model(replace(model.solution, problem=problem), model.outputs, score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs))
+    return Model(
+        replace(model.solution, problem=problem),
+        model.outputs,
+        score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs),
+    )
 
 
 def without_needless(found: Search) -> Search:
-    """Take out every accepted cause without which the later ones do as well."""
+    """Take out every accepted cause without which the others do as well."""
     last = found.last
     for name in last.causes[:-1]:
-        smaller = _without(found.cases, last, name)
+        smaller = _changed(found.cases, last, name)
         if not compare(last.choose, smaller.choose, last.parameters - smaller.parameters).better:
-            kept = [m for m in found.models if name not in m.causes] + [smaller]
-            trials = (*found.trials, Trial(name, 99, None, "no longer needed once the other causes are in"))
-            return without_needless(replace(found, models=tuple(kept), trials=trials))
+            why = "no longer needed once the other causes are in"
+            return without_needless(_replaced(found, smaller, Trial(name, MOST_CAUSES, None, why)))
     return found
 
 
-def _without(cases: Sequence[Case], model: Model, name: str) -> Model:
+def with_simpler(found: Search) -> Search:
+    """Put in a cause's place the simpler ones that it is said to be confused with, where they do as well."""
+    last = found.last
+    for name in last.causes:
+        size = len(effect_named(name).parameters)
+        for rival in effect_named(name).claims.confusable_with:
+            if rival in last.causes or len(effect_named(rival).parameters) >= size:
+                continue
+            simpler = _changed(found.cases, last, name, rival)
+            if not compare(last.choose, simpler.choose, last.parameters - simpler.parameters).better:
+                why = f"no better than {rival}, which is simpler"
+                return with_simpler(_replaced(found, simpler, Trial(name, MOST_CAUSES, last, why)))
+    return found
+
+
+def sequenced(found: Search) -> Search:
+    """Return the search with its models as they nest: the nominal one, then one cause more each time."""
+    model, models = found.last, [found.last]
+    for name in reversed(found.last.causes[1:]):
+        model = _changed(found.cases, model, name)
+        models.append(model)
+    nominal = [found.models[0]] if found.last.causes else []
+    return replace(found, models=(*nominal, *reversed(models)))
+
+
+def _replaced(found: Search, last: Model, trial: Trial) -> Search:
+    return replace(found, models=(found.models[0], last), trials=(*found.trials, trial))
+
+
+def _changed(cases: Sequence[Case], model: Model, name: str, rival: str | None = None) -> Model:
+    """Fit a model again without one of its causes, or with a rival of the same size in its place."""
     problem = model.solution.problem
     keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-    smaller = replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep))
-    return fitted(cases, smaller, model.solution.theta[keep])
+    smaller, theta = (
+        replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)),
+        model.solution.theta[keep],
+    )
+    if rival is None:
+        return fitted(cases, smaller, theta)
+    old, new = effect_named(name).main, effect_named(rival)
+    start = new.typical | (
+        {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
+    )
+    larger = extended_problem(smaller, new, start)
+    return fitted(cases, larger, np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]]))
 
 
 def _trial(model: Model, number: int, was_better: bool, chosen: Model | None) -> Trial:
     name = model.causes[-1]
     if chosen is None or not was_better:
         return Trial(name, number, model, "does not lower the residual of data that it was not fitted to")
-    if model.parameters > chosen.parameters and float(model.choose.loss.sum()) < 1.02 * float(chosen.choose.loss.sum()):
+    if model.parameters > chosen.parameters and float(model.choose.loss.sum()) < 1.02 * float(
+        chosen.choose.loss.sum()
+    ):
         return Trial(name, number, model, f"no better than {chosen.causes[-1]}, which is simpler")
     return Trial(name, number, model, f"{chosen.causes[-1]} explains more")

@@ -7,7 +7,12 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.result import Cause, Fault, Verdict
 from rsea_ros.effects.effect import Effect
 
-_CHANNELS = {"ft": "F/T torque", "position": "position", "velocity": "velocity", "motor_torque": "motor torque"}
+_CHANNELS = {
+    "ft": "F/T torque",
+    "position": "position",
+    "velocity": "velocity",
+    "motor_torque": "motor torque",
+}
 
 
 def verdict_sentence(verdict: Verdict, causes: Sequence[Cause], channel: str, before: float, after: float, faults: Sequence[Fault]) -> str:  # fmt: skip
@@ -34,4 +39,8 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
 def _data(faults: Sequence[Fault]) -> str:
     if not faults:
         return ""
-    return " The data have faults, which were masked: " + ", ".join(f"{f.kind.replace('_', ' ')} in {f.channel}" for f in faults) + "."
+    return (
+        " The data have faults, which were masked: "
+        + ", ".join(f"{f.kind.replace('_', ' ')} in {f.channel}" for f in faults)
+        + "."
+    )

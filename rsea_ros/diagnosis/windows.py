@@ -27,7 +27,9 @@ def windows_of(case: Case) -> tuple[Case, ...]:
         return (fit,)
     starts = np.arange(4.0 * BLOCK, drive.duration - 2.0 * BLOCK, 4.0 * BLOCK)
     every = max(1, round(len(starts) * 2.0 * BLOCK / _ENOUGH))
-    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + 2.0 * BLOCK) for t in starts[every // 2 :: every])
+    return tuple(
+        _piece(fit, drive, float(t) - _RUN_UP, float(t) + 2.0 * BLOCK) for t in starts[every // 2 :: every]
+    )
 
 
 def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
@@ -59,6 +61,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
 def _state_at(case: Case, t: float) -> tuple[float, float]:
     """Return measured position (rad) and velocity (rad/s) at a time."""
     position, velocity = (
-        float(np.interp(t, case.t[n], case.measured[n])) if n in case.measured else 0.0 for n in ("position", "velocity")
+        float(np.interp(t, case.t[n], case.measured[n])) if n in case.measured else 0.0
+        for n in ("position", "velocity")
     )
     return position, velocity
