@@ -69,7 +69,7 @@ def test_a_number_without_unit_is_named(diagnosed):
 
 
 def laid_out(diagnosed, residual):
-    """Return the profiles where the residual before is a function of speed and time, and after there is none."""
+    """Return profiles of a residual that is a function of speed and time before, and zero after."""
     d, channels = diagnosed.diagnosis, diagnosed.record.channels
     t, speed = channels["ft"].t, channels["velocity"].y
     before = [Overlay(n, c.t, c.y, c.y) for n, c in channels.items() if n != "command"]
