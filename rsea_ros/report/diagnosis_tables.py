@@ -1,4 +1,4 @@
-"""Tables of a diagnosis as HTML: every channel before and after, and the settings of the next run."""
+"""Parts of a diagnosis as HTML: tables, every channel before and after, and the next run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rsea_ros.report import words
 from rsea_ros.report.page import code, paragraph, section
 from rsea_ros.signals import UNITS
 
-_EXCITE = ("kind", "amplitude", "low", "high", "duration")
+_EXCITE = ("kind", "amplitude", "noise", "low", "high", "duration")
 """Settings that are parameters of the node excite."""
 
 
@@ -20,8 +20,10 @@ def table(head: Sequence[str], rows: Sequence[str]) -> str:
     cells = "".join(
         f"<th class='number'>{h[1:]}</th>" if h.startswith("#") else f"<th>{h}</th>" for h in head
     )
-    top = f"<thead><tr>{cells}</tr></thead>" if head else ""
-    return f"<div class='scroll'><table>{top}<tbody>{''.join(rows)}</tbody></table></div>"
+    return (
+        f"<div class='scroll'><table><thead><tr>{cells}</tr></thead>"
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
+    )
 
 
 def channel_section(diagnosis: Diagnosis) -> str:
@@ -49,10 +51,9 @@ def _channel(d: Diagnosis, name: str) -> str:
 
 def experiment_section(experiment: Experiment) -> str:
     """Return what the next run would tell, its settings, and the command that plays it."""
-    shown = {k: v if isinstance(v, str) else words.number(v) for k, v in experiment.excitation.items()}
-    rows = [f"<tr><td>{escape(k.replace('_', ' '))}</td><td>{escape(v)}</td></tr>" for k, v in shown.items()]
-    why = paragraph(say.prose(experiment.why))
-    return section("The run that would tell", why, table((), rows) if rows else "", _command(experiment))
+    settings = words.sentence(say.excitation(experiment.excitation))
+    run = paragraph(f"{settings}.") if settings else ""
+    return section("The run that would tell", paragraph(say.prose(experiment.why)), run, _command(experiment))
 
 
 def _command(experiment: Experiment) -> str:

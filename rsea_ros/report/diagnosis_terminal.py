@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.text import Text
 
-from rsea_ros.diagnosis.result import Diagnosis, Estimate, Misfit
+from rsea_ros.diagnosis.result import Diagnosis, Estimate, Experiment, Misfit
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import was_fitted
@@ -40,9 +40,14 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
     for sentence in (*say.confusions(d), *d.statements):
         yield "not told", sentence
     if d.next_experiment is not None:
-        yield "next run", f"{d.next_experiment.why} ({say.excitation(dict(d.next_experiment.excitation))})"
+        yield "next run", _next(d.next_experiment)
     for fault in d.faults:
         yield "data", say.fault(fault)
+
+
+def _next(experiment: Experiment) -> str:
+    settings = say.excitation(experiment.excitation)
+    return f"{say.prose(experiment.why)}{f': {settings}' if settings else ''}"
 
 
 def _size(name: str, parameter: Estimate) -> str:

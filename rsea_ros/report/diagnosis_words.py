@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -162,10 +162,16 @@ def confusions(diagnosis: Diagnosis) -> list[str]:
     ]
 
 
-def excitation(settings: dict[str, float | str]) -> str:
-    """Return `kind multisine, amplitude 20, …` of an experiment."""
-    shown = {k: v if isinstance(v, str) else words.number(v) for k, v in settings.items()}
-    return ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in shown.items())
+def excitation(settings: Mapping[str, float | str]) -> str:
+    """Return `chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s` of an experiment; what has no unit as it stands."""
+    known = {k: v if isinstance(v, str) else f"{v:.3g}" for k, v in settings.items()}
+    parts = [known.pop("kind", "")]
+    torque = words.unit(known.pop("unit", "N m"))
+    parts += [f"{k} {known.pop(k)} {torque}" for k in ("amplitude", "noise") if k in known]
+    if {"low", "high"} <= set(known):
+        parts.append(f"{known.pop('low')} to {known.pop('high')} Hz")
+    parts += [f"{known.pop('duration')} s"] if "duration" in known else []
+    return ", ".join(filter(None, [*parts, *(f"{k.replace('_', ' ')} {v}" for k, v in known.items())]))
 
 
 def _either(names: Sequence[str]) -> str:

@@ -62,6 +62,13 @@ def test_small_angles_and_times_have_a_prefix(estimate, text):
     assert say.estimate(estimate) == text
 
 
+def test_an_experiment_is_said_with_its_units():
+    run = {"kind": "chirp", "amplitude": 64.311, "unit": "N m", "low": 0.05, "high": 120.0, "duration": 12.0}
+    assert say.excitation(run) == "chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s"
+    assert say.excitation({"kind": "steps", "periods": 3.0}) == "steps, periods 3"
+    assert say.excitation({}) == ""
+
+
 def test_a_number_without_unit_is_named(diagnosed):
     cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
                     parameters={"gain": Estimate(1.05, "1", (1.04, 1.06))})  # fmt: skip
