@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Rejected
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_tables import table
@@ -19,22 +20,22 @@ _GAIN = "Gain: share of the residual that is gone, on data that took no part in 
 
 def cause_section(cause: Cause) -> str:
     """Return what a cause is, how large, and why it was accepted."""
-    share = f"{say.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
+    share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
     body = [_sizes(cause), equation(cause.equation) if cause.equation else "", paragraph(cause.evidence)]
     body += [paragraph(_gain(cause)), _rivals(cause)]
     return section(words.sentence(f"{say.effect(cause.name)}: {share}"), *body)
 
 
 def _gain(cause: Cause) -> str:
-    interval = say.percent_range(cause.gain_holdout_ci95)
-    train = say.percent(cause.gain_train)
+    interval = num.percent_range(cause.gain_holdout_ci95)
+    train = num.percent(cause.gain_train)
     return f"95 % interval of that gain: {interval}; on the data of the fit it is {train}."
 
 
 def _sizes(cause: Cause) -> str:
     cells = []
     for name, p in cause.parameters.items():
-        value, half, unit = say.estimate(p)
+        value, half, unit = num.estimate(p)
         doubt = f" <small>± {half}</small>" if half else ""
         what = f"{escape(name.replace('_', ' '))}, 95 % interval"
         cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
@@ -82,7 +83,7 @@ def _row(name: str, gain: float, outcome: str, strong: bool = False) -> str:
     shown = f"<b>{plain}</b>" if strong else plain
     bar = _bar(gain, AFTER if strong else faint(MEASURED, 0.6))
     return (
-        f"<tr><td>{shown}<small>{escape(name)}</small></td><td class='number'>{say.percent(gain)}</td>"
+        f"<tr><td>{shown}<small>{escape(name)}</small></td><td class='number'>{num.percent(gain)}</td>"
         f"<td>{bar}</td><td>{escape(say.prose(outcome))}</td></tr>"
     )
 

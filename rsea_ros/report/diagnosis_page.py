@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import cause_section, tried_section
@@ -51,9 +52,9 @@ def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
     """Return the numbers of the first screen."""
     channel = words.channel(main)
     if d.causes:
-        gone = (say.percent(say.gain(d, main)), f"of the {channel} residual gone, on data that took no part")
-        return [gone, (say.residual_change(d, main), "times the noise, before and after")]
-    keys = [(say.residual_change(d, main), f"times the noise is the {channel} residual")]
+        gone = (num.percent(num.gain(d, main)), f"of the {channel} residual gone, on data that took no part")
+        return [gone, (num.residual_change(d, main), "times the noise, before and after")]
+    keys = [(num.residual_change(d, main), f"times the noise is the {channel} residual")]
     if d.rejected:
         keys.append((str(len(d.rejected)), "causes tried, none accepted"))
     return [*keys, (f"{d.extended_fit_percent[main]:.2f} %", f"of the {channel} explained")]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis, Experiment
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.page import code, paragraph, section
@@ -43,7 +44,7 @@ def channel_section(diagnosis: Diagnosis) -> str:
 def _channel(d: Diagnosis, name: str) -> str:
     unit, stages = UNITS[name], 2 if d.causes else 1
     rms = [words.quantity(v[name], unit) for v in (d.residual_rms, d.extended_residual_rms)]
-    ratios = [words.number(v, 3) for v in say.times_noise(d, name)]
+    ratios = [words.number(v, 3) for v in num.times_noise(d, name)]
     values = [words.quantity(d.noise_rms[name], unit), *rms[:stages], *ratios[:stages]]
     cells = "".join(f"<td class='number'>{escape(v)}</td>" for v in values)
     return f"<tr><td>{escape(words.sentence(words.channel(name)))}</td>{cells}</tr>"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from rich.text import Text
 
 from rsea_ros.diagnosis.result import Diagnosis, Estimate, Experiment, Misfit
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import was_fitted
@@ -24,11 +25,11 @@ def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
 
 def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
     main = say.main_channel(d)
-    ratios, rms = say.residual_change(d, main), say.rms_change(d, main)
+    ratios, rms = num.residual_change(d, main), num.rms_change(d, main)
     yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
     for cause in d.causes:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
-        gain, interval = say.percent(cause.gain_holdout), say.percent_range(cause.gain_holdout_ci95)
+        gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
     if d.misfit:
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
@@ -51,7 +52,7 @@ def _next(experiment: Experiment) -> str:
 
 
 def _size(name: str, parameter: Estimate) -> str:
-    value, half, unit = say.estimate(parameter)
+    value, half, unit = num.estimate(parameter)
     return f"{name.replace('_', ' ')} {value}{f' ± {half}' if half else ''} {unit}".rstrip()
 
 

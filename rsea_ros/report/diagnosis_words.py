@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Fault, Misfit
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Fault, Misfit
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
-from rsea_ros.signals import UNITS
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
 _ORDER = ("ft", "position", "velocity", "motor_torque")
@@ -59,7 +57,7 @@ def named(causes: Sequence[Cause]) -> str:
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as one short sentence."""
     d, n = diagnosis, main_channel(diagnosis)
-    channel, (before, _) = words.channel(n), times_noise(d, n)
+    channel, (before, _) = words.channel(n), num.times_noise(d, n)
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
     if d.verdict == "unexplained":
@@ -70,59 +68,6 @@ def headline(diagnosis: Diagnosis) -> str:
     if d.verdict == "explained":
         rest = f"{is_} what the simulation lacks; with {it}, only noise is left"
     return words.sentence(f"{named(d.causes)} {rest}")
-
-
-def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
-    """Return the held-out residual of a channel over its noise, before and after."""
-    noise = diagnosis.noise_rms.get(channel, np.nan) or np.nan
-    return diagnosis.residual_rms[channel] / noise, diagnosis.extended_residual_rms[channel] / noise
-
-
-def gain(diagnosis: Diagnosis, channel: str) -> float:
-    """Return the gain of all causes together: 1 - RMS(residual after) / RMS(residual before), held out."""
-    before = diagnosis.residual_rms[channel]
-    return 1.0 - diagnosis.extended_residual_rms[channel] / before if before > 0.0 else 0.0
-
-
-def percent(share: float, digits: int = 1) -> str:
-    """Return a share as `97.3 %`, with a minus sign that is one."""
-    return f"{100.0 * share:.{digits}f} %".replace("-", "−") if np.isfinite(share) else "–"
-
-
-def percent_range(interval: tuple[float, float]) -> str:
-    """Return an interval of shares as `97.1 to 97.5 %`."""
-    low, high = (f"{100.0 * side:.1f}".replace("-", "−") for side in interval)
-    return f"{low} to {high} %"
-
-
-def residual_change(diagnosis: Diagnosis, channel: str) -> str:
-    """Return `36.8 → 0.99`: the residual over the noise, before and after; once where nothing has changed."""
-    before, after = (words.number(v, 3 if v >= 1.0 else 2) for v in times_noise(diagnosis, channel))
-    return f"{before} → {after}" if diagnosis.causes else before
-
-
-def rms_change(diagnosis: Diagnosis, channel: str) -> str:
-    """Return the same as RMS in the channel's unit beside the noise."""
-    before, after, noise = (
-        words.quantity(v[channel], UNITS[channel])
-        for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
-    )
-    return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
-
-
-def estimate(estimate: Estimate) -> tuple[str, str, str]:
-    """Return value, half-width of the 95 % interval and unit: ("4.0045", "0.0029", "mrad")."""
-    factor, prefix = _prefix(estimate)
-    low, high = estimate.ci95
-    value, half = words.with_interval(estimate.value * factor, low * factor, high * factor)
-    return value, half, prefix + words.unit(estimate.unit)
-
-
-def _prefix(estimate: Estimate) -> tuple[float, str]:
-    """Return the factor and prefix that make a small angle or time readable."""
-    if estimate.unit not in ("rad", "s") or not 0.0 < abs(estimate.value) < 0.1:
-        return 1.0, ""
-    return (1e3, "m") if abs(estimate.value) >= 1e-3 else (1e6, "µ")
 
 
 def misfit(m: Misfit) -> str:
@@ -163,7 +108,7 @@ def confusions(diagnosis: Diagnosis) -> list[str]:
 
 
 def excitation(settings: Mapping[str, float | str]) -> str:
-    """Return `chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s` of an experiment; what has no unit as it stands."""
+    """Return `chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s` of an experiment."""
     known = {k: v if isinstance(v, str) else f"{v:.3g}" for k, v in settings.items()}
     parts = [known.pop("kind", "")]
     torque = words.unit(known.pop("unit", "N m"))

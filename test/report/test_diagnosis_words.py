@@ -11,6 +11,7 @@ from rich.console import Console
 
 from rsea_ros.diagnosis.result import Estimate, Fault, Misfit, Rejected
 from rsea_ros.identification.result import Overlay
+from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.diagnosis_profile import BINS, profiles
 from rsea_ros.report.diagnosis_terminal import terminal_lines
@@ -59,7 +60,7 @@ def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
-    assert say.estimate(estimate) == text
+    assert num.estimate(estimate) == text
 
 
 def test_an_experiment_is_said_with_its_units():

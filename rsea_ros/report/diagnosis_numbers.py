@@ -1,0 +1,62 @@
+"""Numbers of a diagnosis as people read them: residuals over the noise, gains, sizes with their doubt."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.diagnosis.result import Diagnosis, Estimate
+from rsea_ros.report import words
+from rsea_ros.signals import UNITS
+
+
+def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
+    """Return the held-out residual of a channel over its noise, before and after."""
+    noise = diagnosis.noise_rms.get(channel, np.nan) or np.nan
+    return diagnosis.residual_rms[channel] / noise, diagnosis.extended_residual_rms[channel] / noise
+
+
+def gain(diagnosis: Diagnosis, channel: str) -> float:
+    """Return the gain of all causes together: 1 - RMS(residual after) / RMS(residual before), held out."""
+    before = diagnosis.residual_rms[channel]
+    return 1.0 - diagnosis.extended_residual_rms[channel] / before if before > 0.0 else 0.0
+
+
+def percent(share: float, digits: int = 1) -> str:
+    """Return a share as `97.3 %`, with a minus sign that is one."""
+    return f"{100.0 * share:.{digits}f} %".replace("-", "−") if np.isfinite(share) else "–"
+
+
+def percent_range(interval: tuple[float, float]) -> str:
+    """Return an interval of shares as `97.1 to 97.5 %`."""
+    low, high = (f"{100.0 * side:.1f}".replace("-", "−") for side in interval)
+    return f"{low} to {high} %"
+
+
+def residual_change(diagnosis: Diagnosis, channel: str) -> str:
+    """Return `36.8 → 0.99`: the residual over the noise, before and after; once where nothing has changed."""
+    before, after = (words.number(v, 3 if v >= 1.0 else 2) for v in times_noise(diagnosis, channel))
+    return f"{before} → {after}" if diagnosis.causes else before
+
+
+def rms_change(diagnosis: Diagnosis, channel: str) -> str:
+    """Return the same as RMS in the channel's unit beside the noise."""
+    before, after, noise = (
+        words.quantity(v[channel], UNITS[channel])
+        for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
+    )
+    return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
+
+
+def estimate(estimate: Estimate) -> tuple[str, str, str]:
+    """Return value, half-width of the 95 % interval and unit: ("4.0045", "0.0029", "mrad")."""
+    factor, prefix = _prefix(estimate)
+    low, high = estimate.ci95
+    value, half = words.with_interval(estimate.value * factor, low * factor, high * factor)
+    return value, half, prefix + words.unit(estimate.unit)
+
+
+def _prefix(estimate: Estimate) -> tuple[float, str]:
+    """Return the factor and prefix that make a small angle or time readable."""
+    if estimate.unit not in ("rad", "s") or not 0.0 < abs(estimate.value) < 0.1:
+        return 1.0, ""
+    return (1e3, "m") if abs(estimate.value) >= 1e-3 else (1e6, "µ")
