@@ -36,7 +36,7 @@ Bag = Callable[[str, Record], Record]
 
 @dataclass(frozen=True)
 class MovingOutput:
-    """bench: the true rig. rivals: unlumped and lumped, fitted. response: measured F/T per command by sensor."""
+    """bench: the true rig. rivals: unlumped and lumped, fitted. responses: measured, F/T per command."""
 
     bench: Rig
     rivals: tuple[Rival, ...]

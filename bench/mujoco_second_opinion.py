@@ -1,0 +1,121 @@
+"""The same swept sine through MuJoCo and through our plant: the prototype in a knee, open loop.
+
+Needs MuJoCo beside the project's environment: .venv/bin/pip install -r requirements-mujoco.txt
+Run: .venv/bin/python bench/mujoco_second_opinion.py [RIG] [--seconds 20]
+Status 1 when they part by more than 2 % in gain or 3 degrees in phase up to 100 Hz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from rsea_ros.design.mjcf import STEP, mjcf
+from rsea_ros.model import outputs
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate
+from rsea_ros.signals import Channel, FloatArray, Record
+
+LOW, HIGH, TOP = 0.5, 130.0, 100.0
+"""Hz: of the sweep, and up to where the two must agree."""
+AMPLITUDE = 1.0
+GAIN, PHASE = 0.02, 3.0
+LINES = (1.0, 2.0, 5.0, 10.0, 15.4, 20.0, 28.5, 40.0, 60.0, 80.0, 100.0)
+
+
+def sweep(seconds: float) -> FloatArray:
+    """Return a logarithmic sweep of AMPLITUDE N m that fades in and out, and half as long of rest."""
+    t = STEP * np.arange(round(seconds / STEP))
+    rise = np.log(HIGH / LOW)
+    phase = 2.0 * np.pi * LOW * seconds / rise * np.expm1(t / seconds * rise)
+    window = np.clip(np.minimum(t / 0.5, (seconds - t) / 0.3), 0.0, 1.0)
+    return np.concatenate([AMPLITUDE * window * np.sin(phase), np.zeros(len(t) // 2)])
+
+
+def by_mujoco(rig: Rig, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return T_d (N m) and the velocity of the load on the housing's end (rad/s) at the end of every step."""
+    model = mujoco.MjModel.from_xml_string(mjcf(rig))
+    data = mujoco.MjData(model)
+    joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, i) for i in range(model.njnt)]
+    across = np.array([(name == "chassis") - (name == "distal") for name in joints], float)
+    loaded = "proximal" if "proximal" in joints else "housing"
+    load = np.array([name == loaded for name in joints], float)
+    k_s, b_s = rig["spring.stiffness"], rig["spring.damping"]
+    torque, velocity = np.empty(len(command)), np.empty(len(command))
+    for i, u in enumerate(command):
+        data.ctrl[0] = u
+        mujoco.mj_step(model, data)
+        torque[i] = across @ (k_s * data.qpos + b_s * data.qvel)
+        velocity[i] = load @ data.qvel
+    return torque, velocity
+
+
+def by_plant(rig: Rig, command: FloatArray) -> FloatArray:
+    """Return T_d of our compiled plant at the end of every step, N m."""
+    t = STEP * np.arange(len(command))
+    record = Record({"command": Channel(t, command), "ft": Channel(t + STEP, np.zeros(len(t)))})
+    return simulate(rig, record)["ft"]
+
+
+def agreement(theirs: FloatArray, ours: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return frequency (Hz), gain ratio - 1 and phase difference (degrees) from LOW to TOP."""
+    hz = np.fft.rfftfreq(len(ours), STEP)
+    band = (hz >= LOW) & (hz <= TOP)
+    ratio = np.fft.rfft(theirs)[band] / np.fft.rfft(ours)[band]
+    return hz[band], np.abs(ratio) - 1.0, np.degrees(np.angle(ratio))
+
+
+def end_to_end(rig: Rig, torque: FloatArray, velocity: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return |T_d / T_p| at LINES: MuJoCo's, with T_p from what moves the housing, and our model's."""
+    hz = np.fft.rfftfreq(len(torque), STEP)
+    lines = np.array([np.argmin(np.abs(hz - f)) for f in LINES])
+    s = 2j * np.pi * hz[lines]
+    load = rig["housing_end.inertia"] * s + rig["housing_end.damping"] + rig["housing_end.stiffness"] / s
+    theirs = np.abs(np.fft.rfft(torque)[lines] / (load * np.fft.rfft(velocity)[lines]))
+    ends = [
+        frequency_response(rig, outputs.end_torque(rig, e), hz[lines]) for e in ("spring_end", "housing_end")
+    ]
+    return theirs, np.abs(ends[0] / ends[1])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the agreement."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("rig", nargs="?", default="prototype_knee")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of the sweep (default %(default)s)")
+    args = parser.parse_args(arguments)
+    rig, command = load_rig(args.rig), sweep(args.seconds)
+    torque, velocity = by_mujoco(rig, command)
+    ours = by_plant(rig, command)
+    hz, gain, phase = agreement(torque, ours)
+    print(f"{rig.name}: T_d/T_m, MuJoCo {mujoco.__version__} beside our plant, sweep {LOW:g} to {HIGH:g} Hz")
+    print("      Hz     gain, dB   MuJoCo, %   phase, deg")
+    response = frequency_response(rig, outputs.end_torque(rig, "spring_end"), np.array(LINES))
+    for f, h in zip(LINES, response, strict=True):
+        i = int(np.argmin(np.abs(hz - f)))
+        print(f"{f:8.1f} {20 * np.log10(abs(h)):12.2f} {100 * gain[i]:+11.3f} {phase[i]:+12.3f}")
+    print(
+        f"largest to {TOP:g} Hz: {100 * np.abs(gain).max():.3f} % in gain, {np.abs(phase).max():.3f} deg "
+        "in phase"
+    )
+    if rig.end_is_free("housing_end"):
+        theirs, expected = end_to_end(rig, torque, velocity)
+        print(f"|T_d/T_p|, dB: MuJoCo {_row(theirs)}\n                 ours {_row(expected)}")
+    return int(np.abs(gain).max() > GAIN or np.abs(phase).max() > PHASE)
+
+
+def _row(gains: FloatArray) -> str:
+    return " ".join(f"{20 * np.log10(g):7.2f}" for g in gains)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

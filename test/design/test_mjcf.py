@@ -1,0 +1,98 @@
+"""MJCF export: the XML's bodies, tendons and equalities are the rig's equations of motion."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+
+from rsea_ros.cli.main import main
+from rsea_ros.design.mjcf import GRAVITY, mjcf
+from rsea_ros.errors import RigError
+from rsea_ros.model.equations import mechanics
+from rsea_ros.model.lumped import lumped
+from rsea_ros.model.rig_file import load_rig
+
+sys.path.append(str(Path(__file__).parents[1] / "model"))
+from random_rigs import rigs
+
+S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
+
+
+def floats(node, key, default="0"):
+    return np.array([float(v) for v in node.get(key, default).split()])
+
+
+def matrices(text):
+    """Return mass, damping and stiffness of the small motions, read from the XML alone, and the joints."""
+    root = ElementTree.fromstring(text)
+    joints = [j.get("name") for j in root.iter("joint") if j.get("name")]
+    mass, damping, stiffness = (np.zeros((len(joints), len(joints))) for _ in range(3))
+    for i, body in enumerate(root.iter("body")):
+        joint, inertial = body.find("joint"), body.find("inertial")
+        arm, weight = -floats(inertial, "pos")[1], floats(inertial, "mass")[0]
+        mass[i, i] = floats(inertial, "diaginertia")[2] + weight * arm**2
+        damping[i, i] = floats(joint, "damping")[0]
+        stiffness[i, i] = floats(joint, "stiffness")[0] + weight * GRAVITY * arm
+    rows = {}
+    for tendon in root.iter("fixed"):
+        row = np.zeros(len(joints))
+        for joint in tendon:
+            row[joints.index(joint.get("joint"))] += float(joint.get("coef"))
+        rows[tendon.get("name")] = row
+        damping += floats(tendon, "damping")[0] * np.outer(row, row)
+        stiffness += floats(tendon, "stiffness")[0] * np.outer(row, row)
+    tied = [rows[node.get("tendon1")] for node in root.iter("tendon") if node.get("tendon1")]
+    return mass, damping, stiffness, joints, tied
+
+
+def characteristic(mass, damping, stiffness):
+    """Return det(M s^2 + D s + K) / det M at some s: what does not depend on the choice of coordinates."""
+    return np.array([np.linalg.det(mass * s**2 + damping * s + stiffness) for s in S]) / np.linalg.det(mass)
+
+
+@settings(max_examples=60)
+@given(rigs(gravity=True))
+def test_the_xml_holds_the_rigs_equations_of_motion(rig):
+    assume(not rig.rigid_spring)
+    mass, damping, stiffness, joints, tied = matrices(mjcf(rig))
+    keep = np.eye(len(joints))
+    for row in tied:  # the rotor's angle follows from the others
+        k = joints.index("rotor")
+        keep[k] = -row / row[k]
+        keep = np.delete(keep, k, axis=1)
+    ours = mechanics(rig)
+    found = [keep.T @ m @ keep for m in (mass, damping, stiffness)]
+    assert found[0].shape == ours.mass.shape
+    expected = characteristic(ours.mass, ours.damping, ours.stiffness)
+    np.testing.assert_allclose(characteristic(*found), expected, rtol=1e-6)
+
+
+def test_masses_and_inertias_of_the_knee():
+    mass, _, _, joints, _ = matrices(mjcf(load_rig("prototype_knee")))
+    inertia = dict(zip(joints, np.diag(mass), strict=True))
+    assert inertia == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
+
+
+def test_what_mujoco_cannot_hold_is_refused():
+    with pytest.raises(RigError, match="a rigid spring cannot be exported"):
+        mjcf(load_rig("bare_drive"))
+    with pytest.raises(RigError, match="lumped train cannot be exported"):
+        mjcf(lumped(load_rig("paper_moving_output")))
+    light = replace(load_rig("paper_moving_output")).with_values({"chassis.inertia": 0.0})
+    with pytest.raises(RigError, match="chassis has inertia 0 kg m"):
+        mjcf(light)
+
+
+def test_export_writes_the_file(tmp_path, capsys):
+    out = tmp_path / "knee.xml"
+    assert main(["export", "--mjcf", "prototype_knee", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.strip() == str(out)
+    assert ElementTree.parse(out).getroot().get("model") == "prototype_knee"
+    assert main(["export", "--mjcf", "no_such_rig"]) == 2
+    assert capsys.readouterr().err.startswith("rsea export: rig 'no_such_rig' not found")
