@@ -38,6 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, default=5, help="of benches, commands and noise (default %(default)s)"
     )
+    parser.add_argument(
+        "--figures",
+        type=Path,
+        metavar="DIR",
+        help="write the figures of docs/derivation.md there and nothing else",
+    )
     parser.add_argument("--json", action="store_true", help="print paper.json to stdout and nothing else")
 
 
@@ -47,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.paper_page import paper_report
     from rsea_ros.report.results import write_json, write_text
 
+    if args.figures:
+        return _figures(args.figures)
     if not args.duration >= SHORTEST:
         raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
     args.out.mkdir(parents=True, exist_ok=True)
@@ -67,6 +75,16 @@ def run(args: argparse.Namespace) -> int:
         )
         print(f"{name}: held-out torque explained: {shares}")
     print(f"report: {report}")
+    return 0
+
+
+def _figures(folder: Path) -> int:
+    from rsea_ros.report.paper_docs import documentation_figures
+    from rsea_ros.report.results import write_text
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, svg in documentation_figures().items():
+        print(write_text(folder / name, svg))
     return 0
 
 

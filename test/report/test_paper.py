@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from rsea_ros.report.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
+from rsea_ros.report.paper_docs import documentation_figures
 from rsea_ros.report.paper_figures import figure_9, figure_18_as_printed, figure_20
 from rsea_ros.report.table import table
 
@@ -50,3 +52,11 @@ def test_table_escapes_and_aligns():
     html = table(["a", "b"], [["<i>", "1"]], numbers=(1,))
     assert "&lt;i&gt;" in html
     assert "<td class='number'>1</td>" in html
+
+
+@pytest.mark.parametrize("name", documentation_figures())
+def test_figures_of_the_derivation_are_what_the_program_draws(name):
+    path = Path(__file__).parents[2] / "docs" / "figures" / name
+    made = documentation_figures()[name]
+    assert path.read_text(encoding="utf-8") == made, f"rsea paper --figures docs/figures makes {name} anew"
+    assert f"figures/{name}" in (path.parents[1] / "derivation.md").read_text(encoding="utf-8")
