@@ -15,7 +15,8 @@ import numpy as np
 from msg_adapters.bags import read_contents
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 
@@ -24,6 +25,8 @@ RIG = "paper_high_impedance"
 SHORT, FULL = 20.0, 160.0
 SPREAD = 0.1
 PACE = 10.0
+PATIENT = {"lost_cycles": 30, "ft_timeout": 0.2, "command_timeout": 0.5}
+"""The bench on a wire is a process too, which a busy machine may hold up for longer than a motor would be."""
 START_UP = 60.0
 """Seconds that a node may take beside its work: a cold start compiles the simulation."""
 
@@ -31,6 +34,7 @@ START_UP = 60.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("--full", action="store_true", help="the paper's 160 s of excitation instead of 20 s")
+    parser.add_argument("--wire", action="store_true", help="the plant behind real wires, and the driver")
     parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
         "--seed", type=int, default=1, help="of true values, excitation and noise (default 1)"
@@ -50,7 +54,8 @@ def run(args: argparse.Namespace) -> int:
     save_rig(bench, out / "bench.yaml")
     print(f"{RIG}, its true values up to {100.0 * SPREAD:g} % off, which only the plant knows")
     with Processes(out / "log", domain) as nodes:
-        measure(nodes, out, duration, args.seed)
+        with source(nodes, out, args) as name:
+            measure(nodes, out, duration, args.seed, name)
         evaluate(nodes, out, duration)
     print(table(load_rig(RIG), bench, load_rig(out / "model.yaml")))
     print(losses(out))
@@ -72,14 +77,29 @@ def stage(title: str) -> Iterator[Callable[[float], None]]:
         yield lambda share: tell("", share)
 
 
-def measure(nodes: Processes, out: Path, duration: float, seed: int) -> None:
-    """Play the paper's excitation to the plant and record it."""
-    with stage(f"plant, excite, record: chirp and noise for {duration:g} s") as tell:
-        nodes.start("plant", {"rig": out / "bench.yaml", "seed": seed})
+@contextmanager
+def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[str]:
+    """Start where the measurements come from: the plant, or the driver with a bench on its wires."""
+    rig = out / "bench.yaml"
+    if not args.wire:
+        nodes.start("plant", {"rig": rig, "seed": args.seed})
+        yield "plant"
+        return
+    with RemoteBench(out / "tty", "--rig", rig, "--seed", args.seed) as bench:
+        nodes.start("driver", {**bench.parameters(), **PATIENT, "rig": RIG, "autostart": True})
+        yield "driver"
+    faults = [line for line in nodes.log("driver").read_text().splitlines() if "[ERROR]" in line]
+    if faults:
+        raise RseaError(f"driver: {faults[0].partition(']: ')[2]} (log: {nodes.log('driver')})")
+
+
+def measure(nodes: Processes, out: Path, duration: float, seed: int, first: str) -> None:
+    """Play the paper's excitation to the bench and record it."""
+    with stage(f"{first}, excite, record: chirp and noise for {duration:g} s") as tell:
         nodes.start("record", {"out": out / "bag"})
         nodes.start("excite", {"duration": duration, "seed": seed, "subscribers": 2})
         nodes.wait("excite", duration + START_UP, tell)
-        nodes.stop("record", "plant")
+        nodes.stop("record", first)
 
 
 def evaluate(nodes: Processes, out: Path, duration: float) -> None:

@@ -28,6 +28,18 @@ class Guarded:
         """The latched fault."""
         return self.guard.fault
 
+    def cycle(self, wanted: float, age: float | None) -> State | None:
+        """Write a torque, then read; a reading that trips a fault zeroes the torque at once.
+
+        The write comes first, so that a command takes effect as near to the start of its cycle as can be.
+        """
+        before = self.guard.fault
+        self.write(wanted, age)
+        state = self.read()
+        if self.guard.fault is not before:
+            self.write(0.0, age)
+        return state
+
     def read(self) -> State | None:
         """Return the reading of this cycle; None when there was none."""
         try:

@@ -127,17 +127,16 @@ class Driver(ManagedEntity):
         self._cycle = self._bench = None
 
     def _step(self, stamp: int) -> None:
-        """Read, publish, write the command that is in force from this cycle on (its stamp rounded)."""
+        """Write the command that is in force from this cycle on (its stamp rounded), read, publish."""
         bench = self._bench
         assert bench is not None
         try:
             with self._lock:
                 bench.poll()
                 bench.commands.take(stamp + round(0.5 * SECOND / self._values["rate"]))
-                state = self._guarded.read()
-                if state is not None:
-                    bench.publish(state)
-                self._guarded.write(bench.commands.torque, bench.commands.age(time.time_ns()))
+                state = self._guarded.cycle(bench.commands.torque, bench.commands.age(time.time_ns()))
+            if state is not None:
+                bench.publish(state)
         except Exception:
             self._guarded.device.close()
             raise

@@ -40,10 +40,10 @@ class Loop:
     def cycle(self, torque, age=0.0):
         """One cycle at about its pace; returns what was written."""
         time.sleep(PERIOD)
-        state = self.guarded.read()
+        state = self.guarded.cycle(torque, age)
         if state is not None:
             self.states.append(state)
-        return self.guarded.write(torque, age)
+        return self.guarded.guard.torque
 
     def cycles(self, count, torque, age=0.0):
         """Several; returns what was written in each."""

@@ -78,13 +78,13 @@ class Motor:
     def open(self) -> None:
         """Open the port, check who answers, switch the torque off, set torque mode, read the limit."""
         self._port.open()
-        self.table = table = _table(_patient(self.bus.ping), self._settings)
+        self.table = table = _table(patient(self.bus.ping), self._settings)
         self._put(table.status_level, ACKNOWLEDGE_ALL)
         self._stop()
-        self._port.return_delay = RETURN_DELAY_UNIT * _patient(lambda: self.bus.get(table.return_delay))
-        if _patient(lambda: self.bus.get(table.operating_mode)) != TORQUE_MODE:
+        self._port.return_delay = RETURN_DELAY_UNIT * patient(lambda: self.bus.get(table.return_delay))
+        if patient(lambda: self.bus.get(table.operating_mode)) != TORQUE_MODE:
             self._put(table.operating_mode, TORQUE_MODE)
-        limit = _patient(lambda: self.bus.get(table.torque_limit))
+        limit = patient(lambda: self.bus.get(table.torque_limit))
         self.torque_limit = limit * table.ampere * self._settings.torque_constant
         if table.bus_watchdog is None:
             self._supervisor = Supervisor(self._port.descriptor, SUPERVISION, self._stop_frames())
@@ -146,18 +146,18 @@ class Motor:
     def recover(self) -> None:
         """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
         try:
-            _patient(self.bus.ping)
+            patient(self.bus.ping)
         except DeviceError:
             self.close()
             self.open()
-        error = _patient(lambda: self.bus.get(self._known.hardware_error))
+        error = patient(lambda: self.bus.get(self._known.hardware_error))
         if error:
             raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
 
     def reboot(self) -> None:
         """Reboot the motor and set it up again. Raises DeviceError when it does not come back."""
         self.disable()
-        _patient(self.bus.reboot)
+        patient(self.bus.reboot)
         deadline = time.monotonic() + BOOT_TIME
         while True:
             time.sleep(BOOT_POLL)
@@ -203,7 +203,7 @@ class Motor:
         ]
 
     def _put(self, item: Item, value: int) -> None:
-        _patient(lambda: self.bus.put(item, value))
+        patient(lambda: self.bus.put(item, value))
 
 
 def _table(model: int, settings: Settings) -> ControlTable:
@@ -216,7 +216,7 @@ def _table(model: int, settings: Settings) -> ControlTable:
     return TABLES[model]
 
 
-def _patient(transaction: Callable[[], T]) -> T:
+def patient(transaction: Callable[[], T]) -> T:
     """Return what a transaction returns, tried again when a reply is lost."""
     for _ in range(ATTEMPTS - 1):
         try:
