@@ -34,7 +34,8 @@ def write_text(path: Path, text: str) -> Path:
     try:
         aside.write_text(text, encoding="utf-8")
         os.replace(aside, path)
-    except OSError:
+    except OSError as error:
         aside.unlink(missing_ok=True)
+        error.filename = str(path)  # a failed write does not know it
         raise
     return path

@@ -1,0 +1,128 @@
+"""`rsea import` and `rsea identify` on measurements of real machines, against published values (see
+../shared/realdata/README.md for their origin)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from msg_adapters import read_record
+from msg_adapters.tables import import_record, load_map
+from rsea_ros.cli.main import main
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.statics import Statics, statics_of
+from rsea_ros.model.prediction import predict
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.statics_words import statics_sentences
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+REAL = Path(__file__).resolve().parents[2] / "shared" / "realdata"
+if not REAL.is_dir():
+    pytest.skip(f"{REAL} is missing: no measurements of real machines to test on", allow_module_level=True)
+
+DESIGNS = {
+    "07-18__10-58-26__torqueramp__base_onyx_runin1": (1.95, True),
+    "07-18__11-02-28__torqueramp__base_onyx_runin5": (1.82, True),
+    "07-18__11-17-26__torqueramp__base_onyx_runin6": (1.47, True),
+    "07-18__16-28-57__torqueramp__split_onyx_runin1": (1.77, True),
+    "07-18__16-32-24__torqueramp__split_onyx_runin5": (0.76, True),
+    "07-19__12-45-43__torqueramp__split_onyx_12pre1": (0.46, True),
+    "07-19__12-49-55__torqueramp__split_onyx_12pre5": (0.25, True),
+    "07-19__13-53-23__torqueramp__conic_onyx_2pre1": (0.73, False),
+    "07-19__13-57-00__torqueramp__conic_onyx_2pre5": (0.43, False),
+    "07-19__14-00-00__torqueramp__conic_onyx_2pre6": (0.66, False),
+}
+"""Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
+
+
+def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
+    """Import a file, identify the bag, and return identification.json."""
+    bag, out = folder / f"{mapping}_bag", folder / f"{mapping}_results"
+    assert main(["import", str(REAL / file), "--map", mapping, "--out", str(bag)]) == 0
+    assert main(["identify", str(bag), "--rig", rig, "--out", str(out)]) == 0
+    return json.loads((out / "identification.json").read_text(encoding="utf-8"))
+
+
+def test_emps_has_the_published_values(tmp_path):
+    """Janot, Gautier, Brunot 2019: M 95.109 kg, 203.503 N s/m, 20.394 N, offset -3.165 N."""
+    found = identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)["parameters"]
+    published = {
+        "rotor.reflected_inertia": (95.109, 0.02),
+        "rotor.reflected_damping": (203.503, 0.02),
+        "coulomb_friction.torque": (20.394, 0.03),
+        "asymmetric_friction.offset": (-3.165, 0.10),
+    }
+    assert set(found) == set(published)
+    for name, (value, tolerance) in published.items():
+        assert found[name]["value"] == pytest.approx(value, rel=tolerance), name
+        low, high = found[name]["ci95"]
+        assert low < value < high, name
+        assert high - low < 0.3 * abs(value), name
+
+
+def test_emps_predicts_the_run_with_pulses(tmp_path):
+    """Held out: the force residual is at most 4.7 % of the force."""
+    identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)
+    pulses = ["import", str(REAL / "emps/DATA_EMPS_PULSES.mat"), "--map", "emps_pulses"]
+    assert main([*pulses, "--out", str(tmp_path / "pulses")]) == 0
+    model = load_rig(tmp_path / "emps_identification_results" / "model.yaml")
+    force = predict(model, read_record(tmp_path / "pulses"))["motor_torque"]
+    rms = float(np.sqrt(np.mean(force.measured[force.counts] ** 2)))
+    assert force.rms_error / rms < 0.047
+
+
+def test_pendulum_gravity(tmp_path):
+    file = "pendulum/gravity_compensation.measured.csv.gz"
+    result = identified(file, "pendulum", "pendulum", tmp_path)
+    gravity = result["parameters"]["spring_end.gravity"]
+    assert gravity["value"] == pytest.approx(3.31, abs=0.01)
+    assert gravity["ci95"][0] < 3.31 < gravity["ci95"][1]
+    assert result["residual_rms"]["motor_torque"] < 0.02
+    assert any(s.startswith("spring_end.inertia ran to its bound") for s in result["statements"])
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_cycloidal_statics_of_every_design(design):
+    travel, saturates = DESIGNS[design]
+    short, long = (ramps(design, which) for which in ("short", "long"))
+    assert np.degrees(short.travel) == pytest.approx(travel, abs=0.005)
+    assert 0.5 * short.travel < short.lost_motion < short.travel
+    assert short.limit is None
+    assert 190.0 < long.stiffness < 420.0
+    assert (long.limit is not None and 24.0 < long.limit < 26.0) == saturates
+
+
+def ramps(design: str, which: str) -> Statics:
+    mapping = load_map(CONFIG / f"imports/cycloidal_{which}_ramps.yaml")
+    record = import_record(REAL / f"cycloidal/2024-{design}.csv.gz", mapping)
+    statics = statics_of(record, load_rig("cycloidal"))
+    assert statics is not None
+    return statics
+
+
+@pytest.mark.parametrize("design", list(DESIGNS)[::5])
+def test_cycloidal_identified(design, tmp_path, capsys):
+    file = f"cycloidal/2024-{design}.csv.gz"
+    short = identified(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
+    stiffness = short["parameters"]["spring.stiffness"]
+    assert 100.0 < stiffness["ci95"][0] < stiffness["ci95"][1] < 900.0
+    assert short["parameters"]["coulomb_friction.torque"]["ci95"][0] > 0.0
+    assert any(s.startswith("torque_saturation.limit is not identifiable") for s in short["statements"])
+    shown = capsys.readouterr().out
+    assert f"the output angle travels {DESIGNS[design][0]:.2f}°" in shown
+    assert "no saturation" in shown
+
+
+def test_cycloidal_saturation_is_seen_and_fitted():
+    """One of the three long ramps."""
+    mapping = load_map(CONFIG / "imports/cycloidal_long_ramps.yaml")
+    record = import_record(REAL / f"cycloidal/2024-{next(iter(DESIGNS))}.csv.gz", mapping)
+    result = identify([record.between(record.start, record.start + 20.0)], load_rig("cycloidal"))
+    assert result.statics is not None and result.statics.limit is not None
+    assert "stops at 24.9 N·m where 40.0 N·m are commanded" in statics_sentences(result.statics)[-1]
+    found = {p.name: p.value for p in result.parameters}
+    assert found["torque_saturation.limit"] == pytest.approx(result.statics.limit, rel=0.1)
+    assert found["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
