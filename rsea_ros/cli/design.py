@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.design.requirement import Requirement
+from rsea_ros.design.requirement import Requirement, check_magnitude
 
 HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
@@ -91,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.design_page import design_report
     from rsea_ros.report.results import write_json, write_text
 
+    check_magnitude("stiffness", args.stiffness, "N m/rad")
     requirement, unit = _requirement(args), unit_named(args.unit, args.catalogue)
     asked = judge(requirement, unit, args.stiffness)
     least = judge(requirement, unit, least_stiffness(requirement, unit))

@@ -57,6 +57,8 @@ def run(args: argparse.Namespace) -> int:
         return _figures(args.figures)
     if not args.duration >= SHORTEST:
         raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
+    if args.seed < 0:
+        raise ParameterError(f"--seed {args.seed}, expected 0 or more")
     args.out.mkdir(parents=True, exist_ok=True)
     with progress("paper") as tell:
         tests = _tests(args, tell)

@@ -64,9 +64,7 @@ class Design:
 def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design:
     """Return what a stiffness (N m/rad) gives. Raises ParameterError for one that is not above 0."""
     if not (math.isfinite(stiffness) and stiffness > 0.0):
-        raise ParameterError(
-            f"design: stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad"
-        )
+        raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
     inner = requirement.inertia + unit.spin
     exact = flat_band(
         end_to_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg

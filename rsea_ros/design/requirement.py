@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from rsea_ros.errors import ParameterError
 
 _LARGEST = 45.0
+_RANGE = (1e-9, 1e6)
+"""SI: beyond it nothing of this kind has ever been built, and numbers fail."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +35,14 @@ class Requirement:
     def __post_init__(self) -> None:
         for name, unit in _UNITS.items():
             value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ParameterError(f"design: {name} = {value:g} {unit}, expected a finite value > 0 {unit}")
+            check_magnitude(name, value, unit)
         if self.deflection > math.radians(_LARGEST):
             raise ParameterError(
-                f"design: deflection = {math.degrees(self.deflection):g} deg, expected at most "
-                f"{_LARGEST:g} deg"
+                f"deflection = {math.degrees(self.deflection):g} deg, expected at most {_LARGEST:g} deg"
             )
         if self.separation > self.diameter:
             raise ParameterError(
-                f"design: separation = {self.separation:g} m, expected within the diameter of "
-                f"{self.diameter:g} m"
+                f"separation = {self.separation:g} m, expected within the diameter of {self.diameter:g} m"
             )
 
     @property
@@ -69,3 +68,9 @@ _UNITS = {
 def gyration(requirement: Requirement) -> float:
     """Return the chassis' radius of gyration over its outer radius: 0.71 is a full disc, 1 a thin ring."""
     return math.sqrt(requirement.inertia / requirement.mass) / (0.5 * requirement.diameter)
+
+
+def check_magnitude(name: str, value: float, unit: str) -> None:
+    """Raise ParameterError for a value that is not finite and positive, or of no possible size."""
+    if not _RANGE[0] <= value <= _RANGE[1]:
+        raise ParameterError(f"{name} = {value:g} {unit}, expected {_RANGE[0]:g} to {_RANGE[1]:g} {unit}")

@@ -36,9 +36,9 @@ def test_design_tells_by_status_when_it_is_asked_to(here):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--stiffness", "0"], "design: stiffness = 0 N m/rad, expected a finite value > 0 N m/rad"),
+        (["--stiffness", "0"], "stiffness = 0 N m/rad, expected 1e-09 to 1e+06 N m/rad"),
         (["--unit", "none"], "unit 'none', expected one of h54-200-s500-r, rd85x13-hd_cpl-25a-160"),
-        (["--torque", "nan"], "design: torque = nan N m, expected a finite value > 0 N m"),
+        (["--torque", "nan"], "torque = nan N m, expected 1e-09 to 1e+06 N m"),
         (
             ["--catalogue", "absent.yaml"],
             "absent.yaml: No such file or directory, expected a catalogue in YAML",
