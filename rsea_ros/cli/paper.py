@@ -72,12 +72,15 @@ def run(args: argparse.Namespace) -> int:
     agree = sum(c["agrees"] for c in results["claims"])
     print(f"{agree} of {len(results['claims'])} printed numbers come out to the last digit")
     for name, models in results["moving_output"].items():
-        shares = ", ".join(
-            f"{m} {100 * j['explained']:.1f} % ({j['sensor']})" for m, rows in models.items() for j in rows
-        )
-        print(f"{name}: held-out torque explained: {shares}")
+        for model, sensors in models.items():
+            shares = ", ".join(f"{_share(j['explained'])} at the {j['sensor']}" for j in sensors)
+            print(f"{name}, {model}: held-out torque explained: {shares}")
     print(f"report: {report}")
     return 0
+
+
+def _share(explained: float) -> str:
+    return f"{100.0 * explained:.2f} %" if explained > 0.0 else "none (worse than no model)"
 
 
 def _figures(folder: Path) -> int:

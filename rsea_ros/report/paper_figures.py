@@ -101,7 +101,10 @@ def figure_18_as_printed() -> Figure:
     worst = int(np.argmax(np.abs(gaps)))
     title = f"Fig. 18 with Table 2 as printed: {abs(gaps[worst]):.0f} dB between both at {_HZ[worst]:.2f} Hz"
     return response_figure(
-        title, curves, [], "The pendulum holds still at its own frequency: no torque reaches the spring."
+        title,
+        curves,
+        [],
+        "At its own frequency the pendulum swings by itself and holds no torque: none reaches the spring.",
     )
 
 

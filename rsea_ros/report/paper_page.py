@@ -63,7 +63,8 @@ _KICKER = (
     "actuators”, recomputed"
 )
 _FOOTER = [
-    "Benches are simulated: values drawn from the rigs' spread, sensors' noise, bags written and read back.",
+    "Benches are simulated by the unlumped model: what is tested is whether data can tell, not nature. "
+    "Values drawn from the rigs' spread, sensors' noise, bags written and read back.",
     "Models: rsea_ros/model; what they take for exact: docs/physics.md; derivation: docs/derivation.md. "
     "All values in SI.",
     "rsea paper",
@@ -73,8 +74,9 @@ _FOOTER = [
 def _title(test: MovingOutput) -> str:
     unlumped, lumped = (100.0 * rival.judged[0].explained for rival in test.rivals)
     return (
-        f"The unlumped model holds: {unlumped:.2f} % of the moving output's torque against {lumped:.0f} %. "
-        "The bandwidth of Eq. (7) does not: it leaves out the rotor's spin"
+        f"A moving output tells the models apart: unlumped {unlumped:.2f} % of a simulated bench's torque, "
+        "lumped "
+        f"{lumped:.0f} %. Eq. (7) leaves out the rotor's spin"
     )
 
 

@@ -180,7 +180,8 @@ def moving_table(tests: Mapping[str, MovingOutput]) -> str:
         "other end can",
         table(head, rows, numbers=(3, 4, 5)),
         caption="Fitted to the first half of the spring end's record, judged on the second half, and on "
-        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors.",
+        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The "
+        "benches are unlumped by construction.",
     )
 
 
