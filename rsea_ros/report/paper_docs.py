@@ -32,7 +32,7 @@ def documentation_figures() -> dict[str, str]:
 
 def _on_white(svg: str) -> str:
     """Return a drawing that can be read on a dark page too."""
-    return svg.replace("<svg ", '<svg style="background:#ffffff" ', 1) + "\n"
+    return svg.replace('style="', 'style="background:#ffffff;', 1) + "\n"
 
 
 def _clamped() -> str:

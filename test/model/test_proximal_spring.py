@@ -1,0 +1,72 @@
+"""A spring and a sensor on the proximal side: their limits, their torque, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.errors import RigError
+from rsea_ros.model import outputs
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import EffectSetting, Quantity
+from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+HZ = np.geomspace(0.1, 100.0, 40)
+RIG = load_rig("separate_stiffnesses")
+
+
+def test_an_endlessly_stiff_one_is_none():
+    values = {n: q for n, q in RIG.quantities.items() if not n.startswith("proximal_spring.")}
+    without = replace(RIG, quantities=values)
+    stiff = RIG.with_values({"proximal_spring.stiffness": 1e11})
+    for end in ("housing_end", "spring_end"):
+        expected = frequency_response(without, outputs.end_torque(without, end), HZ)
+        np.testing.assert_allclose(
+            frequency_response(stiff, outputs.end_torque(stiff, end), HZ), expected, rtol=1e-4
+        )
+
+
+def test_the_sensor_on_the_housing_reads_the_torque_on_that_end():
+    """A slow sine through the simulation against the frequency response."""
+    rate, hz = 1000.0, 3.0
+    t = np.arange(round(40.0 * rate)) / rate
+    command = Channel(t, np.cos(2 * np.pi * hz * t))
+    rig = replace(
+        RIG.with_values({"housing_end.damping": 2.0, "spring_end.damping": 2.0}), ft_end="housing_end"
+    )
+    ft = synthesize(rig, command, noise=False)["ft"]
+    late = ft.t > 35.0
+    wave = np.exp(2j * np.pi * hz * ft.t[late])
+    found = np.linalg.lstsq(np.column_stack([wave.real, -wave.imag]), ft.y[late], rcond=None)[0] @ [1, 1j]
+    held = np.sinc(hz / rate) * np.exp(-1j * np.pi * hz / rate)
+    expected = frequency_response(rig, outputs.end_torque(rig, "housing_end"), np.array([hz]))[0] * held
+    assert found == pytest.approx(expected, rel=2e-3)
+
+
+def test_a_file_keeps_it(tmp_path):
+    rig = replace(RIG, ft_end="housing_end")
+    save_rig(rig, tmp_path / "rig.yaml")
+    assert load_rig(tmp_path / "rig.yaml") == rig
+
+
+def test_a_sensor_without_a_spring_is_refused():
+    with pytest.raises(
+        RigError, match=r"ft_end = housing_end without proximal_spring.stiffness, expected that"
+    ):
+        replace(load_rig("paper_moving_output"), ft_end="housing_end")
+    with pytest.raises(RigError, match=r"ft_end = 'gear', expected one of housing_end, spring_end"):
+        replace(RIG, ft_end="gear")
+    with pytest.raises(RigError, match=r"proximal_spring.stiffness = 0 N m/rad"):
+        replace(RIG, quantities={**RIG.quantities, "proximal_spring.stiffness": Quantity(0.0)})
+
+
+def test_an_effect_in_the_spring_is_refused_with_the_sensor_on_the_housing():
+    rig = replace(RIG, ft_end="housing_end").with_effects(EffectSetting("nonlinear_spring", {"cubic": 3.0}))
+    with pytest.raises(
+        RigError, match="effect nonlinear_spring with ft_end = housing_end, expected spring_end"
+    ):
+        synthesize(rig, Channel(np.arange(100) / 280.0, np.ones(100)))
