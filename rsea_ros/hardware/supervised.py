@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from rsea_ros.errors import DeviceError
 
+SURE = 0.8
+"""Share of the time-out from which on the supervisor may have acted."""
 SCRIPT = Path(__file__).with_name("supervisor.py")
 
 
@@ -17,10 +20,15 @@ class SupervisorLost(DeviceError):
     """The process that would stop the motor after the driver's death is dead itself."""
 
 
+class HeldUp(DeviceError):
+    """This process stood still with torque on for about as long as the supervisor bears."""
+
+
 class Supervisor:
     """Sends `frames` on `descriptor` when this process ends, or does not beat for `timeout` s."""
 
     def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes]) -> None:
+        self._timeout, self._last, self._armed = timeout, 0.0, False
         words = [str(descriptor), f"{timeout:g}", *(frame.hex() for frame in frames)]
         self._process = subprocess.Popen(
             [sys.executable, "-I", "-S", str(SCRIPT), *words], stdin=subprocess.PIPE,
@@ -31,11 +39,20 @@ class Supervisor:
         self._beats = self._process.stdin.fileno()
 
     def beat(self, armed: bool) -> None:
-        """Say that this process lives, and whether torque is on. Raises SupervisorLost."""
+        """Say that this process lives, and whether torque is commanded.
+
+        Raises SupervisorLost, and HeldUp when the last beat is so old that the supervisor may have acted.
+        """
+        now = time.monotonic()
+        gap, armed_before = now - self._last, self._armed
+        self._last, self._armed = now, armed
         try:
             os.write(self._beats, b"a" if armed else b"d")
         except OSError as error:
             raise SupervisorLost(f"supervisor process: {error.strerror}, expected it to run") from None
+        if armed_before and gap > SURE * self._timeout:
+            limit = f"{1e3 * SURE * self._timeout:.0f} ms"
+            raise HeldUp(f"no cycle for {1e3 * gap:.0f} ms, limit {limit}: the motor may have been stopped")
 
     def close(self, *, safe: bool = True) -> None:
         """End it. safe: the motor has acknowledged zero torque; else the supervisor sends its frames."""

@@ -1,5 +1,7 @@
 """Every fault on the wire: latched, torque zero in the cycle that sees it, over by its service."""
 
+import time
+
 import pytest
 
 from rsea_ros.errors import DeviceError
@@ -131,6 +133,19 @@ def test_a_clear_that_finds_the_cause_still_there_is_refused(loop):
     with pytest.raises(DeviceError, match="saturation, status 0x80020000 is still there"):
         loop.guarded.clear()
     assert loop.guarded.fault.cause == "ft"
+
+
+def test_a_driver_that_hangs_is_stopped_by_the_supervisor_and_knows_it(loop):
+    since = loop.bench.ask("set", temperature=32)["t"]
+    deadline = time.monotonic() + 20.0
+    while loop.bench.torque() != (0, False):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    assert loop.until_fault(10.0) == 1
+    assert loop.guarded.fault.cause == "heldup"
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+    assert torques(loop.bench, since)[-1][1]
 
 
 def test_closing_leaves_torque_zero_and_off(loop):

@@ -1,0 +1,52 @@
+"""What the driver reaches on the bench on a wire, beside a bare loop with absolute deadlines in the same run.
+
+Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000]
+The sections: timing, loss, faults, stream, fuzz; all of them without a name. `timing --seconds 600` is the
+long soak. A machine that is busy or virtual stalls both loops: look at the ratios.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from bench.driver_faults import faults
+from bench.driver_fuzz import fuzz
+from bench.driver_loss import loss
+from bench.driver_stream import stream
+from bench.driver_timing import timing
+
+SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, str]]]] = {
+    "timing": timing,
+    "loss": loss,
+    "faults": faults,
+    "stream": stream,
+    "fuzz": fuzz,
+}
+
+
+def main() -> None:
+    """Measure and print asked | measured."""
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each run of the loop")
+    parser.add_argument("--strings", type=int, default=1_000_000, help="damaged byte strings")
+    args = parser.parse_args()
+    unknown = set(args.sections) - set(SECTIONS)
+    if unknown:
+        parser.error(f"section {', '.join(unknown)}, expected some of {', '.join(SECTIONS)}")
+    print(f"{'what':58} {'asked':22} measured")
+    for name in args.sections or SECTIONS:
+        with tempfile.TemporaryDirectory() as folder:
+            for row in SECTIONS[name](args, Path(folder)):
+                print(f"{row[0]:58} {row[1]:22} {row[2]}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""The driver's loop without ROS, at absolute deadlines, for measurements of what goes over the wire."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from rsea_ros.hardware.device import State
+from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
+from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.peer.remote import RemoteBench
+
+STIFFNESS = 1530.456
+
+
+class Loop:
+    """A device on a bench and its limits, `rate` cycles a second. spent: time in each cycle, s."""
+
+    def __init__(self, bench: RemoteBench, rate: float, *, lost_cycles: int = 3, ft_timeout: float = 0.01,
+                 latency: float = 0.0) -> None:  # fmt: skip
+        limits = Limits(68.0, lost_cycles=lost_cycles)
+        self.device = DynamixelNetft(
+            MotorSettings(bench.port, 4_000_000, latency=latency or 0.4 / rate),
+            SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
+        )  # fmt: skip
+        self.device.open()
+        self.guarded = Guarded(self.device, limits, rate)
+        self.guarded.enable()
+        self._period, self._due = 1e9 / rate, float(time.monotonic_ns())
+        self.states: list[State] = []
+        self.spent: list[float] = []
+
+    def cycle(self, torque: float) -> State | None:
+        """Wait for the next deadline and do one cycle."""
+        now = time.monotonic_ns()
+        self._due = max(self._due + self._period, now - self._period)
+        time.sleep(max(0.0, self._due - now) / 1e9)
+        begin = time.monotonic_ns()
+        state = self.guarded.cycle(torque, 0.0)
+        self.spent.append((time.monotonic_ns() - begin) / 1e9)
+        if state is not None:
+            self.states.append(state)
+        return state
+
+    def run(self, seconds: float, torque: Callable[[int], float]) -> None:
+        """Run for a while; torque of the cycle's number."""
+        for k in range(round(seconds * 1e9 / self._period)):
+            self.cycle(torque(k))
