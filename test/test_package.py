@@ -68,6 +68,11 @@ def test_every_module_is_installed(workspace, top):
     assert files(installed, "*.py") == files(ROOT / top, "*.py")
 
 
+def test_the_style_of_reports_is_installed(workspace):
+    (installed,) = (workspace / "install/rsea_ros/lib").glob("python3*/site-packages/rsea_ros/report")
+    assert {file.name for file in installed.glob("page.*")} == {"page.py", "page.css", "page.js"}
+
+
 @pytest.mark.parametrize("top", ["config", "launch"])
 def test_every_config_and_launch_file_is_installed(workspace, top):
     assert files(workspace / "install/rsea_ros/share/rsea_ros" / top, "*") == files(ROOT / top, "*")
