@@ -145,4 +145,5 @@ def _svg(d: schemdraw.Drawing, spoken: str) -> str:
     """Return the drawing as SVG with what stands behind _ as an index."""
     text = d.get_imagedata("svg").decode("utf-8")
     text = _INDEX.sub(r'\1<tspan dy="4" font-size="10">\2</tspan><tspan dy="-4">​</tspan>', text)
-    return text.replace("<svg ", f'<svg style="max-width:100%;height:auto" role="img" aria-label="{spoken}" ', 1)
+    look = f'style="max-width:100%;height:auto" role="img" aria-label="{spoken}"'
+    return text.replace("<svg ", f"<svg {look} ", 1)
