@@ -70,7 +70,7 @@ def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
-    """Return the mean of tanh over a straight path from a to b, and its derivative by b. from_a: of _ln_cosh."""
+    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: _ln_cosh(a)."""
     path = b - a
     if abs(path) < 1e-3:
         mean = math.tanh(0.5 * (a + b))

@@ -2,8 +2,8 @@
 
     T = -torque * sign(w),   w the speed of the gear output against the housing
 
-The sign is smoothed below creep_velocity (presliding), see _friction.py. Source: Armstrong-Helouvry, Control of Machines with
-Friction, 1991, ch. 2.
+The sign is smoothed below creep_velocity (presliding), see _friction.py. Source: Armstrong-Helouvry, Control
+of Machines with Friction, 1991, ch. 2.
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction

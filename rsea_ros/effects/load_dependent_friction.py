@@ -3,7 +3,8 @@
     T = -coefficient * |T_s| * sign(w)
 
 T_s is the torque in the spring, w the speed of the gear output against the housing; the sign is smoothed
-below creep_velocity (presliding), see _friction.py. Source: facts.md section 3 (no-load drag is a fraction of b_m).
+below creep_velocity (presliding), see _friction.py. Source: the motor's data sheet (no-load drag is a
+fraction of the paper's b_m).
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction

@@ -12,8 +12,8 @@ from enum import IntEnum
 class Port(IntEnum):
     """Where in the chain an effect acts; the step calls the ports in this order.
 
-    COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], what the measured current
-        shows at the end of the step.
+    COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], what the measured
+        current shows at the end of the step.
     MOTOR: once a step, changes s[COMMAND] after that: what the measured current does not show.
     GEAR: at every evaluation of the torques, with the signals at the middle of the step; adds to
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].

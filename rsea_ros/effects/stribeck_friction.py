@@ -2,8 +2,8 @@
 
     T = -(coulomb_torque + stribeck_torque * exp(-(w / stribeck_velocity)^2)) * sign(w)
 
-w is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding), see
-_friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, eq. (3).
+w is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding),
+see _friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, eq. (3).
 """
 
 import math
@@ -43,5 +43,6 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="friction that is larger near rest than at speed",
-    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω), smooth below creep_velocity",
+    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω), "
+    "smooth below creep_velocity",
 )

@@ -77,7 +77,7 @@ def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:
 
 
 def _rig_unknown(rig: Rig, name: str) -> Unknown:
-    """Return a value of the rig as an unknown: on its logarithm where it is known well enough to stay away from 0.
+    """Return a value of the rig as an unknown: on its logarithm where its prior keeps it away from 0.
 
     A value that may well be near zero (a damping) moves on its own scale: its logarithm would never get back.
     """

@@ -40,8 +40,8 @@ element of Eqs. (1), (3), (4), (6). With b_s = 3 N m s/rad they differ by more t
 class Output:
     """A signal y = (c_0 + c_1 s + c_2 s^2) q + d tau.
 
-    c: shape (3, 5), on the coordinates (h, g, c, d, p) and their two derivatives. d: shape (5,), on the torques
-    at equations.PORTS.
+    c: shape (3, 5), on the coordinates (h, g, c, d, p) and their two derivatives. d: shape (5,), on the
+    torques at equations.PORTS.
     """
 
     c: FloatArray

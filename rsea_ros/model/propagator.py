@@ -88,7 +88,7 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
 
 
 def start_map(rig: Rig) -> FloatArray:
-    """Return what turns output angle (rad) and velocity (rad/s) into the state of least energy, shape (2n, 2).
+    """Return what makes the state of least energy of output angle (rad) and velocity (rad/s), shape (2n, 2).
 
     So an encoder that starts away from zero turns what is free to turn and leaves the spring alone.
     """
@@ -115,7 +115,7 @@ def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
 
 
 def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:
-    """Return the row of T_p = K_p (q_p - q_h) + b_p (q_p' - q_h'), what a sensor at the housing's end reads."""
+    """Return the row of T_p = K_p (q_p - q_h) + b_p (q_p' - q_h'): a sensor at the housing's end reads it."""
     difference = np.array([-1.0, 0.0, 0.0, 0.0, 1.0]) @ m.placement
     stiffness, damping = rig["proximal_spring.stiffness"], rig["proximal_spring.damping"]
     return np.concatenate([stiffness * difference, damping * difference])

@@ -26,7 +26,18 @@ from rsea_ros.model.rig import (
 from rsea_ros.signals import UNITS
 
 _GROUPS = sorted({name.split(".")[0] for name in FIELDS})
-_TOP = {"name", "about", "source", "known", "proximal", "ft_end", "sensors", "controller", "effects", *_GROUPS}
+_TOP = {
+    "name",
+    "about",
+    "source",
+    "known",
+    "proximal",
+    "ft_end",
+    "sensors",
+    "controller",
+    "effects",
+    *_GROUPS,
+}
 _SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
 
 

@@ -131,10 +131,12 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
 
 
 def _check_sensor(rig: Rig, active: Sequence[tuple[Effect, Mapping[str, float]]]) -> None:
-    """Raise RigError for an effect in the spring where the F/T sensor is not: the step adds its torque there."""
+    """Raise RigError for an effect in the spring where the F/T sensor is not: the step adds its torque."""
     for effect, _ in active:
         if rig.ft_end == "housing_end" and effect.port == st.Port.SPRING:
-            raise RigError(f"rig {rig.name}: effect {effect.name} with ft_end = housing_end, expected spring_end")
+            raise RigError(
+                f"rig {rig.name}: effect {effect.name} with ft_end = housing_end, expected spring_end"
+            )
 
 
 def _constants(rig: Rig) -> tuple[float, float, float, float]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import slow_equations
 import numpy as np
 import pytest
+import slow_equations
 from effect_bench import RIG, SIGNALS, command, record_of, rms, simulate
 
 from rsea_ros.effects.catalogue import catalogue

@@ -162,7 +162,9 @@ NONSENSE = [
 ]
 
 
-@pytest.mark.parametrize(("path", "value", "message"), NONSENSE, ids=lambda item: "deleted" if item is DELETE else str(item)[:40])
+@pytest.mark.parametrize(
+    ("path", "value", "message"), NONSENSE, ids=lambda item: "deleted" if item is DELETE else str(item)[:40]
+)
 def test_nonsense_is_one_line_that_names_it(path, value, message, tmp_path):
     file = tmp_path / "bad.yaml"
     file.write_text(yaml.safe_dump(changed(path, value)))
