@@ -28,7 +28,7 @@ PLANT_RATE = 2000.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--port", type=Path, default=Path("/tmp/rsea-bench"), help="link to the pseudo-terminal")
+    add("--port", type=Path, default=Path("rsea-bench-tty"), help="link to the pseudo-terminal")
     add("--model", type=int, default=54024, choices=sorted(MODELS), help="number of the motor")
     add("--rig", default="paper_high_impedance", help="the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
@@ -53,11 +53,11 @@ def run(args: argparse.Namespace) -> int:
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motor, bus, sensor, wrong, inlet, sys.stdout.fileno())
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
-    place = {"port": str(args.port), "model": args.model, "ft_port": sensor.port, "page_port": sensor.page}
-    print(json.dumps(place), flush=True)
+    ports = {"ft_port": sensor.port, "page_port": sensor.page}
     try:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.default_int_handler)
+        print(json.dumps({"port": str(args.port), "model": args.model, **ports}), flush=True)
         Station(plant, motor, bus, sensor, requests).run()
     except KeyboardInterrupt:
         pass

@@ -25,7 +25,7 @@ RIG = "paper_high_impedance"
 SHORT, FULL = 20.0, 160.0
 SPREAD = 0.1
 PACE = 10.0
-PATIENT = {"lost_cycles": 30, "ft_timeout": 0.2, "command_timeout": 0.5}
+PATIENT = {"latency": 0.02, "lost_cycles": 30, "ft_timeout": 0.5, "command_timeout": 0.5, "watchdog": 1.0}
 """The bench on a wire is a process too, which a busy machine may hold up for longer than a motor would be."""
 START_UP = 60.0
 """Seconds that a node may take beside its work: a cold start compiles the simulation."""

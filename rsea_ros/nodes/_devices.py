@@ -29,6 +29,7 @@ MOTOR = (
     Parameter("model", 0, f"number that the motor must have: {KNOWN}; 0: any of them", "", 0, 65535),
     Parameter("torque_constant", 6.826, "torque at the gear output for a current", "N m/A", 0.1, 100.0),
     Parameter("latency", 0.0, "what adapter and host may add to a reply; 0: 0.4 of a cycle", "s", 0.0, 0.1),
+    Parameter("watchdog", 0.1, "time without the driver after which the motor is stopped", "s", 0.02, 2.5),
 )
 SENSOR = (
     Parameter("ft_host", "192.168.1.1", "address of the F/T sensor; empty: there is none"),
@@ -83,6 +84,7 @@ def _dynamixel_netft(values: Values) -> Device:
         model=values["model"],
         torque_constant=values["torque_constant"],
         latency=values["latency"] or 0.4 / values["rate"],
+        watchdog=values["watchdog"],
     )
     sensor = SensorSettings(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
     stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]

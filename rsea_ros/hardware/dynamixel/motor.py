@@ -21,8 +21,6 @@ ATTEMPTS = 5
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
-WATCHDOG, SUPERVISION = 0.06, 0.1
-"""s without the host after which the motor's own watchdog, or the supervisor, takes the torque away."""
 WRITE = 0x03
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
 
@@ -32,7 +30,8 @@ class Settings:
     """Where the motor is and what it is.
 
     baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
-    per A. latency: what adapter and scheduler may add to the time on the wire, s.
+    per A. latency: what adapter and scheduler may add to the time on the wire, s. watchdog: s without the
+    host after which the motor's own watchdog, or the supervisor, takes the torque away.
     """
 
     path: str
@@ -41,6 +40,7 @@ class Settings:
     model: int = 0
     torque_constant: float = 6.826
     latency: float = 1e-3
+    watchdog: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,16 @@ class Motor:
         limit = patient(lambda: self.bus.get(table.torque_limit))
         self.torque_limit = limit * table.ampere * self._settings.torque_constant
         if table.bus_watchdog is None:
-            self._supervisor = Supervisor(self._port.descriptor, SUPERVISION, self._stop_frames())
+            self._supervisor = Supervisor(
+                self._port.descriptor, self._settings.watchdog, self._stop_frames()
+            )
 
     def enable(self) -> None:
         """Switch the torque on, at zero, with a watchdog. Raises DeviceError."""
         table = self._known
         self._stop()
         if table.bus_watchdog is not None:
-            self._put(table.bus_watchdog, round(WATCHDOG / WATCHDOG_UNIT))
+            self._put(table.bus_watchdog, max(1, round(self._settings.watchdog / WATCHDOG_UNIT)))
         self._put(table.torque_enable, 1)
 
     def disable(self) -> None:

@@ -21,10 +21,11 @@ class RemoteBench:
     """
 
     def __init__(self, path: Path, *options: object) -> None:
-        command = [sys.executable, "-m", "rsea_ros", "bench", "--port", str(path), "--requests"]
+        path = path.absolute()
+        words = [str(o.absolute() if isinstance(o, Path) else o) for o in ("--port", path, *options)]
         self._process = subprocess.Popen(
-            [*command, *map(str, options)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            start_new_session=True,
+            [sys.executable, "-m", "rsea_ros", "bench", "--requests", *words], cwd=ROOT,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
         )  # fmt: skip
         place = self._receive()
         self.port, self.ft_port, self.page_port = str(path), int(place["ft_port"]), int(place["page_port"])

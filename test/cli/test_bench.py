@@ -1,0 +1,50 @@
+"""`rsea bench` as a program: it says where it is, does what it is told, and leaves nothing behind."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.peer.remote import RemoteBench
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def start(*words):
+    command = [sys.executable, "-m", "rsea_ros", "bench", *map(str, words)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_it_says_where_it_is_and_sigterm_takes_the_port_away(tmp_path):
+    process = start("--port", tmp_path / "tty", "--model", 2020)
+    place = json.loads(process.stdout.readline())
+    assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
+    assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=30)
+    assert (process.returncode, errors) == (0, "")
+    assert not (tmp_path / "tty").is_symlink()
+
+
+def test_a_request_that_it_does_not_know_is_answered_and_changes_nothing(tmp_path):
+    with RemoteBench(tmp_path / "tty") as bench:
+        for name, values in {"explode": {}, "misbehave": {"dropp": 1.0}, "set": {"colour": 3}}.items():
+            with pytest.raises(DeviceError, match="expected one of misbehave, set, alert"):
+                bench.ask(name, **values)
+        assert bench.torque() == (0, False)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--ft-rate", 9000), "rsea bench: --ft-rate 9000 Hz, expected 1 to 7000 Hz\n"),
+        (("--return-delay", 300), "rsea bench: --return-delay 300, expected 0 to 254 (unit 2 µs)\n"),
+    ],
+)
+def test_what_no_bench_can_have_is_refused(words, message):
+    _, errors = (process := start(*words)).communicate(timeout=30)
+    assert (process.returncode, errors) == (2, message)
