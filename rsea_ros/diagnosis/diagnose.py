@@ -13,7 +13,7 @@ from rsea_ros.diagnosis.experiment import amplitude_series, separating
 from rsea_ros.diagnosis.faults import Checked, check
 from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
-from rsea_ros.diagnosis.search import Search, Trial, fitted, search
+from rsea_ros.diagnosis.search import Model, Search, Trial, fitted, rescored, search
 from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
 from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
 from rsea_ros.effects.catalogue import effect_named
@@ -64,6 +64,7 @@ def diagnose(records: Sequence[Record], rig: Rig, holdout: Record | None = None,
     """
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
+    rig = nominal_rig(rig)
     checked = [check(r, rig) for r in records]
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None
@@ -71,13 +72,20 @@ def diagnose(records: Sequence[Record], rig: Rig, holdout: Record | None = None,
     with ThreadPoolExecutor(2) as pool:
         found = search(cases, nominal, pool, tell)
         tell("judging", 0.95)
-        stages = list(pool.map(lambda m: _stage(found, m.solution, judging, rig), found.models))
+        stages = list(pool.map(lambda m: _stage(found, m, judging, rig), found.models))
     return _conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig)
 
 
-def _stage(found: Search, solution: Solution, judging: Checked | None, rig: Rig) -> Stage:
+def nominal_rig(rig: Rig) -> Rig:
+    """Return the rig with only those of its effects whose parameters are all known: the others are to be found."""
+    known = (e for e in rig.effects if all(f"{e.name}.{p}" in rig.known for p in e.parameters))
+    return rig.with_effects(*known)
+
+
+def _stage(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> Stage:
     """Re-fit a model on all that does not judge, and judge it."""
-    model = fitted(found.cases, solution.problem, solution.theta, places=(*FIT, *CHOOSE))
+    start, weights = chosen.solution, rescored(found.cases, chosen).choose
+    model = fitted(found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights)
     problem = model.solution.problem
     train = score(problem, problem.cases, model.outputs)
     if judging is None:
@@ -155,10 +163,11 @@ def is_trusted(found: Search, first: Score, last: Score) -> bool:
     """Tell whether causes may be named although the floor is not reached.
 
     What is not in the catalogue often looks a little like something that is. A cause is named only if it
-    takes away half of the residual in every channel that misfits, and no other does as well.
+    takes away half of the residual in every channel that misfits, and nothing else does as well as the first.
     """
     falls = [last.ratio(n) / first.ratio(n) for n in first.sums if first.ratio(n) > MISFIT]
-    return bool(falls) and max(falls) < HALF and not any(found.rivals.values())
+    first_cause = found.last.causes[0]
+    return bool(falls) and max(falls) < HALF and not found.rivals.get(first_cause, ())
 
 
 def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:

@@ -22,6 +22,7 @@ _SPIKE = 12.0
 _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
 _SMALLEST_SHARE = 1e-3
+_SLOW = 0.25
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,8 @@ def _common(y: FloatArray, extreme: float) -> bool:
 def frozen(channel: Channel, name: str) -> BoolArray:
     """Return which samples repeat the one before more often than a quantum explains.
 
-    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then.
+    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then. A sensor
+    that repeats every other sample or more is slower than the log, which is no fault.
     """
     if name in ("command", "reference"):
         return np.zeros(len(channel), bool)
@@ -124,7 +126,8 @@ def frozen(channel: Channel, name: str) -> BoolArray:
         return repeat
     by_chance = float((moving < 1.5 * float(moving.min())).sum()) / 2.0
     surplus = float(repeat.sum()) - 1.5 * by_chance
-    return repeat if surplus > max(5.0, _SMALLEST_SHARE * len(channel)) else np.zeros(len(channel), bool)
+    is_fault = max(5.0, _SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
+    return repeat if is_fault else np.zeros(len(channel), bool)
 
 
 def while_others_moved(record: Record, name: str, repeat: BoolArray) -> BoolArray:

@@ -34,16 +34,11 @@ class Standing:
 
 def compare(model: Score, other: Score, extra_parameters: int = 0) -> Standing:
     """Hold a model against another. extra_parameters: how many more the model has."""
-    difference = other.loss - model.loss
-    price = 2.0 * extra_parameters * scale(model) / len(difference)
+    difference = other.loss(other) - model.loss(other)
+    price = 2.0 * extra_parameters / len(difference)
     means = bootstrap_means(difference - price)
     falls = [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
     return Standing(sure=bool(np.quantile(means, 0.025) > 0.0), matters=max(falls, default=0.0) > MATTERS)
-
-
-def scale(score: Score) -> float:
-    """Return the mean squared weighted residual of the worst channel: what one useless parameter gains."""
-    return max(1.0, max(score.ratio(n) for n in score.sums) ** 2)
 
 
 def bootstrap_means(values: FloatArray, seed: int = 0) -> FloatArray:

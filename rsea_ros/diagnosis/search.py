@@ -82,10 +82,16 @@ class Search:
         return self.models[-1]
 
 
-def fitted(cases: Sequence[Case], problem: Problem, theta: FloatArray | None, places: tuple[int, ...] = FIT,
-           iterations: int = _FIT_ITERATIONS) -> Model:  # fmt: skip
-    """Fit a problem's unknowns on some blocks of the cases."""
-    masked = replace(problem, cases=tuple(part(c, places) for c in cases))
+def fitted(
+    cases: Sequence[Case],
+    problem: Problem,
+    theta: FloatArray | None,
+    places: tuple[int, ...] = FIT,
+    iterations: int = _FIT_ITERATIONS,
+    weights: Score | None = None,
+) -> Model:
+    """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise."""
+    masked = replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
     solution = solve(masked, theta, iterations=iterations)
     moved = with_common_clock_in_delay(solution)
     if moved is not None:
@@ -111,6 +117,14 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     return theta
 
 
+def heavier(case: Case, weights: Score | None) -> Case:
+    """Return a case in which what a model leaves of a channel counts as its noise, where that is more."""
+    if weights is None:
+        return case
+    noise = {n: s * max(1.0, weights.ratio(n)) if n in weights.sums else s for n, s in case.noise.items()}
+    return replace(case, noise=noise)
+
+
 def as_model(cases: Sequence[Case], solution: Solution) -> Model:
     """Return a solution with its outputs and its score on the blocks that choose."""
     outputs = solution.problem.outputs(solution.theta)
@@ -121,7 +135,7 @@ def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell
     """Find the causes, most telling first. tell: progress (what is being tried, share done)."""
     models = [fitted(cases, nominal, None, iterations=25)]
     cases = requieted(cases, models[0])
-    models = [fitted(cases, nominal, models[0].solution.theta)]
+    models = [refitted(cases, models[0])]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
     for number in range(MOST_CAUSES):
@@ -133,11 +147,16 @@ def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell
             break
         equals[accepted.causes[-1]] = rivals
         quieter = requieted(cases, accepted)
-        accepted = fitted(quieter, accepted.solution.problem, accepted.solution.theta)
+        accepted = refitted(quieter, accepted)
         models = [*(rescored(quieter, m) for m in models), accepted]
         cases = quieter
     tell("looking for a simpler model", 0.9)
     return sequenced(with_simpler(without_needless(Search(cases, tuple(models), tuple(trials), equals))))
+
+
+def refitted(cases: Sequence[Case], model: Model) -> Model:
+    """Fit a model again with each channel in units of what the model leaves of it."""
+    return fitted(cases, model.solution.problem, model.solution.theta, weights=rescored(cases, model).choose)
 
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
@@ -153,7 +172,7 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
     """
     effects = [e for n, e in catalogue().items() if n not in present.causes]
     rig, outputs = present.solution.problem.rig, present.outputs[0]
-    pieces = tuple(w for c in cases for w in windows_of(c))
+    pieces = tuple(heavier(w, present.choose) for c in cases for w in windows_of(c))
     there = linearised(
         *without_clocks(replace(present.solution.problem, cases=pieces), present.solution.theta)
     )
@@ -169,11 +188,9 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
 
     def fit_all(h: Hypothesis) -> Model:
         tell(f"round {number + 1}: fitting {h.name} on everything", _share(number, 0.8))
-        return fitted(
-            cases,
-            *with_clocks(replace(h.problem, cases=cases), h.theta, present.solution.problem),
-            iterations=_FULL_ITERATIONS,
-        )
+        problem, theta = with_clocks(replace(h.problem, cases=cases), h.theta, present.solution.problem)
+        first = fitted(cases, problem, theta, iterations=_FULL_ITERATIONS, weights=present.choose)
+        return refitted(cases, first)
 
     screened = sorted(
         (h for h in pool.map(try_one, range(len(effects))) if h is not None), key=lambda h: h.cost
@@ -185,7 +202,7 @@ def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Execut
     ]
     models = list(pool.map(fit_all, finalists))
     better = [m for m in models if is_progress(m, present)]
-    chosen, rivals = choose(better)
+    chosen, rivals = choose(better, present.choose)
     accepted, final = {id(m) for m in better}, {h.name for h in finalists}
     trials = [
         Trial(h.name, number, None, "far behind the best on the data that it was fitted to")
@@ -226,7 +243,7 @@ def is_progress(model: Model, present: Model) -> bool:
     return fall > ENOUGH or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
 
 
-def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[Model, ...]]:
+def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
     Of all that are not surely and materially worse than the best, the simplest; of equals, the one that
@@ -234,7 +251,7 @@ def choose(models: Sequence[Model]) -> tuple[Model | None, tuple[Model, ...]]:
     """
     if not models:
         return None, ()
-    best = min(models, key=lambda m: float(m.choose.loss.sum()))
+    best = min(models, key=lambda m: float(m.choose.loss(present).sum()))
     contenders = [m for m in models if m is best or not compare(best.choose, m.choose).better]
     simplest = min(contenders, key=lambda m: (m.parameters, prior_cost(m.solution) + loss_excess(m, best)))
     rivals = tuple(m for m in contenders if m is not simplest and m.parameters <= simplest.parameters)
@@ -254,10 +271,8 @@ def prior_cost(solution: Solution) -> float:
 
 
 def loss_excess(model: Model, best: Model) -> float:
-    """Return how much more a model loses than the best on the blocks that choose, in units of its scale."""
-    return float(model.choose.loss.sum() - best.choose.loss.sum()) / max(
-        1.0, max(best.choose.ratio(n) for n in best.choose.sums) ** 2
-    )
+    """Return how much more a model loses than the best on the blocks that choose, in units of the best's own."""
+    return float(model.choose.loss(best.choose).sum() - best.choose.loss(best.choose).sum())
 
 
 def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
@@ -338,21 +353,23 @@ def _changed(cases: Sequence[Case], model: Model, name: str, rival: str | None =
         model.solution.theta[keep],
     )
     if rival is None:
-        return fitted(cases, smaller, theta)
+        return fitted(cases, smaller, theta, weights=model.choose)
     old, new = effect_named(name).main, effect_named(rival)
     start = new.typical | (
         {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
     )
     larger = extended_problem(smaller, new, start)
-    return fitted(cases, larger, np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]]))
+    beginning = np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]])
+    return fitted(cases, larger, beginning, weights=model.choose)
 
 
 def _trial(model: Model, number: int, was_better: bool, chosen: Model | None) -> Trial:
     name = model.causes[-1]
     if chosen is None or not was_better:
         return Trial(name, number, model, "does not lower the residual of data that it was not fitted to")
-    if model.parameters > chosen.parameters and float(model.choose.loss.sum()) < 1.02 * float(
-        chosen.choose.loss.sum()
+    if (
+        model.parameters > chosen.parameters
+        and loss_excess(model, chosen) < 0.02 * chosen.choose.loss(chosen.choose).sum()
     ):
         return Trial(name, number, model, f"no better than {chosen.causes[-1]}, which is simpler")
     return Trial(name, number, model, f"{chosen.causes[-1]} explains more")

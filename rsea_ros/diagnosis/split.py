@@ -39,10 +39,14 @@ class Score:
     sums: dict[str, FloatArray]
     counts: dict[str, FloatArray]
 
-    @property
-    def loss(self) -> FloatArray:
-        """Sum over the channels of each block, shape (blocks,)."""
-        return np.asarray(np.sum(list(self.sums.values()), axis=0))
+    def loss(self, against: Score) -> FloatArray:
+        """Return the loss of each block beside another model's, shape (blocks,).
+
+        Every channel counts in units of what the other model leaves of it, or of its noise where that is more
+        (maximum likelihood with unknown noise): no channel's fine sensor drowns the others.
+        """
+        scaled = [s / max(1.0, against.ratio(n)) ** 2 for n, s in self.sums.items()]
+        return np.asarray(np.sum(scaled, axis=0))
 
     def ratio(self, channel: str) -> float:
         """RMS of the residual over the noise of a channel."""
