@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 
 from rsea_ros.hardware.device import State, Wrench
-from rsea_ros.hardware.dynamixel.motor import Motor, patient
+from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
 from rsea_ros.hardware.limits import Limits, check_limits
 from rsea_ros.hardware.netft.sensor import Sensor
@@ -38,7 +38,7 @@ class DynamixelNetft:
         try:
             self._motor.open()
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
-            self.origin = patient(self._motor.read).position
+            self.origin = self._motor.patiently(self._motor.read).position
             if self._sensor is not None:
                 self._sensor.open()
         except Exception:

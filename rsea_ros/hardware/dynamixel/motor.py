@@ -17,7 +17,8 @@ from rsea_ros.hardware.dynamixel.tables import TABLES, ControlTable, Item, error
 from rsea_ros.hardware.supervised import Supervisor
 
 T = TypeVar("T")
-ATTEMPTS = 5
+ATTEMPTS, PATIENCE = 5, 0.02
+"""Of a transaction outside the cycle: how often it is tried, and how late a reply may be each time, s."""
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
 RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
@@ -78,13 +79,13 @@ class Motor:
     def open(self) -> None:
         """Open the port, check who answers, switch the torque off, set torque mode, read the limit."""
         self._port.open()
-        self.table = table = _table(patient(self.bus.ping), self._settings)
+        self.table = table = _table(self.patiently(self.bus.ping), self._settings)
         self._put(table.status_level, ACKNOWLEDGE_ALL)
         self._stop()
-        self._port.return_delay = RETURN_DELAY_UNIT * patient(lambda: self.bus.get(table.return_delay))
-        if patient(lambda: self.bus.get(table.operating_mode)) != TORQUE_MODE:
+        self._port.return_delay = RETURN_DELAY_UNIT * self.patiently(lambda: self.bus.get(table.return_delay))
+        if self.patiently(lambda: self.bus.get(table.operating_mode)) != TORQUE_MODE:
             self._put(table.operating_mode, TORQUE_MODE)
-        limit = patient(lambda: self.bus.get(table.torque_limit))
+        limit = self.patiently(lambda: self.bus.get(table.torque_limit))
         self.torque_limit = limit * table.ampere * self._settings.torque_constant
         if table.bus_watchdog is None:
             self._supervisor = Supervisor(
@@ -148,18 +149,18 @@ class Motor:
     def recover(self) -> None:
         """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
         try:
-            patient(self.bus.ping)
+            self.patiently(self.bus.ping)
         except DeviceError:
             self.close()
             self.open()
-        error = patient(lambda: self.bus.get(self._known.hardware_error))
+        error = self.patiently(lambda: self.bus.get(self._known.hardware_error))
         if error:
             raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
 
     def reboot(self) -> None:
         """Reboot the motor and set it up again. Raises DeviceError when it does not come back."""
         self.disable()
-        patient(self.bus.reboot)
+        self.patiently(self.bus.reboot)
         deadline = time.monotonic() + BOOT_TIME
         while True:
             time.sleep(BOOT_POLL)
@@ -204,8 +205,16 @@ class Motor:
             for item in (table.goal_torque, table.torque_enable)
         ]
 
+    def patiently(self, transaction: Callable[[], T]) -> T:
+        """Return what a transaction outside the cycle returns: it has time for several attempts."""
+        usual, self._port.latency = self._port.latency, max(self._port.latency, PATIENCE)
+        try:
+            return _patient(transaction)
+        finally:
+            self._port.latency = usual
+
     def _put(self, item: Item, value: int) -> None:
-        patient(lambda: self.bus.put(item, value))
+        self.patiently(lambda: self.bus.put(item, value))
 
 
 def _table(model: int, settings: Settings) -> ControlTable:
@@ -218,7 +227,7 @@ def _table(model: int, settings: Settings) -> ControlTable:
     return TABLES[model]
 
 
-def patient(transaction: Callable[[], T]) -> T:
+def _patient(transaction: Callable[[], T]) -> T:
     """Return what a transaction returns, tried again when a reply is lost."""
     for _ in range(ATTEMPTS - 1):
         try:
