@@ -1,1 +1,1 @@
-"""What a simulation gets wrong, why, the extended model, and the gain: the scientific method, one file a verb."""
+"""What a simulation gets wrong, why, the extended model, and the gain: one file a verb."""

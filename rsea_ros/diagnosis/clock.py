@@ -34,7 +34,7 @@ def _expected_span(record: Record, name: str) -> float:
 
 
 def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channel, list[Fault]]:
-    """Take out steps of the clock: intervals that go back, or that make the channel longer than the others."""
+    """Take out steps of the clock: intervals that go back, or make the channel longer than the others."""
     step = np.diff(channel.t)
     period = float(np.median(step))
     back = step < -0.5 * period

@@ -1,6 +1,8 @@
-"""Where a model and the data part: by frequency, amplitude, speed, time and rotor angle, each against the noise."""
+"""Where a model and the data part: by frequency, amplitude, speed, time, angle, against the noise."""
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 from scipy import signal
@@ -36,7 +38,7 @@ def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str
     white = noise**2 / (0.5 * rate)
     edges = np.geomspace(max(frequency[1], 0.5), 0.5 * rate, 3 * 8 + 1)
     bands = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         inside = (frequency >= low) & (frequency < high)
         if inside.any():
             bands.append(

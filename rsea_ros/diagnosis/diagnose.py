@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from rsea_ros.diagnosis.search import Model, Search, Trial, fitted, rescored, se
 from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
 from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import confidence_of, what_is_not_told
 from rsea_ros.identification.identify import (
     CHANNELS,
@@ -56,7 +58,9 @@ class Stage:
     judged: Score
 
 
-def diagnose(records: Sequence[Record], rig: Rig, holdout: Record | None = None, progress: Progress | None = None) -> Diagnosis:  # fmt: skip
+def diagnose(
+    records: Sequence[Record], rig: Rig, holdout: Record | None = None, progress: Progress | None = None
+) -> Diagnosis:
     """Say where a rig's simulation and the records part, why, and what extending the model gains.
 
     holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
@@ -77,7 +81,7 @@ def diagnose(records: Sequence[Record], rig: Rig, holdout: Record | None = None,
 
 
 def nominal_rig(rig: Rig) -> Rig:
-    """Return the rig with only those of its effects whose parameters are all known: the others are to be found."""
+    """Return the rig with only those of its effects whose parameters are all known; others are to be found."""
     known = (e for e in rig.effects if all(f"{e.name}.{p}" in rig.known for p in e.parameters))
     return rig.with_effects(*known)
 
@@ -98,13 +102,19 @@ def _stage(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> S
     )
 
 
-def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig) -> Diagnosis:  # fmt: skip
-    channel = next(n for n in PRIMARY if n in stages[0].judged.sums)
+def _conclusion(
+    found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig
+) -> Diagnosis:
+    channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
+    if channel is None:
+        raise IdentificationError(
+            f"{records[0].source}: no sample is left to judge by, expected a longer record"
+        )
     verdict = _verdict(found, stages)
     if verdict == "unexplained":
         stages = stages[:1]
     first, last = stages[0], stages[-1]
-    causes = tuple(_cause(found, a, b, last, channel) for a, b in zip(stages[:-1], stages[1:], strict=True))
+    causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
     named = [c.name for c in causes]
     confidence, case = confidence_of(first.solution), found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
@@ -137,6 +147,7 @@ def _conclusion(found: Search, stages: list[Stage], checked: Sequence[Checked], 
         ),
         next_experiment=_next_experiment(found, stages, verdict, records[0]),
         remaining=misfits(case, last.outputs[0], channel, rig),
+        masked=checked[0].masked,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
@@ -174,9 +185,13 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
     setting = with_it.solution.problem.rig.effects[-1]
     effect = effect_named(setting.name)
-    speaks = channel if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel) else max(
-        without.judged.sums, key=lambda n: without.judged.ratio(n) / max(with_it.judged.ratio(n), 1e-12)
-    )  # fmt: skip
+    speaks = (
+        channel
+        if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel)
+        else max(
+            without.judged.sums, key=lambda n: without.judged.ratio(n) / max(with_it.judged.ratio(n), 1e-12)
+        )
+    )
     held_out, interval = gain(with_it.judged, without.judged, speaks)
     train, _ = gain(with_it.train, without.train, speaks)
     estimates = {

@@ -6,6 +6,7 @@ that (one linearised step), and what it cannot follow is held against the sensor
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -38,14 +39,20 @@ class Candidate:
     @property
     def cost(self) -> float:
         """What it asks of the bench: amplitude first, then bandwidth."""
-        return self.relative * (1.0 + 0.1 * np.log10(self.high / self.low))
+        return self.relative * (1.0 + 0.1 * math.log10(self.high / self.low))
 
 
 CANDIDATES = tuple(
     Candidate(kind, relative, low, high)
     for relative in (0.25, 0.5, 1.0, 1.5)
-    for kind, low, high in (("steps", 0.1, 10.0), ("multisine", 0.1, 5.0), ("multisine", 2.0, 60.0), ("multisine", 20.0, 120.0), ("chirp", 0.05, 120.0))
-)  # fmt: skip
+    for kind, low, high in (
+        ("steps", 0.1, 10.0),
+        ("multisine", 0.1, 5.0),
+        ("multisine", 2.0, 60.0),
+        ("multisine", 20.0, 120.0),
+        ("chirp", 0.05, 120.0),
+    )
+)
 
 
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
@@ -69,15 +76,24 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
 
 
 def _worded(cause: str, names: str, told: float, best: Candidate, present: float) -> Experiment:
-    run: dict[str, float | str] = {"kind": best.kind, "amplitude": round(best.relative * present, 3), "unit": "N m",
-                                   "low": best.low, "high": best.high, "duration": _DURATION, "separation_times_noise": round(told, 3)}  # fmt: skip
+    run: dict[str, float | str] = {
+        "kind": best.kind,
+        "amplitude": round(best.relative * present, 3),
+        "unit": "N m",
+        "low": best.low,
+        "high": best.high,
+        "duration": _DURATION,
+        "separation_times_noise": round(told, 3),
+    }
     if told > _ENOUGH:
         return Experiment(
-            f"{cause} and {names} do as well on these data; this run makes them differ by {told:.1f} times the noise",
+            f"{cause} and {names} do as well on these data; "
+            f"this run makes them differ by {told:.1f} times the noise",
             run,
         )
     return Experiment(
-        f"{cause} and {names} make the same motion under every excitation tried (at most {told:.2f} times the noise apart): "
+        f"{cause} and {names} make the same motion under every excitation tried "
+        f"(at most {told:.2f} times the noise apart): "
         "only a value measured apart tells them, such as the spring stiffness by a known weight",
         run,
     )
@@ -97,8 +113,16 @@ def _separation(
 
 def _played(accepted: Solution, candidate: Candidate, amplitude: float, rate: float) -> Case:
     """Return a case whose measurements are the accepted model's own, without noise."""
-    settings = Settings(rate=rate, duration=_DURATION, amplitude=0.5 * amplitude, noise=0.2 * amplitude, low=candidate.low,
-                        high=min(candidate.high, 0.45 * rate), period=4.0, seed=7)  # fmt: skip
+    settings = Settings(
+        rate=rate,
+        duration=_DURATION,
+        amplitude=0.5 * amplitude,
+        noise=0.2 * amplitude,
+        low=candidate.low,
+        high=min(candidate.high, 0.45 * rate),
+        period=4.0,
+        seed=7,
+    )
     values = excitation(candidate.kind, settings)
     values = values * min(1.0, amplitude / float(np.max(np.abs(values))))
     t = np.arange(len(values)) / rate
@@ -117,7 +141,7 @@ def _played(accepted: Solution, candidate: Candidate, amplitude: float, rate: fl
 
 
 def _left_over(problem: Problem, theta: FloatArray) -> float:
-    """Return the RMS of the weighted residual of the worst channel after one linearised step of all unknowns."""
+    """Return the RMS of the worst channel's weighted residual after one linearised step of all unknowns."""
     outputs = problem.outputs(theta)
     residual = problem.residual_of(outputs)
     matrix = jacobian(problem, theta, residual)
@@ -137,7 +161,8 @@ def amplitude_series(amplitude: float) -> Experiment:
     """Return the run that says of an unexplained residual whether it grows with the amplitude."""
     why = (
         "nothing in the catalogue explains the residual: repeat at half the amplitude with an odd multisine, "
-        "whose empty lines show distortion apart from noise; what scales with the command is linear, what does not is friction-like"
+        "whose empty lines show distortion apart from noise; "
+        "what scales with the command is linear, what does not is friction-like"
     )
     return Experiment(
         why,

@@ -83,7 +83,7 @@ def outliers(channel: Channel, name: str) -> BoolArray:
 
 
 def clipping(channel: Channel, name: str) -> BoolArray:
-    """Return which samples lie at exactly the largest or smallest value, if that is where many do in a row."""
+    """Return which samples lie at exactly the largest or smallest value, where many do in a row."""
     bad = np.zeros(len(channel), bool)
     if name in ("command", "reference", "motor_torque"):
         return bad
@@ -131,7 +131,7 @@ def frozen(channel: Channel, name: str) -> BoolArray:
 
 
 def while_others_moved(record: Record, name: str, repeat: BoolArray) -> BoolArray:
-    """Return the repeats at which another sensor shows motion: a sensor that stands still with the machine is well.
+    """Return the repeats while another sensor moved: a sensor that stands still with the machine is well.
 
     Half of all samples move by more than the median; where a machine sticks few do.
     """

@@ -45,7 +45,7 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
 def _mode_hints(
     effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]
 ) -> list[dict[str, float]]:
-    """Return starts of a part on a spring of its own whose mode, with the actuator's spring, is at a peak of the residual."""
+    """Return starts of a part on a spring of its own, its mode at a peak of the residual."""
     if rig.rigid_spring:
         return []
     channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
@@ -131,7 +131,7 @@ def _cycle_hints(case: Case, rig: Rig) -> list[dict[str, float]]:
 
 
 def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None:
-    """Return the measured position (rad) and the torque that the nominal model lacks to explain the motion, N m.
+    """Return the measured position (rad) and the torque that the nominal model lacks for the motion, N m.
 
     J_m a + b_m v + T - T_m with all but the command measured; None without a position, or for a free housing.
     """
@@ -154,7 +154,7 @@ def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None
     )
     acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
     steps = np.clip(((t[1:-1] - case.start) / case.drive.step).astype(int), 0, len(case.drive.command) - 1)
-    width = max(1, int(round(float(np.median(np.diff(t))) / case.drive.step)))
+    width = max(1, round(float(np.median(np.diff(t))) / case.drive.step))
     around = np.convolve(case.drive.command, np.ones(2 * width) / (2 * width), mode="same")[steps]
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
     torque = inertia * acceleration + rig["rotor.reflected_damping"] * v[1:-1] + load[1:-1] - around

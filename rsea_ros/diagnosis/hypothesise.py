@@ -43,7 +43,7 @@ def extended_problem(present: Problem, effect: Effect, start: dict[str, float]) 
 
 
 def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
-    """Return the best of an effect's starts after two cheap steps; None when the rig cannot have the effect."""
+    """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have."""
     best: Hypothesis | None = None
     for start in starts:
         try:

@@ -1,4 +1,4 @@
-"""The search: from the re-fitted nominal model, cause after cause, to the noise floor or to where nothing helps.
+"""The search: from the re-fitted nominal model, cause after cause, to the noise floor or until nothing helps.
 
 A model is fitted on FIT blocks and chosen on CHOOSE blocks; JUDGE blocks are not looked at here.
 """
@@ -101,7 +101,7 @@ def fitted(
 
 
 def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock error that all sensors share turned into delay of the command, as it may be.
+    """Return theta with the clock error that all sensors share turned into delay of the command.
 
     Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
     rest in the clocks. None for a model without a delay.
@@ -114,7 +114,7 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     common = float(np.mean(theta[clocks]))
     theta[clocks] -= common
     theta[names.index(DELAY)] -= common
-    return theta
+    return np.asarray(theta)
 
 
 def heavier(case: Case, weights: Score | None) -> Case:
@@ -165,7 +165,9 @@ def at_floor(model: Model, cases: Sequence[Case]) -> bool:
     return all(standing.ratio(n) < AT_FLOOR for n in standing.sums)
 
 
-def one_round(cases: tuple[Case, ...], present: Model, number: int, pool: Executor, tell: Tell) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:  # fmt: skip
+def one_round(
+    cases: tuple[Case, ...], present: Model, number: int, pool: Executor, tell: Tell
+) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
     """Try every effect that is not in the model; return the one to accept, all trials, and its equal rivals.
 
     All are screened and the promising fitted on short pieces; the best of those are fitted on all that fits.
@@ -236,7 +238,7 @@ def _share(number: int, within: float) -> float:
 
 
 def is_progress(model: Model, present: Model) -> bool:
-    """Tell whether a model is surely better, and by enough: a tenth of some channel's residual, or all that is left."""
+    """Tell whether a model is surely better, and by enough: a tenth of a channel's residual, or all of it."""
     if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
         return False
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
@@ -271,12 +273,12 @@ def prior_cost(solution: Solution) -> float:
 
 
 def loss_excess(model: Model, best: Model) -> float:
-    """Return how much more a model loses than the best on the blocks that choose, in units of the best's own."""
+    """Return how much more a model loses than the best on the blocks that choose, in the best's units."""
     return float(model.choose.loss(best.choose).sum() - best.choose.loss(best.choose).sum())
 
 
 def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
-    """Return the cases with the noise lowered where a model's residual shows that it is less than thought."""
+    """Return the cases with the noise lowered where a model's residual shows that it is less."""
     return tuple(
         _requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True)
     )

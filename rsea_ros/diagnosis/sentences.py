@@ -15,17 +15,28 @@ _CHANNELS = {
 }
 
 
-def verdict_sentence(verdict: Verdict, causes: Sequence[Cause], channel: str, before: float, after: float, faults: Sequence[Fault]) -> str:  # fmt: skip
+def verdict_sentence(
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    channel: str,
+    before: float,
+    after: float,
+    faults: Sequence[Fault],
+) -> str:
     """Return the verdict as one sentence. before, after: held-out residual over noise."""
     name, data = _CHANNELS[channel], _data(faults)
     named = " and ".join(c.name.replace("_", " ") for c in causes)
+    fall = f"the {name} residual falls from {before:.1f} to"
     if verdict == "nothing_wrong":
-        return f"Nothing is wrong with the model: with its values re-fitted the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
+        return (
+            f"Nothing is wrong with the model: with its values re-fitted the {name} residual "
+            f"is at the noise floor ({after:.2f} times the noise).{data}"
+        )
     if verdict == "unexplained":
-        return f"The {name} residual is {before:.1f} times the noise, and nothing in the catalogue explains it.{data}"
+        return f"The {name} residual is {before:.1f} times the noise; no known effect explains it.{data}"
     if verdict == "explained":
-        return f"{named.capitalize()}: with it the {name} residual falls from {before:.1f} to {after:.2f} times the noise, which is the floor.{data}"
-    return f"{named.capitalize()} explains part: the {name} residual falls from {before:.1f} to {after:.1f} times the noise; the rest is unexplained.{data}"
+        return f"{named.capitalize()}: with it {fall} {after:.2f} times the noise, which is the floor.{data}"
+    return f"{named.capitalize()} explains part: {fall} {after:.1f} times the noise; the rest is open.{data}"
 
 
 def evidence_of(effect: Effect, channel: str, before: float, after: float, gain: float) -> str:

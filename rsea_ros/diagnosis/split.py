@@ -1,7 +1,6 @@
 """Which samples fit, which choose, which judge: blocks of time that no two of these share.
 
-The pattern of four blocks is fit, fit, choose, judge; with a held-out bag it is fit, fit, choose on the bag(s)
-and all of the held-out one judges.
+The pattern of four blocks is fit, fit, choose, judge. With a held-out bag all of that judges instead.
 """
 
 from __future__ import annotations
@@ -67,8 +66,8 @@ def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, Flo
             keep = case.mask[n]
             weighted = ((out[n] - case.measured[n]) / case.noise[n])[keep] ** 2
             where = blocks_of(case, n)[keep]
-            sums[n].append(np.bincount(where, weighted, length)[:length])
-            counts[n].append(np.bincount(where, minlength=length)[:length].astype(float))
+            sums[n].append(np.asarray(np.bincount(where, weighted, length)[:length], dtype=np.float64))
+            counts[n].append(np.bincount(where, minlength=length)[:length].astype(np.float64))
     all_sums = {n: np.concatenate(parts) for n, parts in sums.items()}
     all_counts = {n: np.concatenate(parts) for n, parts in counts.items()}
     used = np.sum(list(all_counts.values()), axis=0) > 0
