@@ -81,7 +81,7 @@ def diagnose(
 
 
 def nominal_rig(rig: Rig) -> Rig:
-    """Return the rig with only those of its effects whose parameters are all known; others are to be found."""
+    """Return the rig with only those of its effects whose parameters are all known."""
     known = (e for e in rig.effects if all(f"{e.name}.{p}" in rig.known for p in e.parameters))
     return rig.with_effects(*known)
 

@@ -199,12 +199,17 @@ def one_round(
     )
     worth = [h for h in screened if h.cost < there.cost][:_FITS_ON_PIECES]
     close = sorted(pool.map(fit_pieces, worth), key=lambda h: h.cost)
+    rivals = close[0].effect.claims.confusable_with if close else ()
+    unheard = [h for h in screened if h.name in rivals and not any(h.name == w.name for w in close)]
+    unheard = [*unheard, *(h for h in close[_FULL_FITS:] if h.name in rivals)]
     finalists = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost][
         : 2 * _FULL_FITS
     ]
+    heard = {h.name for h in finalists}
+    finalists += [h for h in pool.map(fit_pieces, unheard) if h.name not in heard]
     models = list(pool.map(fit_all, finalists))
     better = [m for m in models if is_progress(m, present)]
-    chosen, rivals = choose(better, present.choose)
+    chosen, equals = choose(better, present.choose)
     accepted, final = {id(m) for m in better}, {h.name for h in finalists}
     trials = [
         Trial(h.name, number, None, "far behind the best on the data that it was fitted to")
@@ -212,7 +217,7 @@ def one_round(
         if h.name not in final
     ]
     trials += [_trial(m, number, id(m) in accepted, chosen) for m in models if m is not chosen]
-    return chosen, trials, rivals
+    return chosen, trials, equals
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
