@@ -128,7 +128,7 @@ def _initial(record: Record) -> tuple[float, float]:
 
 
 def _moved(y: FloatArray) -> bool:
-    return bool(abs(y[0]) > max(AT_REST * np.std(y), np.max(np.abs(np.diff(y)))))
+    return bool(abs(y[0]) >= max(AT_REST * np.std(y), np.max(np.abs(np.diff(y)))))
 
 
 def _in_steps(t: FloatArray, start: float, step: float) -> FloatArray:

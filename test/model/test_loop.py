@@ -9,7 +9,6 @@ import pytest
 import slow
 from scipy.linalg import expm
 
-from rsea_ros.errors import ChannelError
 from rsea_ros.model.rig import Controller
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import simulate
@@ -80,9 +79,11 @@ def test_without_a_controller_the_reference_does_nothing():
     )
 
 
-def test_a_loop_needs_the_motor_torque():
-    record = record_of(np.zeros(len(T)))
-    channels = {n: c for n, c in record.channels.items() if n != "motor_torque"}
+def test_without_a_measured_motor_torque_nothing_but_the_loop_acts():
+    record = record_of(np.sin(T))
+    same = record.with_channels(motor_torque=record["command"])
+    without = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     rig = replace(load_rig("bare_drive"), controller=Controller(8.0, 20.0))
-    with pytest.raises(ChannelError, match="bag: no channel 'motor_torque'"):
-        simulate(rig, replace(record, channels=channels))
+    expected = simulate(rig, same)
+    for name, values in simulate(rig, without).items():
+        np.testing.assert_array_equal(values, expected[name])
