@@ -9,8 +9,8 @@ from math import nan, prod
 
 from diagnosis_cases import Case
 from independent.hidden import MAIN_PARAMETER
-from rsea_ros.diagnosis.diagnose import diagnose
 
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig import Rig

@@ -13,8 +13,8 @@ import pytest
 from independent.bench import drawn_bench, record_run
 from independent.hidden import MAIN_PARAMETER, hide
 from independent.severities import SIZES, drawn_parameters
-from rsea_ros.diagnosis.diagnose import diagnose
 
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
