@@ -223,7 +223,7 @@ def as_nobody(*arguments: str | Path, once: tuple[str | Path, ...] = ()) -> subp
 
 
 def reachable(folder: Path) -> None:
-    for one in (folder, *folder.parents[:2]):
+    for one in (folder, *folder.parents[:-2]):
         one.chmod(0o755)
 
 

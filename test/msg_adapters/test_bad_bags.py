@@ -156,7 +156,7 @@ def test_a_reader_without_permission(tmp_path):
     (bag / "bag.mcap").chmod(0)
     load = "import os, sys; from msg_adapters import read_record"
     as_nobody = f"{load}; os.geteuid() or os.seteuid(65534); read_record(sys.argv[1])"
-    for directory in (tmp_path, *tmp_path.parents[:2], bag):
+    for directory in (bag, tmp_path, *tmp_path.parents[:-2]):
         directory.chmod(0o755)
     done = subprocess.run(
         [sys.executable, "-c", as_nobody, str(bag)],
