@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import slow
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_rigs import RIG_NAMES, WITH_SPRING, rigs
 from scipy.linalg import expm
@@ -78,6 +78,8 @@ def held_response(rig, output, hz):
 @settings(max_examples=20)
 @given(rigs(), st.integers(0, 1000))
 def test_simulated_record_has_the_frequency_response_of_the_equations(rig, seed):
+    # A sensor at the housing feels the motor torque at once: at a jump of the command its sample is ambiguous.
+    assume(rig.ft_end == "spring_end")
     command = multisine(rig, seed)
     measured = simulate(rig, uniform(command))
     hz = LINES * RATE / PERIOD
