@@ -86,7 +86,7 @@ def test_simulated_record_has_the_frequency_response_of_the_equations(rig, seed)
     late = np.exp(2j * np.pi * hz / RATE)  # the measurement is at the end of the hold
     asked = np.fft.rfft(command[-PERIOD:])[LINES]
     for name in set(signals_of(rig)) - {"velocity"}:
-        output = outputs.position() if name == "position" else outputs.end_torque(rig, "spring_end")
+        output = outputs.position() if name == "position" else outputs.end_torque(rig, rig.ft_end)
         expected = held_response(rig, output, hz) * late
         simulated = np.fft.rfft(measured[name][-PERIOD:])[LINES] / asked
         np.testing.assert_allclose(simulated, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
