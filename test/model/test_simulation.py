@@ -78,7 +78,7 @@ def held_response(rig, output, hz):
 @settings(max_examples=20)
 @given(rigs(), st.integers(0, 1000))
 def test_simulated_record_has_the_frequency_response_of_the_equations(rig, seed):
-    # A sensor at the housing feels the motor torque at once: at a jump of the command its sample is ambiguous.
+    # At the housing the F/T feels the motor torque at once: its sample at a jump is ambiguous.
     assume(rig.ft_end == "spring_end")
     command = multisine(rig, seed)
     measured = simulate(rig, uniform(command))
