@@ -151,9 +151,9 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
         fall = (cost - trial_cost) / cost
         theta, residual, cost = trial, trial_residual, trial_cost
         damping = max(damping / 10.0, 1e-10)
-        matrix = jacobian(problem, theta, residual, run)
-        if fall < gain:
+        if fall < gain:  # a step too small to change the derivatives
             break
+        matrix = jacobian(problem, theta, residual, run)
     return Solution(problem, theta, residual, matrix, cost)
 
 
