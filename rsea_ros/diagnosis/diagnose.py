@@ -91,7 +91,7 @@ def _stage(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> S
     start, weights = chosen.solution, rescored(found.cases, chosen).choose
     model = fitted(found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights)
     problem = model.solution.problem
-    train = score(problem, problem.cases, model.outputs)
+    train = score(problem, tuple(part(c, (*FIT, *CHOOSE)) for c in found.cases), model.outputs)
     if judging is None:
         judges = tuple(part(c, JUDGE) for c in found.cases)
         return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))

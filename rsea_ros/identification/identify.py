@@ -85,7 +85,7 @@ def fit(cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = 
     """
     unknowns = unknowns_of(rig, cases)
     problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
-    solution = solve(problem, _better_start(problem, start), run=run)
+    solution = solve(problem, _better_start(problem, start, run), run=run)
     for _ in range(_REWEIGHTINGS):
         ratios = misfit_ratios(solution)
         if max(ratios.values()) < _MISFIT:
@@ -95,14 +95,14 @@ def fit(cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = 
     return solution
 
 
-def _better_start(problem: Problem, start: Rig | None) -> FloatArray:
+def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
     """Return the coordinates of `start` where the residual is smaller there than at the rig's own values."""
     own = start_vector(problem.unknowns)
     if start is None:
         return own
     values = start.values()
     other = np.array([u.inner(values.get(u.name, u.start)) for u in problem.unknowns])
-    costs = [float(r @ r) for r in (problem.residual(own), problem.residual(other))]
+    costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
     return other if costs[1] < costs[0] else own
 
 

@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem, simulated
 from rsea_ros.identification.unknowns import CLOCK, Unknown, apply, start_vector
@@ -21,6 +22,8 @@ _DIFFERENCE = 1e-4
 _CLOCK_DIFFERENCE = 1e-6
 """s. Sensors are read so much earlier and later for the derivatives by their clocks."""
 _SMALLEST_GAIN = 1e-6
+_SMALLEST_FALL = 0.5
+"""Of the cost: less than a standard deviation of one parameter, after which next to nothing is left."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,6 @@ class Solution:
         return {u.name: u.outer(float(t)) for u, t in zip(self.problem.unknowns, self.theta, strict=True)}
 
 
-Outputs = list[dict[str, FloatArray]]
 Map = Callable[[Callable[[int], FloatArray], Sequence[int]], Sequence[FloatArray]]
 
 
@@ -64,11 +66,9 @@ def jacobian_columns(
     """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta."""
 
     clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if _is_clock(problem.unknowns[i])}
-    rates = _rates(problem, theta) if clocks else []
+    others = [i for i in which if i not in clocks]
 
     def column(i: int) -> FloatArray:
-        if i in clocks:
-            return _clock_column(problem, rates, clocks[i])
         unknown = problem.unknowns[i]
         moved = theta.copy()
         step = _DIFFERENCE * unknown.scale
@@ -77,7 +77,33 @@ def jacobian_columns(
         slope: FloatArray = (problem.residual(moved) - residual) / (moved[i] - theta[i])
         return slope
 
-    return np.column_stack(list(run(column, which))) if len(which) else np.empty((len(residual), 0))
+    columns = dict(zip(others, run(column, others), strict=True))
+    if clocks:
+        later, earlier = run(lambda sign: _read_later(problem, theta, sign * _CLOCK_DIFFERENCE), (1, -1))
+        rate, channel = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE), _channel_of_rows(problem)
+        columns |= {i: np.where(channel == problem.channels.index(n), rate, 0.0) for i, n in clocks.items()}
+    return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
+
+
+def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray:
+    """Return the weighted residuals with every sensor read `delay` s later than it was."""
+    rig, offsets = apply(problem.rig, problem.unknowns, theta)
+    shifted = {n: offsets.get(n, 0.0) + delay for n in problem.channels}
+    return problem.residual_of(simulated(problem.cases, rig, shifted, ride=problem.ride))
+
+
+def _channel_of_rows(problem: Problem) -> npt.NDArray[np.int64]:
+    """Return by residual which channel it is of."""
+    rows = [
+        np.full(np.count_nonzero(case.mask[n]), problem.channels.index(n))
+        for case in problem.cases
+        for n in problem.present(case)
+    ]
+    return np.concatenate(rows)
+
+
+def _is_clock(unknown: Unknown) -> bool:
+    return unknown.name.startswith(CLOCK + ".")
 
 
 def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
@@ -88,35 +114,6 @@ def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
         step[i] = _CLOCK_DIFFERENCE if _is_clock(unknown) else _DIFFERENCE * unknown.scale
         columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
     return np.column_stack(columns)
-
-
-def _is_clock(unknown: Unknown) -> bool:
-    return unknown.name.startswith(CLOCK + ".")
-
-
-def _rates(problem: Problem, theta: FloatArray) -> Outputs:
-    """Return how fast every channel changes at its stamps, per s, from a little later and a little earlier.
-
-    The samples themselves are too far apart to be differentiated.
-    """
-    rig, offsets = apply(problem.rig, problem.unknowns, theta)
-    later, earlier = (
-        simulated(
-            problem.cases, rig, {n: offsets.get(n, 0.0) + shift for n in problem.channels}, ride=problem.ride
-        )
-        for shift in (_CLOCK_DIFFERENCE, -_CLOCK_DIFFERENCE)
-    )
-    span = 2.0 * _CLOCK_DIFFERENCE
-    return [{n: (b[n] - a[n]) / span for n in b} for a, b in zip(earlier, later, strict=True)]
-
-
-def _clock_column(problem: Problem, rates: Outputs, channel: str) -> FloatArray:
-    parts = []
-    for case, rate in zip(problem.cases, rates, strict=True):
-        for name in problem.present(case):
-            counted = rate[name][case.mask[name]] / case.noise[name]
-            parts.append(counted if name == channel else np.zeros(len(counted)))
-    return np.concatenate(parts)
 
 
 def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int = 25, run: Map = serial,
@@ -148,10 +145,10 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
             damping *= 30.0
         if not accepted:
             break
-        fall = (cost - trial_cost) / cost
+        enough = cost - trial_cost < max(gain * cost, _SMALLEST_FALL)
         theta, residual, cost = trial, trial_residual, trial_cost
         damping = max(damping / 10.0, 1e-10)
-        if fall < gain:  # a step too small to change the derivatives
+        if enough:  # and too small a step to change the derivatives
             break
         matrix = jacobian(problem, theta, residual, run)
     return Solution(problem, theta, residual, matrix, cost)
