@@ -1,0 +1,174 @@
+"""The conclusion: verdict, causes with sizes and gains, what was rejected, what is left, what to run next."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.compare import misfits, spectrum
+from rsea_ros.diagnosis.experiment import amplitude_series, separating
+from rsea_ros.diagnosis.faults import Checked
+from rsea_ros.diagnosis.judge import gain
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
+from rsea_ros.diagnosis.search import Search
+from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
+from rsea_ros.diagnosis.split import JUDGE, Score, part, score
+from rsea_ros.diagnosis.stages import Stage
+from rsea_ros.diagnosis.trial import Trial
+from rsea_ros.diagnosis.verdict import reached, verdict_of
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.confidence import confidence_of, what_is_not_told
+from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.unknowns import CLOCK_DOUBT
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Record
+
+MODEL_DOUBT = 0.0025
+"""Relative, one sigma: measured between the simulation and the second bench in test/independent."""
+PRIMARY = ("ft", "position", "motor_torque")
+"""The channel that gains and verdicts speak of: the first of these that is there."""
+
+
+def conclusion(
+    found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig
+) -> Diagnosis:
+    channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
+    if channel is None:
+        raise IdentificationError(
+            f"{records[0].source}: no sample is left to judge by, expected a longer record"
+        )
+    verdict = verdict_of(found, stages)
+    if verdict == "unexplained":
+        stages = stages[:1]
+    first, last = stages[0], stages[-1]
+    causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
+    named = {c.name for c in causes}
+    rejected = [_rejected(t, found.cases, channel) for t in _latest(found.trials) if t.name not in named]
+    confidence, case = confidence_of(first.solution), found.cases[0]
+    faults = tuple(f for c in checked for f in c.faults)
+    where = misfits(case, first.outputs[0], channel, rig)
+    return Diagnosis(
+        verdict=verdict,
+        sentence=verdict_sentence(
+            verdict, causes, channel, first.judged.ratio(channel), last.judged.ratio(channel), faults
+        ),
+        rig_name=rig.name,
+        sources=tuple(r.source for r in records),
+        duration=sum(r.stop - r.start for r in records),
+        rate=records[0]["command"].rate,
+        faults=faults,
+        baseline_rig=identified_rig(first.solution, confidence),
+        baseline=parameters_of(first.solution, confidence),
+        extended_rig=identified_rig(last.solution, confidence_of(last.solution)),
+        noise_rms=dict(case.noise),
+        residual_rms=_rms(first.judged, case),
+        fit_percent=_fit(first, found.cases),
+        extended_residual_rms=_rms(last.judged, case),
+        extended_fit_percent=_fit(last, found.cases),
+        at_noise_floor=reached(last.judged),
+        misfit=where,
+        causes=causes,
+        rejected=tuple(rejected),
+        next_experiment=_next_experiment(found, stages, verdict, records[0]),
+        remaining=misfits(case, last.outputs[0], channel, rig),
+        masked=checked[0].masked,
+        before=overlays_of(case, first.outputs[0]),
+        after=overlays_of(case, last.outputs[0]),
+        spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
+        statements=what_is_not_told(first.solution.problem.unknowns, confidence),
+    )
+
+
+def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:
+    """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
+    setting = with_it.solution.problem.rig.effects[-1]
+    effect = effect_named(setting.name)
+    speaks = (
+        channel
+        if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel)
+        else max(
+            without.judged.sums, key=lambda n: without.judged.ratio(n) / max(with_it.judged.ratio(n), 1e-12)
+        )
+    )
+    held_out, interval = gain(with_it.judged, without.judged, speaks)
+    train, _ = gain(with_it.train, without.train, speaks)
+    estimates = {
+        p.name.split(".")[1]: p
+        for p in parameters_of(last.solution, confidence_of(last.solution))
+        if p.name.startswith(effect.name + ".")
+    }
+    return Cause(
+        name=effect.name,
+        parameters={k: honest(e) for k, e in estimates.items()},
+        gain_train=train,
+        gain_holdout=held_out,
+        gain_holdout_ci95=interval,
+        evidence=evidence_of(
+            effect, speaks, without.judged.ratio(speaks), with_it.judged.ratio(speaks), held_out
+        ),
+        equation=effect.equation,
+        channel=speaks,
+        confusable_with=tuple(m.causes[-1] for m in found.rivals.get(effect.name, ())),
+    )
+
+
+def honest(estimate: ParameterEstimate) -> Estimate:
+    """Return an estimate whose interval also holds what no residual shows.
+
+    The fit's interval speaks of noise alone. Two right simulations of one bench differ by about MODEL_DOUBT
+    in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
+    the sensors' clocks.
+    """
+    doubt = MODEL_DOUBT * abs(estimate.value)
+    if estimate.unit == "s":
+        doubt = float(np.hypot(doubt, CLOCK_DOUBT))
+    low, high = (float(np.hypot(end - estimate.value, 1.96 * doubt)) for end in estimate.ci95)
+    return Estimate(estimate.value, estimate.unit, (estimate.value - low, estimate.value + high))
+
+
+def _next_experiment(
+    found: Search, stages: Sequence[Stage], verdict: Verdict, record: Record
+) -> Experiment | None:
+    """Return the run that would tell what these data cannot; None when nothing is left to tell."""
+    for stage in stages[1:]:
+        rivals = found.rivals.get(stage.solution.problem.rig.effects[-1].name, ())
+        if rivals:
+            return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
+    if verdict in ("unexplained", "partly_explained"):
+        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
+    return None
+
+
+def _latest(trials: Sequence[Trial]) -> list[Trial]:
+    """Return each effect's trial that says most: one fitted to everything, else the last."""
+    best: dict[str, Trial] = {}
+    for t in trials:
+        if t.name not in best or t.is_full or not best[t.name].is_full:
+            best[t.name] = t
+    return list(best.values())
+
+
+def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
+    """Return a trial with its gain, on data that judge, over the model that it was tried beside."""
+    judges = tuple(part(c, JUDGE) for c in cases)
+    problem = replace(trial.problem, cases=cases)
+    with_it = score(problem, judges, problem.outputs(trial.theta))
+    without = score(problem, judges, trial.beside.outputs)
+    return Rejected(trial.name, gain(with_it, without, channel)[0], trial.why)
+
+
+def _rms(judged: Score, case: Case) -> dict[str, float]:
+    return {n: judged.ratio(n) * case.noise[n] for n in judged.sums}
+
+
+def _fit(stage: Stage, cases: tuple[Case, ...]) -> dict[str, float]:
+    """Return the fit of every channel on all samples that count, %."""
+    case, out = cases[0], stage.outputs[0]
+    keep = {n: case.mask[n] for n in stage.judged.sums if n in case.measured}
+    return {n: fit_percent((out[n] - case.measured[n])[k], case.measured[n][k]) for n, k in keep.items()}

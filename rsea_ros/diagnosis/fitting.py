@@ -1,0 +1,127 @@
+"""A model of the search: fitted on some blocks of the cases, scored on others, in units of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
+from rsea_ros.identification.noise import residual_floor
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.unknowns import CLOCK
+from rsea_ros.signals import FloatArray
+
+AT_FLOOR = 1.04
+"""RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
+DELAY = "command_delay.delay"
+_ITERATIONS = 12
+
+
+@dataclass(frozen=True)
+class Model:
+    """A fitted model, its simulated channels on every case, and how it does on the blocks that choose."""
+
+    solution: Solution
+    outputs: list[dict[str, FloatArray]]
+    choose: Score
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Names of the effects that act, in the order in which they came in."""
+        return tuple(e.name for e in self.solution.problem.rig.effects)
+
+    @property
+    def parameters(self) -> int:
+        """How many unknowns the model has."""
+        return len(self.solution.theta)
+
+
+def fitted(
+    cases: Sequence[Case],
+    problem: Problem,
+    theta: FloatArray | None,
+    places: tuple[int, ...] = FIT,
+    iterations: int = _ITERATIONS,
+    weights: Score | None = None,
+) -> Model:
+    """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise."""
+    masked = replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
+    solution = solve(masked, theta, iterations=iterations)
+    moved = with_common_clock_in_delay(solution)
+    if moved is not None:
+        again = solve(masked, moved, iterations=iterations)
+        solution = min(solution, again, key=lambda s: s.cost)
+    return as_model(cases, solution)
+
+
+def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
+    """Return theta with the clock error that all sensors share turned into delay of the command.
+
+    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
+    rest in the clocks. None for a model without a delay.
+    """
+    names = [u.name for u in solution.problem.unknowns]
+    clocks = [i for i, n in enumerate(names) if n.startswith(CLOCK + ".")]
+    if DELAY not in names or not clocks:
+        return None
+    theta = solution.theta.copy()
+    common = float(np.mean(theta[clocks]))
+    theta[clocks] -= common
+    theta[names.index(DELAY)] -= common
+    return np.asarray(theta)
+
+
+def heavier(case: Case, weights: Score | None) -> Case:
+    """Return a case in which what a model leaves of a channel counts as its noise, where that is more."""
+    if weights is None:
+        return case
+    noise = {n: s * max(1.0, weights.ratio(n)) if n in weights.sums else s for n, s in case.noise.items()}
+    return replace(case, noise=noise)
+
+
+def as_model(cases: Sequence[Case], solution: Solution) -> Model:
+    """Return a solution with its outputs and its score on the blocks that choose."""
+    outputs = solution.problem.outputs(solution.theta)
+    return Model(solution, outputs, score(solution.problem, tuple(part(c, CHOOSE) for c in cases), outputs))
+
+
+def refitted(cases: Sequence[Case], model: Model) -> Model:
+    """Fit a model again with each channel in units of what the model leaves of it."""
+    return fitted(cases, model.solution.problem, model.solution.theta, weights=rescored(cases, model).choose)
+
+
+def rescored(cases: Sequence[Case], model: Model) -> Model:
+    """Return the model with its score against the cases' present noise."""
+    problem = replace(model.solution.problem, cases=tuple(part(c, FIT) for c in cases))
+    return Model(
+        replace(model.solution, problem=problem),
+        model.outputs,
+        score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs),
+    )
+
+
+def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
+    """Return the cases with the noise lowered where a model's residual shows that it is less."""
+    return tuple(
+        _requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True)
+    )
+
+
+def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> Case:
+    noise = dict(case.noise)
+    for n in case.measured:
+        if n in out:
+            residual = np.where(case.mask[n], case.measured[n] - out[n], 0.0)
+            quantum = problem.rig.sensors[n].quantum if n in problem.rig.sensors else 0.0
+            floor = max(residual_floor(residual), 0.5 * quantum)
+            noise[n] = min(noise[n], floor)
+    return replace(case, noise=noise)
+
+
+def at_floor(model: Model, cases: Sequence[Case]) -> bool:
+    """Tell whether the residual of every channel is at its noise, on all blocks but those that judge."""
+    standing = score(model.solution.problem, tuple(part(c, (*FIT, *CHOOSE)) for c in cases), model.outputs)
+    return all(standing.ratio(n) < AT_FLOOR for n in standing.sums)

@@ -1,0 +1,156 @@
+"""One round of the search: every effect tried beside the present model, at a cost that grows as few remain.
+
+All are screened and the promising fitted on short pieces of the data; the best of those are fitted on all
+that may be fitted to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from rsea_ros.diagnosis.choice import choose, is_progress, loss_excess
+from rsea_ros.diagnosis.fitting import Model, fitted, heavier, refitted
+from rsea_ros.diagnosis.hints import starts_of
+from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.trial import Trial, trial_of
+from rsea_ros.diagnosis.windows import windows_of
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution, linearised, solve
+from rsea_ros.identification.unknowns import CLOCK
+from rsea_ros.signals import FloatArray
+
+MOST_CAUSES = 4
+_FITS_ON_PIECES = 9
+_FULL_FITS = 3
+_CLOSE = 1.1
+"""Of the best cost on pieces: so close an effect is fitted to everything too."""
+_PIECES_ITERATIONS = 12
+_FULL_ITERATIONS = 6
+
+
+class Tell(Protocol):
+    """Hears what is being tried and which share of the work is done, 0 … 1."""
+
+    def __call__(self, step: str, share: float, /) -> None:
+        """Hear it."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """What a round starts from: every sample of the cases, and the model so far."""
+
+    cases: tuple[Case, ...]
+    present: Model
+    number: int
+    pool: Executor
+    tell: Tell
+
+    def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
+        """Return the model to accept, all other trials, and the models that do as well as it."""
+        screened = self._screened()
+        finalists = self._finalists(screened)
+        models = list(self.pool.map(self._fit_all, finalists))
+        better = [m for m in models if is_progress(m, self.present)]
+        chosen, equals = choose(better, self.present.choose)
+        final = {h.name for h in finalists}
+        trials = [self._far_behind(h) for h in screened if h.name not in final]
+        trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
+        return chosen, trials, equals
+
+    @cached_property
+    def on_pieces(self) -> Solution:
+        """The present model on short pieces, with clocks taken as right."""
+        pieces = tuple(heavier(w, self.present.choose) for c in self.cases for w in windows_of(c))
+        solution = self.present.solution
+        return linearised(*without_clocks(replace(solution.problem, cases=pieces), solution.theta))
+
+    def _screened(self) -> list[Hypothesis]:
+        """Return what two cheap steps of every effect reach, best first."""
+        effects = [e for n, e in catalogue().items() if n not in self.present.causes]
+        there = self.on_pieces
+
+        def screen_one(i: int) -> Hypothesis | None:
+            self._say(effects[i].name, 0.4 * i / len(effects))
+            return screen(there, effects[i], self._starts(effects[i]))
+
+        found = [h for h in self.pool.map(screen_one, range(len(effects))) if h is not None]
+        return sorted(found, key=lambda h: h.cost)
+
+    def _starts(self, effect: Effect) -> list[dict[str, float]]:
+        return starts_of(effect, self.cases[0], self.present.solution.problem.rig, self.present.outputs[0])
+
+    def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the best on pieces, and what is said to be confused with the very best."""
+        worth = [h for h in screened if h.cost < self.on_pieces.cost][:_FITS_ON_PIECES]
+        close = sorted(self.pool.map(self._fit_pieces, worth), key=lambda h: h.cost)
+        if not close:
+            return []
+        near = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost]
+        near = near[: 2 * _FULL_FITS]
+        heard, rivals = {h.name for h in near}, close[0].effect.claims.confusable_with
+        fitted_on_pieces = {h.name for h in close}
+        unheard = [h for h in (*close, *screened) if h.name in rivals and h.name not in heard]
+        once = {h.name: h for h in reversed(unheard)}.values()
+        late = [h if h.name in fitted_on_pieces else self._fit_pieces(h) for h in once]
+        return [*near, *late]
+
+    def _fit_pieces(self, h: Hypothesis) -> Hypothesis:
+        self._say(f"fitting {h.name}", 0.5)
+        solution = solve(h.problem, h.theta, iterations=_PIECES_ITERATIONS)
+        return replace(h, theta=solution.theta, cost=solution.cost)
+
+    def _fit_all(self, h: Hypothesis) -> Model:
+        self._say(f"fitting {h.name} on everything", 0.8)
+        first = fitted(
+            self.cases, *self._with_clocks(h), iterations=_FULL_ITERATIONS, weights=self.present.choose
+        )
+        return refitted(self.cases, first)
+
+    def _with_clocks(self, h: Hypothesis) -> tuple[Problem, FloatArray]:
+        return with_clocks(replace(h.problem, cases=self.cases), h.theta, self.present.solution.problem)
+
+    def _say(self, what: str, within: float) -> None:
+        """Tell what is being tried; rounds are taken to halve what is left of the work."""
+        share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
+        self.tell(f"round {self.number + 1}: {what}", share)
+
+    def _far_behind(self, h: Hypothesis) -> Trial:
+        why = "far behind the best on the data that it was fitted to"
+        return Trial(h.name, self.present, *self._with_clocks(h), is_full=False, why=why)
+
+    def _trial(self, model: Model, better: Sequence[Model], chosen: Model | None) -> Trial:
+        return trial_of(model, model.causes[-1], self.present, _why_not(model, better, chosen))
+
+
+def _why_not(model: Model, better: Sequence[Model], chosen: Model | None) -> str:
+    if chosen is None or not any(model is m for m in better):
+        return "does not lower the residual of data that it was not fitted to"
+    near = loss_excess(model, chosen) < 0.02 * chosen.choose.loss(chosen.choose).sum()
+    if model.parameters > chosen.parameters and near:
+        return f"no better than {chosen.causes[-1]}, which is simpler"
+    return f"{chosen.causes[-1]} explains more"
+
+
+def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with all clocks taken as right.
+
+    Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
+    """
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(CLOCK + ".")]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
+def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with the clocks of another problem free again, at zero."""
+    clocks = tuple(u for u in model.unknowns if u.name.startswith(CLOCK + "."))
+    return replace(problem, unknowns=(*problem.unknowns, *clocks)), np.concatenate(
+        [theta, np.zeros(len(clocks))]
+    )

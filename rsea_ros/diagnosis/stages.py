@@ -1,0 +1,41 @@
+"""Stages: the accepted models one after another, re-fitted on all that does not judge, and judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rsea_ros.diagnosis.faults import Checked
+from rsea_ros.diagnosis.fitting import Model, fitted, rescored
+from rsea_ros.diagnosis.search import Search
+from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
+from rsea_ros.identification.problem import case_from, simulated
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A model of the accepted sequence, re-fitted on all blocks but those that judge, and judged there."""
+
+    solution: Solution
+    outputs: list[dict[str, FloatArray]]
+    train: Score
+    judged: Score
+
+
+def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> Stage:
+    """Re-fit a model on all that does not judge, and judge it."""
+    start, weights = chosen.solution, rescored(found.cases, chosen).choose
+    model = fitted(found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights)
+    problem = model.solution.problem
+    train = score(problem, tuple(part(c, (*FIT, *CHOOSE)) for c in found.cases), model.outputs)
+    if judging is None:
+        judges = tuple(part(c, JUDGE) for c in found.cases)
+        return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))
+    case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
+    moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
+    return Stage(
+        model.solution, model.outputs, train, score(problem, (case,), simulated((case,), moved, offsets))
+    )
