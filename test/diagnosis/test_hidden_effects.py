@@ -43,10 +43,8 @@ def conceal(seed: int) -> Concealed:
     return Concealed(record, fresh, effect, parameters[MAIN_PARAMETER[effect]])
 
 
-SHORT = pytest.mark.xfail(reason="open: F/T gain error named beside a gear compliance", strict=False)
 
-
-@pytest.mark.parametrize("seed", [*range(34, 39), pytest.param(39, marks=SHORT)])
+@pytest.mark.parametrize("seed", range(34, 40))
 def test_the_hidden_effect_is_found_with_its_size_and_its_gain(seed):
     concealed = conceal(seed)
     diagnosis = diagnose([concealed.record], load_rig("paper_high_impedance"))
