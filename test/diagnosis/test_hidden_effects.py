@@ -43,7 +43,6 @@ def conceal(seed: int) -> Concealed:
     return Concealed(record, fresh, effect, parameters[MAIN_PARAMETER[effect]])
 
 
-
 @pytest.mark.parametrize("seed", range(34, 40))
 def test_the_hidden_effect_is_found_with_its_size_and_its_gain(seed):
     concealed = conceal(seed)
