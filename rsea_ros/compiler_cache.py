@@ -10,7 +10,8 @@ import hashlib
 import os
 from pathlib import Path
 
-SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "model/call.py", "model/step.py")
+SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "model/call.py", "model/step.py",
+          "model/observer/filter.py", "model/observer/transition.py")  # fmt: skip
 """Files whose functions and constants are compiled into those of other files."""
 
 

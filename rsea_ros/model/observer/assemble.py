@@ -1,0 +1,87 @@
+"""From a rig to the arrays of the compiled filter."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import matrix_balance
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.model.drive import LONGEST_STEP
+from rsea_ros.model.equations import PORTS
+from rsea_ros.model.observer.filter import CLOCK, SIGMA, Model, State, disturbance
+from rsea_ros.model.observer.linear import linear_model, structured
+from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import Machine, build
+from rsea_ros.model.step import Calls
+from rsea_ros.signals import FloatArray
+
+_GEAR = int(st.Port.GEAR)
+_DELAY = "command_delay"
+
+
+def without_delay(rig: Rig) -> tuple[Rig, float]:
+    """Return the rig without a delay of its command, and that delay, s.
+
+    The observer's steps are as long as the stamps ask for; a ring of steps, as the effect keeps one, is not.
+    The delay moves the commands' stamps instead, which is exact.
+    """
+    delay = sum(e.parameters["delay"] for e in rig.effects if e.name == _DELAY)
+    return rig.with_effects(*(e for e in rig.effects if e.name != _DELAY)), float(delay)
+
+
+def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[Model, State]:
+    """Return the model and the state at rest with nothing known. hold, duration: s."""
+    machine, linear = build(rig, LONGEST_STEP, duration), linear_model(structured(rig))
+    n, size = linear.order, len(linear.start)
+    measured = np.zeros((2, size))
+    measured[:, :n] = machine.linear.outputs[[0, 2]]
+    measured[0, n + 1 :] = 1.0
+    a, scale = _balanced(linear.a)
+    block, block_scale = _balanced(linear.block)
+    walk = np.zeros((size, size))
+    walk[n, n] = noise.walk / scale[n] ** 2
+    estimated = linear.estimated
+    model = Model(
+        linear=machine.linear._replace(phi=np.eye(n), g=np.zeros((n, len(PORTS)))),
+        calls=_with_disturbance(machine.calls),
+        block=block, block_scale=block_scale, a=a, walk=walk, scale=scale,
+        f=np.eye(size), q=np.zeros((size, size)), measured=measured,
+        noise=np.array([noise.position, noise.ft, noise.motor_torque]) ** 2,
+        estimated=estimated, torques=linear.torques, held=np.zeros(2), hold=hold,
+    )  # fmt: skip
+    state = _state(n, size, machine)
+    state.p[:] = np.diag(linear.start**2)
+    state.p[n, n] = noise.disturbance**2
+    return model, state
+
+
+def _balanced(a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a matrix with rows and columns of like size, and the scale that makes it so."""
+    balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    return np.ascontiguousarray(balanced), np.ascontiguousarray(scale)
+
+
+def _with_disturbance(calls: Calls) -> Calls:
+    """Return the calls with the disturbance before the effects at the gear; its torque is p[0]."""
+    first, at = calls.first.copy(), int(calls.first[_GEAR])
+    first[_GEAR + 1 :] += 1
+    return Calls(
+        first=first,
+        address=np.insert(calls.address, at, disturbance.address),
+        p_at=np.insert(calls.p_at + 1, at, 0),
+        x_at=np.insert(calls.x_at, at, 0),
+        p=np.concatenate([[0.0], calls.p]),
+        nonlinear=True,
+    )
+
+
+def _state(n: int, size: int, machine: Machine) -> State:
+    """Return a state of zeros, all its parts views of one array."""
+    own = len(machine.own)
+    sizes = (n, size - n, size * size, st.SIZE, own, n, 3, SIGMA + 3, CLOCK, 9)
+    whole = np.zeros(sum(sizes))
+    parts = np.split(whole, np.cumsum(sizes)[:-1])
+    state = State(whole, *parts)
+    state.table[:] = machine.table
+    return state._replace(p=state.p.reshape(size, size))

@@ -1,0 +1,47 @@
+"""The innovation test: is what the sensors say of each other what their noise allows?
+
+Where the model is right nu^2 / S, the squared innovation over its variance, is chi-square distributed with
+one degree of freedom and white: the sum over a window of n samples has n degrees of freedom.
+Source: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, sec. 5.4.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+from scipy.stats import chi2
+
+from rsea_ros.signals import FloatArray
+
+CHANNELS = ("position", "ft", "motor_torque")
+FALSE_ALARM = 1e-6
+"""Probability that a right model is called inconsistent in a window: once in ten days of windows of 1 s."""
+
+
+class Consistency(NamedTuple):
+    """ratio: RMS of the innovations over what it should be. limit: largest. mean: in the channel's unit."""
+
+    ratio: float
+    limit: float
+    mean: float
+
+    @property
+    def broken(self) -> bool:
+        """Whether the model is inconsistent with this channel."""
+        return self.ratio > self.limit
+
+
+def consistency(score: FloatArray) -> dict[str, Consistency]:
+    """Return the test of each channel that had samples. score: sums of nu^2 / S, 1, nu, shape (3, 3)."""
+    return {
+        name: Consistency(math.sqrt(total / count), _limit(round(count)), sum_ / count)
+        for name, (total, count, sum_) in zip(CHANNELS, score.tolist(), strict=True)
+        if count >= 1.0
+    }
+
+
+@lru_cache(maxsize=64)
+def _limit(count: int) -> float:
+    return math.sqrt(float(chi2.isf(FALSE_ALARM, count)) / count)

@@ -1,0 +1,269 @@
+"""The filter, compiled: the mean through the simulation's own step, the covariance through the linear model.
+
+    predict   z = step(z, u), with the effects of the model as known torques;   P = F P F' + Q + g s_u^2 g'
+    update    S = h P h' + r,  K = P h' / S,  z += K nu,  P = (I - K h) P (I - K h)' + K r K'   (Joseph)
+
+F and Q are exact for any time between stamps (transition.py). g is what a motor torque held over that time
+does, s_u the doubt in it. Source: Anderson, Moore, Optimal Filtering, 1979, sections 3.1 and 6.7.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from rsea_ros.effects import signal_table as st
+from rsea_ros.effects.effect import compiled
+from rsea_ros.model.drive import LONGEST_STEP
+from rsea_ros.model.observer.transition import exponential, transition
+from rsea_ros.model.step import Calls, Linear, advance
+from rsea_ros.signals import FloatArray
+
+POSITION, FT, TORQUE = range(3)
+NOW, COMMAND, SINCE, ERROR, STARTED, CLOCK = range(6)
+"""In `clock`: time (s), command in force (N m), since when (s), what the drive makes beside it (N m)."""
+SIGMA = 3
+SAME = 1e-6
+SHORTEST = 1e-7
+"""s. Stamps nearer than this are the same instant."""
+GATE = 4.0
+"""Sigmas of the measured motor torque beyond which it, and no longer the command, is what the motor makes."""
+
+
+inner: Any = partial(njit, cache=True, nogil=True, error_model="numpy",
+                     no_cpython_wrapper=True, no_cfunc_wrapper=True)()  # fmt: skip
+"""For functions that only compiled ones call: what Python would need to call them takes long to compile."""
+
+
+class Model(NamedTuple):
+    """What does not change, but for `held`: steps for which linear.phi, f and q hold, s.
+
+    measured: rows of position and ft on z, shape (2, n). noise: variances of position, ft, motor torque.
+    hold: how long a command stays in force, s.
+    """
+
+    linear: Linear
+    calls: Calls
+    block: FloatArray
+    block_scale: FloatArray
+    a: FloatArray
+    walk: FloatArray
+    scale: FloatArray
+    f: FloatArray
+    q: FloatArray
+    measured: FloatArray
+    noise: FloatArray
+    estimated: FloatArray
+    torques: FloatArray
+    held: FloatArray
+    hold: float
+
+
+class State(NamedTuple):
+    """All that changes, as views of `whole`, so that a copy of one array is a checkpoint.
+
+    extra: (d[, zero]). reach: g. predicted: position, ft, measured motor torque. estimate: T_d, T_p, d, their
+    sigmas. score: by channel the sum of nu^2 / S, their number, the sum of nu.
+    """
+
+    whole: FloatArray
+    x: FloatArray
+    extra: FloatArray
+    p: FloatArray
+    table: FloatArray
+    own: FloatArray
+    reach: FloatArray
+    predicted: FloatArray
+    estimate: FloatArray
+    clock: FloatArray
+    score: FloatArray
+
+
+@compiled
+def disturbance(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the disturbance and what the drive makes beside its command, p[0], to the torque on the gear."""
+    s[st.GEAR_TORQUE] += p[0]
+
+
+@inner
+def predict(model, state, t):  # type: ignore[no-untyped-def]
+    """Go to an instant; a command older than `hold` ends on the way, as the bench ends it."""
+    end, reached = state.clock[SINCE] + model.hold, False
+    while not reached:
+        reached = state.clock[COMMAND] == 0.0 or t <= end
+        _propagate(model, state, t if reached else end)
+        if not reached:
+            state.clock[COMMAND] = 0.0
+
+
+@inner
+def _propagate(model, state, t):  # type: ignore[no-untyped-def]
+    dt = t - state.clock[NOW]
+    if dt < SHORTEST:
+        return
+    count = int(np.ceil(dt / LONGEST_STEP - 1e-6))
+    _set_step(model, state.table, dt / count)
+    if abs(dt - model.held[1]) > SAME * dt:
+        transition(model.a, model.walk, model.scale, dt, model.f, model.q)
+        model.held[1] = dt
+    model.calls.p[0] = state.extra[0] + state.clock[ERROR]
+    command, out, none = np.full(count, state.clock[COMMAND]), np.empty((count, 4)), np.empty(0)
+    advance(model.linear, model.calls, command, none, none, state.clock[NOW],
+            state.x, state.table, state.own, out)  # fmt: skip
+    n = len(state.x)
+    for i in range(n):
+        state.reach[i] = model.f[i, n]
+    _spread(model, state)
+    state.clock[NOW] = t
+    state.predicted[POSITION], state.predicted[FT] = out[count - 1, 0], out[count - 1, 3]
+    state.predicted[TORQUE] = out[count - 1, 2]
+    if len(state.extra) > 1:
+        state.predicted[POSITION] += state.extra[1]
+    _estimate(model, state)
+
+
+@inner
+def _set_step(model, table, h):  # type: ignore[no-untyped-def]
+    """Make the propagators of a step of h seconds, where the last one was another."""
+    linear, n = model.linear, len(model.linear.phi)
+    if abs(h - model.held[0]) > SAME * h:
+        whole = np.empty(model.block.shape)
+        exponential(model.block, model.block_scale, h, whole)
+        for i in range(n):
+            for j in range(n):
+                linear.phi[i, j] = whole[i, j]
+            for j in range(linear.g.shape[1]):
+                linear.g[i, j] = whole[i, n + j]
+        model.held[0] = h
+    table[st.STEP] = model.held[0]
+    table[st.MOBILITY] = 0.0
+    for i in range(n):
+        table[st.MOBILITY] += linear.spans[0, i] * linear.g[i, 0]
+
+
+@inner
+def _spread(model, state):  # type: ignore[no-untyped-def]
+    """Let the covariance grow over the time of f and q."""
+    p, n = state.p, len(state.p)
+    fp = np.zeros((n, n))
+    for i in range(n):
+        for k in range(n):
+            if model.f[i, k] != 0.0:
+                for j in range(n):
+                    fp[i, j] += model.f[i, k] * p[k, j]
+    for i in range(n):
+        for j in range(i + 1):
+            value = model.q[i, j]
+            for k in range(n):
+                value += fp[i, k] * model.f[j, k]
+            if i < len(state.reach):
+                value += model.noise[TORQUE] * state.reach[i] * state.reach[j]
+            p[i, j] = p[j, i] = value
+
+
+@inner
+def _estimate(model, state):  # type: ignore[no-untyped-def]
+    """Read the torques on both ends from the state and from the torques that the last step ended with."""
+    s, n = state.table, len(state.x)
+    for k in range(2):
+        value = model.torques[k, 0] * s[st.COMMAND]
+        for port in range(5):
+            value += model.torques[k, port] * s[st.FIRST_FORCE + port]
+        for i in range(n):
+            value += model.estimated[k, i] * state.x[i]
+        state.estimate[k] = value
+    state.estimate[2] = state.extra[0]
+
+
+@inner
+def doubt(model, state):  # type: ignore[no-untyped-def]
+    """Put the sigmas of the estimates beside them; the doubt in the motor's torque is part of both."""
+    n, x = len(state.p), len(state.x)
+    for k in range(2):
+        variance = model.noise[TORQUE] * model.torques[k, 0] ** 2
+        for i in range(n):
+            for j in range(n):
+                variance += model.estimated[k, i] * state.p[i, j] * model.estimated[k, j]
+        state.estimate[SIGMA + k] = np.sqrt(variance)
+    state.estimate[SIGMA + 2] = np.sqrt(state.p[x, x])
+
+
+@inner
+def update(model, state, channel, value):  # type: ignore[no-untyped-def]
+    """Correct the state by a measured position (rad) or ft (N m); one that is not finite tells nothing."""
+    if not (np.isfinite(value) and np.isfinite(model.noise[channel])):
+        return
+    p, h, r, n = state.p, model.measured[channel], model.noise[channel], len(state.p)
+    ph, s = np.zeros(n), r
+    for i in range(n):
+        for j in range(n):
+            ph[i] += p[i, j] * h[j]
+    for i in range(n):
+        s += h[i] * ph[i]
+    error = value - state.predicted[channel]
+    _score(state, channel, error, s)
+    gain = ph / s
+    _joseph(p, gain, h, r)
+    _shift(model, state, gain * error)
+
+
+@inner
+def _joseph(p, gain, h, r):  # type: ignore[no-untyped-def]
+    n = len(p)
+    left, hp = np.empty((n, n)), np.zeros(n)
+    for j in range(n):
+        for k in range(n):
+            hp[j] += h[k] * p[k, j]
+    for i in range(n):
+        for j in range(n):
+            left[i, j] = p[i, j] - gain[i] * hp[j]
+    for i in range(n):
+        lh = 0.0
+        for k in range(n):
+            lh += left[i, k] * h[k]
+        for j in range(i + 1):
+            p[i, j] = p[j, i] = left[i, j] + (r * gain[i] - lh) * gain[j]
+
+
+@inner
+def _shift(model, state, change):  # type: ignore[no-untyped-def]
+    """Add a change of z, shape (n,), to the state and to all that was read from it."""
+    x = len(state.x)
+    for i in range(x):
+        state.x[i] += change[i]
+    for i in range(x, len(change)):
+        state.extra[i - x] += change[i]
+    for k in range(2):
+        for i in range(len(change)):
+            state.predicted[k] += model.measured[k, i] * change[i]
+            state.estimate[k] += model.estimated[k, i] * change[i]
+    state.estimate[2] = state.extra[0]
+
+
+@inner
+def weigh_torque(model, state, value):  # type: ignore[no-untyped-def]
+    """Hold the measured motor torque (N m) against the command: what it denies is put right at once."""
+    if not np.isfinite(value) or model.noise[TORQUE] == 0.0:
+        return
+    error = value - state.predicted[TORQUE]
+    _score(state, TORQUE, error, model.noise[TORQUE])
+    believed = error if error * error > GATE * GATE * model.noise[TORQUE] else 0.0
+    change = believed - state.clock[ERROR]
+    if change != 0.0:
+        state.clock[ERROR] = believed
+        z = np.zeros(len(state.p))
+        for i in range(len(state.x)):
+            z[i] = state.reach[i] * change
+        _shift(model, state, z)
+        for k in range(2):
+            state.estimate[k] += model.torques[k, 0] * change
+
+
+@inner
+def _score(state, channel, error, variance):  # type: ignore[no-untyped-def]
+    state.score[3 * channel] += error * error / variance
+    state.score[3 * channel + 1] += 1.0
+    state.score[3 * channel + 2] += error

@@ -1,0 +1,134 @@
+"""What has arrived, by stamp, with a checkpoint behind each: what comes late is put in its place.
+
+A late sample goes back to the checkpoint before its stamp, and what came since is worked off again. At one
+instant measurements come before commands: a command with the stamp of a measurement acts after it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from rsea_ros.model.observer.filter import (
+    COMMAND,
+    FT,
+    NOW,
+    POSITION,
+    SINCE,
+    STARTED,
+    doubt,
+    inner,
+    predict,
+    update,
+    weigh_torque,
+)
+from rsea_ros.signals import FloatArray
+
+STATE, WRENCH, ORDER = range(3)
+"""Kinds: position and motor torque; ft; command."""
+FIRST, COUNT, DONE, LATE, REFUSED = range(5)
+TOO_LATE = -1
+LENGTH = 512
+
+
+class Log(NamedTuple):
+    """A ring: t (s), kind and two values of each event, and the state behind it.
+
+    place: first row, number of events, how many are worked off, how many came late, too late; horizon: newest
+    measurement, s.
+    """
+
+    t: FloatArray
+    kind: npt.NDArray[np.int64]
+    values: FloatArray
+    saved: FloatArray
+    place: npt.NDArray[np.int64]
+    horizon: FloatArray
+
+
+def empty_log(size: int) -> Log:
+    """Return a log for states of some size."""
+    return Log(
+        t=np.zeros(LENGTH),
+        kind=np.zeros(LENGTH, dtype=np.int64),
+        values=np.zeros((LENGTH, 2)),
+        saved=np.zeros((LENGTH, size)),
+        place=np.zeros(REFUSED + 1, dtype=np.int64),
+        horizon=np.full(1, -np.inf),
+    )
+
+
+@inner
+def _row(log, i):  # type: ignore[no-untyped-def]
+    return (log.place[FIRST] + i) % LENGTH
+
+
+@inner
+def _copy(a, out):  # type: ignore[no-untyped-def]
+    for i in range(len(a)):
+        out[i] = a[i]
+
+
+@inner
+def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
+    """Put an event in its place and return that, or TOO_LATE where no checkpoint goes back so far."""
+    place = log.place
+    if place[COUNT] == LENGTH:
+        place[FIRST], place[COUNT] = (place[FIRST] + 1) % LENGTH, LENGTH - 1
+        place[DONE] = max(place[DONE] - 1, 0)
+    at = place[COUNT]
+    while at > 0:
+        before = _row(log, at - 1)
+        if log.t[before] < t or (log.t[before] == t and log.kind[before] <= kind):
+            break
+        at -= 1
+    if at == 0 and place[DONE] > 0:
+        return TOO_LATE
+    for i in range(place[COUNT], at, -1):
+        new, old = _row(log, i), _row(log, i - 1)
+        log.t[new], log.kind[new] = log.t[old], log.kind[old]
+        log.values[new, 0], log.values[new, 1] = log.values[old, 0], log.values[old, 1]
+    row = _row(log, at)
+    log.t[row], log.kind[row], log.values[row, 0], log.values[row, 1] = t, kind, a, b
+    place[COUNT] += 1
+    return at
+
+
+@inner
+def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
+    if state.clock[STARTED] == 0.0:
+        state.clock[STARTED], state.clock[NOW] = 1.0, t
+    predict(model, state, t)
+    if kind == ORDER:
+        state.clock[COMMAND], state.clock[SINCE] = values[0], t
+    else:
+        if kind == STATE:
+            weigh_torque(model, state, values[1])
+        update(model, state, POSITION if kind == STATE else FT, values[0])
+    doubt(model, state)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def receive(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
+    """Take in an event, work off all up to the newest measurement, and return its row, or TOO_LATE."""
+    at = _insert(log, t, kind, a, b)
+    if at == TOO_LATE:
+        log.place[REFUSED] += 1
+        return TOO_LATE
+    if at < log.place[DONE]:
+        _copy(log.saved[_row(log, at - 1)], state.whole)
+        log.place[DONE] = at
+        log.place[LATE] += 1
+    if kind != ORDER:
+        log.horizon[0] = max(log.horizon[0], t)
+    while log.place[DONE] < log.place[COUNT]:
+        row = _row(log, log.place[DONE])
+        if log.t[row] > log.horizon[0] or (log.kind[row] == ORDER and log.t[row] == log.horizon[0]):
+            break
+        _apply(model, state, log.kind[row], log.t[row], log.values[row])
+        _copy(state.whole, log.saved[row])
+        log.place[DONE] += 1
+    return _row(log, at)

@@ -1,0 +1,82 @@
+"""What the observer may believe of each signal: all from sensors and what an identification left unexplained.
+
+The disturbance is a random walk. Its intensity comes from a torque of RMS sigma that keeps for a time tau:
+over times short against tau such an Ornstein-Uhlenbeck process is a random walk of intensity
+
+    2 sigma^2 / tau    (N m)^2/s
+
+tau = 1 / |slowest pole| of the actuator between clamped ends: what lasts longer, the filter follows anyhow.
+sigma is what the model left of the F/T signal beyond its noise, and never less than the doubt in the measured
+motor torque: a torque too small for that sensor to tell cannot be denied.
+Source: Gardiner, Handbook of Stochastic Methods, 2004, section 3.8.4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from rsea_ros.errors import RigError
+from rsea_ros.model.propagator import state_space
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.signals import UNITS
+
+NOTHING: Mapping[str, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One sigma of position (rad), ft (N m) and motor torque (N m; 0: not measured); of the disturbance
+    (N m), and how long that keeps, s. A channel that the rig's sensors lack is infinite: it tells nothing.
+    """
+
+    position: float
+    ft: float
+    motor_torque: float
+    disturbance: float
+    tau: float
+
+    @property
+    def walk(self) -> float:
+        """Intensity of the disturbance's random walk, (N m)^2/s."""
+        return 2.0 * self.disturbance**2 / self.tau
+
+
+def noise_of(rig: Rig, noise_rms: Mapping[str, float] = NOTHING,
+             residual_rms: Mapping[str, float] = NOTHING) -> Noise:  # fmt: skip
+    """Return the noise of a rig's sensors, or what an identification measured of it, by channel.
+
+    Raises RigError where neither says anything of a sensor that the rig has.
+    """
+    position, ft, torque = (_sigma(rig, n, noise_rms) for n in ("position", "ft", "motor_torque"))
+    if math.isinf(position) and math.isinf(ft):
+        raise RigError(f"rig {rig.name}: sensors {', '.join(rig.sensors)}, expected position or ft")
+    known = [s for s in (torque, ft) if math.isfinite(s)]
+    unexplained = residual_rms.get("ft", 0.0) ** 2 - (ft**2 if math.isfinite(ft) else 0.0)
+    sigma = max(known[0] if known else 0.0, math.sqrt(max(0.0, unexplained)))
+    if sigma == 0.0:
+        raise RigError(f"rig {rig.name}: sensors has no torque, expected motor_torque or ft with noise, N m")
+    return Noise(position, ft, torque if math.isfinite(torque) else 0.0, sigma, 1.0 / slowest_rate(rig))
+
+
+def slowest_rate(rig: Rig) -> float:
+    """Return |slowest pole| of the actuator between clamped ends, 1/s; of the rig itself without a spring."""
+    held = rig if rig.rigid_spring else replace(rig, clamped=frozenset(END_NAMES))
+    rates = np.abs(np.linalg.eigvals(state_space(held).a))
+    return float(rates[rates > 1e-6 * rates.max()].min())
+
+
+def _sigma(rig: Rig, channel: str, noise_rms: Mapping[str, float]) -> float:
+    if channel not in rig.sensors:
+        return math.inf
+    sensor = rig.sensors[channel]
+    sigma = noise_rms.get(channel, math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0)))
+    if not sigma > 0.0:
+        raise RigError(
+            f"rig {rig.name}: sensors.{channel}.noise = {sigma:g} {UNITS[channel]}, expected > 0, as measured"
+        )
+    return sigma

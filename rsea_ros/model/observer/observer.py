@@ -1,0 +1,134 @@
+"""The observer as its users see it: samples in, torques on both ends out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from rsea_ros.model.observer.assemble import assemble, without_delay
+from rsea_ros.model.observer.consistency import Consistency, consistency
+from rsea_ros.model.observer.filter import SIGMA
+from rsea_ros.model.observer.log import LATE, ORDER, REFUSED, STATE, TOO_LATE, WRENCH, empty_log, receive
+from rsea_ros.model.observer.noise import Noise, noise_of
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, Record
+
+GAP = 1.0
+"""s. Stamps that jump so far, either way, are of another run: the observer begins anew."""
+
+
+class Estimate(NamedTuple):
+    """Torques on the two ends and the disturbance on the gear, N m, and one sigma of each."""
+
+    distal: float
+    proximal: float
+    disturbance: float
+    sigma_distal: float
+    sigma_proximal: float
+    sigma_disturbance: float
+
+
+class Observer:
+    """A Kalman filter on a rig's unlumped model, by sample. Stamps are s since any epoch.
+
+    noise: of the sensors, from the rig when it is not given. hold: how long a command stays in force, s.
+    duration: over which drifts come to their full size, s.
+    """
+
+    def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
+                 duration: float = 60.0) -> None:  # fmt: skip
+        self._rig, self._delay = without_delay(rig)
+        self._noise = noise_of(rig) if noise is None else noise
+        self._hold, self._duration = hold, duration
+        self.restarts = -1
+        self._begin()
+
+    def command(self, t: float, torque: float) -> None:
+        """Take in a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
+        self._look_for_gap(t)
+        receive(self._model, self._state, self._log, t + self._delay, ORDER, torque, 0.0)
+
+    def state(self, t: float, position: float, motor_torque: float = math.nan) -> Estimate | None:
+        """Take in position (rad) and motor torque (N m), nan where it is missing; None when too late."""
+        return self._measured(t, STATE, position, motor_torque)
+
+    def ft(self, t: float, torque: float) -> Estimate | None:
+        """Take in a torque of the F/T sensor (N m); None when it is too late."""
+        return self._measured(t, WRENCH, torque, 0.0)
+
+    @property
+    def late(self) -> int:
+        """Samples that came after others with later stamps, and were put in their place."""
+        return int(self._log.place[LATE])
+
+    @property
+    def refused(self) -> int:
+        """Samples that came too late for that."""
+        return int(self._log.place[REFUSED])
+
+    def consistency(self) -> dict[str, Consistency]:
+        """Return for each channel how its innovations since the last call compare to what they should be."""
+        now = self._state.score.reshape(3, 3).copy()
+        change = now - self._score
+        self._score = now
+        return consistency(change)
+
+    def _begin(self) -> None:
+        self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
+        self._log = empty_log(len(self._state.whole))
+        self._at = self._state.whole.size - self._tail()
+        self._score, self._newest = np.zeros((3, 3)), math.nan
+        self.restarts += 1
+
+    def _tail(self) -> int:
+        """Return how far the estimate lies from the end of a state."""
+        return sum(part.size for part in (self._state.estimate, self._state.clock, self._state.score))
+
+    def _look_for_gap(self, t: float) -> None:
+        if abs(t - self._newest) > GAP:
+            self._begin()
+        if math.isnan(self._newest):
+            self._newest = t
+
+    def _measured(self, t: float, kind: int, a: float, b: float) -> Estimate | None:
+        self._look_for_gap(t)
+        self._newest = max(t, self._newest)
+        row = receive(self._model, self._state, self._log, t, kind, a, b)
+        if row == TOO_LATE:
+            return None
+        return Estimate(*self._log.saved[row, self._at : self._at + 2 * SIGMA].tolist())
+
+
+def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]:
+    """Run an observer over a record; return stamps and the estimates there.
+
+    Stamps: those of the F/T samples, without a sensor those of the positions, s, shape (n,). Estimates: N m,
+    shape (n, 6), in the order of Estimate.
+    """
+    wanted, t, rows = ("ft" if "ft" in record else "position"), [], []
+    for stamp, channel, a, b in _events(record):
+        if channel == "command":
+            observer.command(stamp, a)
+            continue
+        estimate = observer.state(stamp, a, b) if channel == "position" else observer.ft(stamp, a)
+        if channel == wanted and estimate is not None:
+            t.append(stamp)
+            rows.append(estimate)
+    return np.array(t), np.array(rows)
+
+
+def _events(record: Record) -> Iterator[tuple[float, str, float, float]]:
+    """Yield the samples of a record by stamp, position with the motor torque of the same stamp."""
+    events: list[tuple[float, int, str, float, float]] = []
+    torque = {}
+    if "motor_torque" in record:
+        torque = dict(zip(record["motor_torque"].t.tolist(), record["motor_torque"].y.tolist(), strict=True))
+    for order, name in enumerate(("position", "ft", "command")):
+        if name in record:
+            pairs = zip(record[name].t.tolist(), record[name].y.tolist(), strict=True)
+            events += [(t, order, name, y, torque.get(t, math.nan)) for t, y in pairs]
+    events.sort(key=lambda event: event[:2])
+    yield from ((t, name, a, b) for t, _, name, a, b in events)

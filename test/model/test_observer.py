@@ -1,0 +1,186 @@
+"""The observer on simulated benches: as sure as it says, whatever order and rhythm the samples come in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from bench.observer_truth import true_run
+from rsea_ros.errors import RigError
+from rsea_ros.model.lumped import lumped
+from rsea_ros.model.observer import Observer, noise_of, observe
+from rsea_ros.model.observer.transition import transition
+from rsea_ros.model.rig import EffectSetting, Sensor
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Record
+
+RATE = 280.0
+SETTLE = 100
+RIGS = ("paper_high_impedance", "paper_moving_output", "prototype_knee", "two_moving_outputs")
+FRICTION = EffectSetting("coulomb_friction", {"torque": 3.0})
+
+
+def rms(values):
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def chirp(seconds, amplitude=8.0):
+    """A chirp of 0.5 to 40 Hz with white noise, N m."""
+    t = np.arange(round(seconds * RATE)) / RATE
+    phase = 2.0 * np.pi * (0.5 * t + 39.5 / seconds / 2.0 * t**2)
+    return amplitude * np.sin(phase) + 3.0 * np.random.default_rng(1).standard_normal(len(t))
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """A run of the moving-output bench, and its truth."""
+    return true_run(load_rig("paper_moving_output"), chirp(3.0), RATE, seed=2)
+
+
+def test_transitions_are_those_of_van_loan():
+    rng = np.random.default_rng(0)
+    a, half = 30.0 * rng.standard_normal((5, 5)), rng.standard_normal((5, 5))
+    walk, t, f, q = half @ half.T, 0.02, np.empty((5, 5)), np.empty((5, 5))
+    transition(a, walk, np.ones(5), t, f, q)
+    block = expm(np.block([[-a, walk], [np.zeros((5, 5)), a.T]]) * t)
+    assert f == pytest.approx(block[5:, 5:].T, rel=1e-9, abs=1e-9)
+    assert q == pytest.approx(block[5:, 5:].T @ block[:5, 5:], rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_the_unlumped_observer_errs_as_it_says_and_the_lumped_one_much_more(name):
+    rig = load_rig(name)
+    truth = true_run(rig, chirp(3.0), RATE, seed=2)
+    _, estimates = observe(Observer(rig), truth.record)
+    for error, sigma in ((estimates[:, 0] - truth.distal, estimates[:, 3]),
+                         (estimates[:, 1] - truth.proximal, estimates[:, 4])):  # fmt: skip
+        assert rms((error / sigma)[SETTLE:]) < 1.9
+    _, rival = observe(Observer(lumped(rig)), truth.record)
+    unlumped_error, lumped_error = (rms((e[:, 1] - truth.proximal)[SETTLE:]) for e in (estimates, rival))
+    assert unlumped_error < 0.03 < 50.0 * unlumped_error < lumped_error
+
+
+def test_the_order_of_arrival_changes_nothing(moving):
+    """Commands early, samples up to 60 ms late and out of order: the last estimate is that of the order."""
+    rig, record = load_rig("paper_moving_output"), moving.record
+    in_order = observe(Observer(rig), record)[1][-1]
+    rng, observer, arrivals = np.random.default_rng(3), Observer(rig), []
+    for name in ("command", "position", "ft"):
+        for t, y in zip(record[name].t, record[name].y, strict=True):
+            early, late = (0.1, 0.0) if name == "command" else (0.0, 0.06)
+            arrivals.append((t + rng.uniform(-early, late), t, name, y))
+    torque = dict(zip(record["motor_torque"].t, record["motor_torque"].y, strict=True))
+    for _, t, name, y in sorted(arrivals):
+        if name == "command":
+            observer.command(t, y)
+        elif name == "position":
+            last = observer.state(t, y, torque[t])
+        else:
+            observer.ft(t, y)
+    last = observer.ft(record["ft"].t[-1], np.nan)
+    assert observer.late > 100 and observer.refused == 0
+    assert last[:3] == pytest.approx(in_order[:3], abs=2e-4)
+
+
+def test_jitter_and_loss_leave_it_as_sure_as_it_says():
+    """Stamps off by up to 1 ms, every seventh F/T sample and every fifth position lost."""
+    rig = load_rig("paper_high_impedance")
+    fine = true_run(rig, np.repeat(chirp(3.0), 10), 10.0 * RATE, seed=2)
+    rng = np.random.default_rng(4)
+    at = np.arange(10, len(fine.distal) - 10, 10)
+    at = at + rng.integers(-3, 4, size=len(at))
+    pick = {"ft": np.delete(at, slice(0, None, 7)), "position": np.delete(at, slice(0, None, 5))}
+    channels = {n: Channel(fine.record[n].t[i], fine.record[n].y[i]) for n, i in pick.items()}
+    command = Channel(fine.record["command"].t[::10], fine.record["command"].y[::10])
+    _, estimates = observe(Observer(rig), Record({"command": command, **channels}))
+    for k, true in ((0, fine.distal), (1, fine.proximal)):
+        error = estimates[:, k] - true[pick["ft"]]
+        assert rms((error / estimates[:, 3 + k])[SETTLE:]) < 1.9
+
+
+def test_without_ft_the_doubt_grows_and_its_return_is_no_surprise(moving):
+    observer = Observer(load_rig("paper_moving_output"))
+    record, gone = moving.record, (1.5, 1.8)
+    before = during = after = None
+    for k, t in enumerate(record["ft"].t):
+        observer.command(record["command"].t[k], record["command"].y[k])
+        if gone[0] < t < gone[1]:
+            during = observer.state(t, np.nan)
+            continue
+        held = observer.state(t, record["position"].y[k])
+        after = observer.ft(t, record["ft"].y[k])
+        if during is None:
+            before = after
+        elif t < gone[1] + 1.5 / RATE:
+            assert abs(held.distal - moving.distal[k]) < 3.0 * held.sigma_distal
+            assert abs(after.distal - held.distal) < 3.0 * held.sigma_distal
+            assert abs(after.proximal - held.proximal) < 3.0 * held.sigma_proximal
+    assert during.sigma_distal > 1.5 * before.sigma_distal
+    assert after.sigma_distal == pytest.approx(before.sigma_distal, rel=0.05)
+
+
+def test_the_innovation_test_names_the_channel_and_passes_a_right_model(moving):
+    rig = load_rig("paper_moving_output")
+    right, wrong = (
+        Observer(rig),
+        Observer(rig.with_values({"spring.stiffness": 0.9 * rig["spring.stiffness"]})),
+    )
+    for observer in (right, wrong):
+        observe(observer, moving.record)
+    assert not any(channel.broken for channel in right.consistency().values())
+    told = wrong.consistency()
+    assert told["ft"].broken and told["ft"].ratio > 2.0 and not told["motor_torque"].broken
+
+
+def test_an_effect_of_the_extended_model_is_a_known_torque():
+    rig = load_rig("paper_moving_output").with_effects(FRICTION)
+    truth = true_run(rig, chirp(3.0), RATE, seed=2)
+    errors, disturbances = [], []
+    for model in (rig.with_effects(), rig):
+        _, estimates = observe(Observer(model), truth.record)
+        errors.append(rms((estimates[:, 1] - truth.proximal)[SETTLE:]))
+        disturbances.append(rms(estimates[SETTLE:, 2]))
+    assert errors[1] < 0.5 * errors[0]
+    assert disturbances[1] < 0.2 * disturbances[0] and disturbances[0] > 1.0
+
+
+def test_a_drive_that_does_not_follow_its_command_is_believed_for_its_current():
+    rig = load_rig("paper_high_impedance")
+    limited = rig.with_effects(EffectSetting("torque_saturation", {"limit": 4.0}))
+    truth = true_run(limited, chirp(3.0), RATE, seed=2)
+    observer = Observer(rig)
+    _, estimates = observe(observer, truth.record)
+    assert observer.consistency()["motor_torque"].broken
+    assert rms((estimates[:, 0] - truth.distal)[SETTLE:]) < 0.03
+    assert rms(estimates[SETTLE:, 2]) < 0.2
+
+
+def test_a_delayed_command_of_the_model_acts_later():
+    rig = load_rig("paper_high_impedance").with_effects(EffectSetting("command_delay", {"delay": 5e-3}))
+    truth = true_run(rig, chirp(2.0), RATE, seed=2)
+    _, estimates = observe(observer := Observer(rig), truth.record)
+    assert rms(((estimates[:, 0] - truth.distal) / estimates[:, 3])[SETTLE:]) < 1.9
+    assert not observer.consistency()["ft"].broken
+
+
+def test_another_run_begins_anew(moving):
+    observer = Observer(load_rig("paper_moving_output"))
+    first = observe(observer, moving.record)[1]
+    again = observe(observer, moving.record)[1]
+    assert observer.restarts == 1 and again == pytest.approx(first)
+
+
+def test_gains_come_from_what_identification_measured():
+    rig = load_rig("paper_high_impedance")
+    quiet = noise_of(rig)
+    assert quiet.ft == rig.sensors["ft"].noise
+    assert quiet.disturbance == pytest.approx(np.hypot(0.05, 0.109989 / np.sqrt(12.0)))
+    assert 1.0 / quiet.tau == pytest.approx(2.0 * np.pi * 6.365, rel=0.01)
+    told = noise_of(rig, {"ft": 0.3, "position": 1e-4}, {"ft": 0.5})
+    assert (told.ft, told.position, told.disturbance) == (0.3, 1e-4, pytest.approx(0.4))
+    with pytest.raises(RigError, match=r"sensors\.ft\.noise = 0 N m, expected > 0"):
+        noise_of(replace(rig, sensors={"ft": Sensor()}))
