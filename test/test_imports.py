@@ -21,7 +21,7 @@ OWN = {
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},
     "diagnosis": BASE | {"effects", "model", "identification"},
-    "control": BASE,
+    "control": BASE | {"effects", "model"},
     "design": BASE | {"model"},
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},

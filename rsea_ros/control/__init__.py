@@ -1,0 +1,1 @@
+"""Torque control: a law designed from the rig, its margins over the loads, what the actuator becomes."""

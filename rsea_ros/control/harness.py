@@ -1,0 +1,54 @@
+"""The loop faster than real time: the simulated bench and the controller, one sample at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import Plant
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One run: t (s), desired, ft and command (N m), velocity (rad/s), all at the samples, shape (n,)."""
+
+    t: FloatArray
+    desired: FloatArray
+    ft: FloatArray
+    command: FloatArray
+    velocity: FloatArray
+
+    def error(self, settle: float = 0.0) -> float:
+        """Return the RMS of ft - desired from `settle` (s) on, over that of desired."""
+        late = self.t >= settle
+        wanted = self.desired[late]
+        return float(np.sqrt(np.mean((self.ft[late] - wanted) ** 2) / np.mean(wanted**2)))
+
+
+def closed_loop(
+    rig: Rig,
+    rate: float,
+    controller: TorqueController,
+    desired: FloatArray,
+    *,
+    noise: bool = True,
+    seed: int = 0,
+) -> Trace:
+    """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
+
+    A command that is computed at a sample acts from the next one on: one sample of delay.
+    """
+    plant = Plant(rig, rate, seed=seed, noise=noise)
+    sample = plant.step(0.0)
+    pending, rows = 0.0, np.empty((len(desired), 3))
+    controller.start(Reading(sample.ft, sample.velocity, sample.position))
+    for k, wanted in enumerate(desired):
+        command = controller.step(Reading(sample.ft, sample.velocity, sample.position), float(wanted))
+        rows[k] = sample.ft, command, sample.velocity
+        sample = plant.step(pending)
+        pending = command
+    return Trace(np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2])

@@ -1,0 +1,45 @@
+"""The loads that a controller must stand: the actuator clamped at both ends, free, and what lies between."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import END_NAMES, Rig
+
+LOCKED = "locked"
+MULTIPLES = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
+"""Of the free ends' inertia. At 100 times the paper's load hardly moves at the frequencies of control."""
+
+
+def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
+    """Return the rig by load: `locked`, and the free ends of `free` with 1 to 100 times their inertia.
+
+    free: a bench whose ends are the lightest load; by default the rig itself. The actuator is the rig's in
+    all. Raises ParameterError where neither has a free end.
+    """
+    loads = {LOCKED: locked(rig)}
+    lightest = with_ends(rig, free or rig)
+    ends = [end for end in END_NAMES if lightest.end_is_free(end)]
+    if free is not None and not ends:
+        raise ParameterError(
+            f"rig {free.name}: both ends are clamped, expected a free one: it is the lightest load"
+        )
+    for multiple in MULTIPLES if ends else ():
+        inertias = {f"{end}.inertia": multiple * lightest[f"{end}.inertia"] for end in ends}
+        loads[f"free x {multiple:g}"] = lightest.with_values(inertias)
+    return loads
+
+
+def locked(rig: Rig) -> Rig:
+    """Return the rig with both ends clamped."""
+    return replace(rig, clamped=frozenset(END_NAMES))
+
+
+def with_ends(rig: Rig, other: Rig) -> Rig:
+    """Return the rig between the ends of another one: what is clamped there, and what hangs on it."""
+    prefixes = (*(f"{end}." for end in END_NAMES), "housing.", "proximal_spring.")
+    ends = {name: q for name, q in other.quantities.items() if name.startswith(prefixes)}
+    own = {name: q for name, q in rig.quantities.items() if not name.startswith(prefixes)}
+    return replace(rig, quantities={**own, **ends}, clamped=other.clamped)

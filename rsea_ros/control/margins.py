@@ -1,0 +1,47 @@
+"""How far a loop is from the edge of stability: gain, phase, delay, and the distance to -1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.model.response import ComplexArray
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Margins:
+    """crossover: the highest one, Hz. phase: deg. gain: dB, up or down. delay: samples.
+
+    Each is the smallest over all crossings, inf where there is none. sensitivity: largest |1 / (1 + L)|.
+    """
+
+    crossover: float
+    phase: float
+    gain: float
+    delay: float
+    sensitivity: float
+
+
+def margins(loop: ComplexArray, hz: FloatArray, period: float) -> Margins:
+    """Return the margins of a loop from its response, by straight lines between its points."""
+    crossings, at = _crossings(np.abs(loop) - 1.0, loop, hz)
+    behind = np.angle(-crossings) % (2.0 * np.pi)  # turned back by so much it meets -1
+    phases = np.degrees(np.abs(np.angle(-crossings)))
+    turned, _ = _crossings(loop.imag, loop, hz)
+    gains = np.abs(20.0 * np.log10(np.abs(turned[turned.real < 0.0])))
+    return Margins(
+        crossover=float(at.max(initial=0.0)),
+        phase=float(phases.min(initial=np.inf)),
+        gain=float(gains.min(initial=np.inf)),
+        delay=float((behind / (2.0 * np.pi * at * period)).min(initial=np.inf)),
+        sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
+    )
+
+
+def _crossings(sign: FloatArray, loop: ComplexArray, hz: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """Return the loop and the frequency where `sign` passes zero."""
+    i = np.nonzero(sign[:-1] * sign[1:] < 0.0)[0]
+    share = sign[i] / (sign[i] - sign[i + 1])
+    return loop[i] + share * (loop[i + 1] - loop[i]), hz[i] + share * (hz[i + 1] - hz[i])
