@@ -18,6 +18,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 _PEAKS = 2
+_LIMITS = (0.95, 0.85, 0.7, 0.5)
 _CYCLES = np.arange(0.5, 60.0, 0.125)
 
 
@@ -32,14 +33,25 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
     names = {p.name: p.unit for p in effect.parameters}
     if "cycles_per_revolution" in names:
         return [{**effect.typical, **hint} for hint in _cycle_hints(case, rig)] or starts
+    if "limit" in names:
+        return [{**effect.typical, "limit": limit} for limit in _limit_hints(case)] or starts
     if {"stiffness", "inertia"} <= set(names):
-        return starts + _mode_hints(effect, case, rig, outputs)
+        return _mode_hints(effect, case, rig, outputs) or starts
     if "Hz" in names.values():
         frequency = next(n for n, unit in names.items() if unit == "Hz")
         channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
         hints = _line_hints(case, channel, outputs[channel], names, frequency, effect)
         return [{**effect.typical, **hint} for hint in hints] or starts
     return starts
+
+
+def _limit_hints(case: Case) -> list[float]:
+    """Return where a torque could stop growing, N m: the largest measured, and shares of what is asked."""
+    if not isinstance(case.drive, Drive):
+        return []
+    asked = float(np.max(np.abs(case.drive.command)))
+    measured = np.abs(case.measured.get("motor_torque", np.zeros(0)))
+    return [float(np.quantile(measured, 0.999))] * bool(len(measured)) + [s * asked for s in _LIMITS]
 
 
 def _mode_hints(

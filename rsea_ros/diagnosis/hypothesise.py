@@ -1,7 +1,8 @@
 """Hypotheses: every effect of the catalogue tried on the residual, cheaply and generously.
 
 From each start one simulation and one derivative for each of the effect's parameters; the nominal values
-move along with the derivatives they already have. Two such steps show what a full fit would gain.
+move along with the derivatives they already have. Two such steps show what a full fit would gain. A mode is
+too sharp for that: near it the nominal values need derivatives of their own.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns
+from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
 from rsea_ros.signals import FloatArray
 
@@ -44,15 +45,28 @@ def extended_problem(present: Problem, effect: Effect, start: dict[str, float]) 
 
 def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
     """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have."""
+    try_start = _with_new_derivatives if is_mode(effect) else _from_start
     best: Hypothesis | None = None
     for start in starts:
         try:
-            tried = _from_start(present, effect, start)
+            tried = try_start(present, effect, start)
         except RseaError:
             continue
         if best is None or tried.cost < best.cost:
             best = tried
     return best
+
+
+def is_mode(effect: Effect) -> bool:
+    """Tell whether an effect adds a mode: a mode has a damping ratio."""
+    return any(p.name == "damping_ratio" for p in effect.parameters)
+
+
+def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:
+    problem = extended_problem(present.problem, effect, start)
+    theta = np.concatenate([present.theta, start_vector(problem.unknowns)[len(present.theta) :]])
+    solution = solve(problem, theta, iterations=_STEPS)
+    return Hypothesis(effect, problem, solution.theta, solution.cost)
 
 
 def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:

@@ -32,6 +32,8 @@ _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
+_WORTH = 0.4
+"""Of what the best takes off the cost on pieces: what takes less off is not fitted to everything."""
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 
@@ -68,7 +70,8 @@ class Round:
     @cached_property
     def on_pieces(self) -> Solution:
         """The present model on short pieces, with clocks taken as right."""
-        pieces = tuple(heavier(w, self.present.choose) for c in self.cases for w in windows_of(c))
+        runs = zip(self.cases, self.present.outputs, strict=True)
+        pieces = tuple(heavier(w, self.present.choose) for c, out in runs for w in windows_of(c, out))
         solution = self.present.solution
         return linearised(*without_clocks(replace(solution.problem, cases=pieces), solution.theta))
 
@@ -93,14 +96,16 @@ class Round:
         close = sorted(self.pool.map(self._fit_pieces, worth), key=lambda h: h.cost)
         if not close:
             return []
-        near = [h for i, h in enumerate(close) if i < _FULL_FITS or h.cost < _CLOSE * close[0].cost]
-        near = near[: 2 * _FULL_FITS]
-        heard, rivals = {h.name for h in near}, close[0].effect.claims.confusable_with
+        best, rivals = close[0].cost, close[0].effect.claims.confusable_with
+        worst = self.on_pieces.cost - _WORTH * (self.on_pieces.cost - best)
+        near = [h for h in close[:_FULL_FITS] if h.cost <= worst]
+        near += [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
+        heard = {h.name for h in near}
         fitted_on_pieces = {h.name for h in close}
         unheard = [h for h in (*close, *screened) if h.name in rivals and h.name not in heard]
         once = {h.name: h for h in reversed(unheard)}.values()
         late = [h if h.name in fitted_on_pieces else self._fit_pieces(h) for h in once]
-        return [*near, *late]
+        return [*near, *(h for h in late if h.cost <= worst)]
 
     def _fit_pieces(self, h: Hypothesis) -> Hypothesis:
         self._say(f"fitting {h.name}", 0.5)

@@ -11,6 +11,7 @@ from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -36,6 +37,7 @@ def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> S
         return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))
     case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
     moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
+    moved = in_phase(moved, judging.record)
     return Stage(
         model.solution, model.outputs, train, score(problem, (case,), simulated((case,), moved, offsets))
     )

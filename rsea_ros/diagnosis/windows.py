@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from rsea_ros.diagnosis.split import BLOCK, FIT, part
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
+from rsea_ros.signals import FloatArray
 
 _RUN_UP = 0.5
 """s before a piece that are simulated and not compared: the state there is the measured one."""
@@ -16,9 +18,10 @@ _ENOUGH = 14.0
 """s of data in all pieces together."""
 
 
-def windows_of(case: Case) -> tuple[Case, ...]:
+def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...]:
     """Return pieces of a case, each a run-up and the FIT blocks after it, about 14 s of data in all.
 
+    Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
     fit = part(case, FIT)
@@ -26,10 +29,24 @@ def windows_of(case: Case) -> tuple[Case, ...]:
     if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
         return (fit,)
     starts = np.arange(4.0 * BLOCK, drive.duration - 2.0 * BLOCK, 4.0 * BLOCK)
-    every = max(1, round(len(starts) * 2.0 * BLOCK / _ENOUGH))
-    return tuple(
-        _piece(fit, drive, float(t) - _RUN_UP, float(t) + 2.0 * BLOCK) for t in starts[every // 2 :: every]
-    )
+    half = round(0.5 * _ENOUGH / (2.0 * BLOCK))
+    spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
+    misfit = np.array([_misfit(fit, outputs, float(t)) for t in starts])
+    misfit[spread] = -1.0
+    worst = np.argsort(misfit)[len(spread) - 2 * half :]
+    chosen = starts[np.sort(np.concatenate([spread, worst]))]
+    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + 2.0 * BLOCK) for t in chosen)
+
+
+def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float) -> float:
+    """Return the power of a residual in two blocks, each channel over its power in all, summed."""
+    total = 0.0
+    for n in case.measured.keys() & outputs.keys():
+        power = np.where(case.mask[n], (case.measured[n] - outputs[n]) ** 2, 0.0)
+        t = case.t[n] - case.start
+        inside = (t >= begin) & (t < begin + 2.0 * BLOCK)
+        total += float(power[inside].sum() / max(power.sum(), 1e-300))
+    return total
 
 
 def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:

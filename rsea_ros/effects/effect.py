@@ -35,7 +35,8 @@ class Parameter:
 
     null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
     may well have. starts: where fits begin besides `typical`, for problems with several minima.
-    optional: may be left out; then it is `null`.
+    optional: may be left out; then it is `null`. per_record: another in every record, such as the phase that
+    the mains had when it began.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Parameter:
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
     optional: bool = False
+    per_record: bool = False
 
 
 @dataclass(frozen=True)

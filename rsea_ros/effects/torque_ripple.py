@@ -40,7 +40,13 @@ EFFECT = Effect(
             logarithmic=True,
         ),
         Parameter(
-            "phase", "rad", null=0.0, low=-math.pi, high=math.pi, typical=0.7, starts=(-2.4, -0.9, 2.3)
+            "phase",
+            "rad",
+            null=0.0,
+            low=-2.0 * math.pi,
+            high=2.0 * math.pi,
+            typical=0.7,
+            starts=(-2.4, -0.9, 2.3),
         ),
     ),
     claims=Claims("position", "neither", amplitude_exponent=None),

@@ -202,15 +202,16 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
 
 
 def identified_rig(solution: Solution, confidence: Confidence) -> Rig:
-    """Return the rig with the fitted values, their intervals, and their doubt as the next fit's spread."""
-    rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+    """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
+    rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+    sensors = {n: replace(s, clock=s.clock + clocks.get(n, 0.0)) for n, s in rig.sensors.items()}
     quantities = dict(rig.quantities)
     for estimate in parameters_of(solution, confidence):
         if estimate.name in quantities:
             quantities[estimate.name] = replace(
                 quantities[estimate.name], ci95=estimate.ci95, source="identified"
             )
-    return replace(rig, quantities=quantities)
+    return replace(rig, quantities=quantities, sensors=sensors)
 
 
 def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
 from rsea_ros.signals import FloatArray, Record
@@ -49,6 +50,7 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
         motion = motion_from(record)
         torque = inverse_torque(rig, motion)
         return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
+    rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
     return {n: _on_measured_zero(c) if rig.zero_unknown(n) else c for n, c in compared.items()}
 

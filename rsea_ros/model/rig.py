@@ -67,12 +67,13 @@ class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
 
     zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
-    so only changes of its values tell something.
+    so only changes of its values tell something. clock: s, how much later than its stamps it reads.
     """
 
     noise: float = 0.0
     quantum: float = 0.0
     zero_unknown: bool = False
+    clock: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -164,6 +165,10 @@ class Rig:
     def zero_unknown(self, channel: str) -> bool:
         """Tell whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
+
+    def clock(self, channel: str) -> float:
+        """Return how much later than its stamps a channel is read, s."""
+        return self.sensors[channel].clock if channel in self.sensors else 0.0
 
     def end_is_free(self, end: str) -> bool:
         """Tell whether an end can move (it has an inertia of its own)."""

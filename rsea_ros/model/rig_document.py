@@ -38,6 +38,8 @@ _TOP = {
     "effects",
     *_GROUPS,
 }
+_LATEST = 0.01
+"""s. A clock further off than this is no clock error but a delay of the bench."""
 _SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
 
 
@@ -102,7 +104,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
 
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
-    return {**body, "zero_unknown": True} if sensor.zero_unknown else body
+    body |= {"zero_unknown": True} if sensor.zero_unknown else {}
+    return body | ({"clock": {"value": sensor.clock, "unit": "s"}} if sensor.clock else {})
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -149,12 +152,25 @@ def _interval(item: Any, name: str, unit: str) -> tuple[float, float]:
     return low, high
 
 
+def _clock(fields: Mapping[str, Any], name: str) -> float:
+    """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
+    field = f"sensors.{name}.clock"
+    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
+    only_keys(item, {"value", "unit"}, field)
+    if item.get("unit") != "s":
+        raise RigError(f"{field}.unit = {item.get('unit')!r}, expected 's'")
+    value = number(item.get("value"), f"{field}.value", "s")
+    if not abs(value) < _LATEST:
+        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way")
+    return value
+
+
 def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     only_keys(body, set(UNITS), "sensors")
     sensors = {}
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown"}, f"sensors.{name}")
+        only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown", "clock"}, f"sensors.{name}")
         if fields.get("unit") != UNITS[name]:
             raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
         noise, quantum = (
@@ -164,7 +180,8 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
             raise RigError(
                 f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
             )
-        sensors[name] = Sensor(noise, quantum, switch(fields, f"sensors.{name}.zero_unknown"))
+        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
+        sensors[name] = Sensor(noise, quantum, floating, clock)
     return sensors
 
 
