@@ -13,6 +13,7 @@ from rsea_ros.model.observer.consistency import Consistency, consistency
 from rsea_ros.model.observer.filter import SIGMA
 from rsea_ros.model.observer.log import LATE, ORDER, REFUSED, STATE, TOO_LATE, WRENCH, empty_log, receive
 from rsea_ros.model.observer.noise import Noise, noise_of
+from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
@@ -31,12 +32,27 @@ class Estimate(NamedTuple):
     sigma_disturbance: float
 
 
+class ErrorModel(NamedTuple):
+    """How noise of the sensors comes into T_d: e = A e + K v, T_d error = c e, v of variances r.
+
+    a: shape (n, n), k: (n, 2), r: (2,) of position (rad^2) and ft (N^2 m^2), c: (n,). sigma: of T_d, N m.
+    """
+
+    a: FloatArray
+    k: FloatArray
+    r: FloatArray
+    c: FloatArray
+    sigma: float
+
+
 class Observer:
     """A Kalman filter on a rig's unlumped model, by sample. Stamps are s since any epoch.
 
     noise: of the sensors, from the rig when it is not given. hold: how long a command stays in force, s.
     duration: over which drifts come to their full size, s.
     """
+
+    _score: FloatArray
 
     def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
                  duration: float = 60.0) -> None:  # fmt: skip
@@ -75,6 +91,16 @@ class Observer:
         change = now - self._score
         self._score = now
         return consistency(change)
+
+    def error_model(self, dt: float) -> ErrorModel:
+        """Return the error's dynamics at a period of dt s, with the gain K = P h' / r of this moment."""
+        m, p, size = self._model, self._state.p, len(self._state.p)
+        f, q = np.empty((size, size)), np.empty((size, size))
+        transition(m.a, m.walk, m.scale, dt, f, q)
+        k = p @ m.measured.T / m.noise[:2]
+        heard = np.where(np.isfinite(m.noise[:2]), m.noise[:2], 0.0)
+        sigma = float(self._state.estimate[SIGMA])
+        return ErrorModel((np.eye(size) - k @ m.measured) @ f, k, heard, m.estimated[0], sigma)
 
     def _begin(self) -> None:
         self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
