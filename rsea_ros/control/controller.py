@@ -13,16 +13,17 @@ limits let it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from rsea_ros.control.compensation import COMPENSATED, Compensation, compensation
-from rsea_ros.control.feedforward import Inverse, inverse
 from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
 from rsea_ros.control.prediction import Prediction
-from rsea_ros.control.sampled import FT, POSITION, VELOCITY, Sampled, sampled
+from rsea_ros.control.reference import Reference
+from rsea_ros.control.sampled import FT, POSITION, VELOCITY, sampled
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -41,11 +42,15 @@ class Limits:
 
 @dataclass(frozen=True)
 class Reading:
-    """One sample of the bench: N m, rad/s, rad."""
+    """One sample of the bench: N m, rad/s, rad; motor_torque: N m over the sample before, nan if unknown.
+
+    The measured torque tells of a command that came late or was cut down by the driver.
+    """
 
     ft: float
     velocity: float
     position: float
+    motor_torque: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -67,8 +72,7 @@ class TorqueController:
                  compensate: Iterable[str] = COMPENSATED, preview: bool = False) -> None:  # fmt: skip
         """rate: Hz. preview: desired torques are those of two samples later, known ahead: no prediction."""
         self._law: Law = law_of(rig, rate, gains)
-        self._model: Sampled = sampled(rig, rate)
-        self._inverse: Inverse = inverse(self._model)
+        self._reference = Reference(sampled(rig, rate))
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction = Prediction(CORNER, 1.0 / rate)
         self._preview, self._limits = preview, limits or Limits()
@@ -76,86 +80,79 @@ class TorqueController:
 
     def start(self, reading: Reading) -> None:
         """Begin anew, from zero torque, with the bench as it is: nothing jumps."""
-        wanted = np.array([reading.ft, reading.velocity])
-        self._x: FloatArray = np.linalg.lstsq(self._model.c[[FT, VELOCITY]], wanted, rcond=None)[0]
-        self._now = self._next = self._model.c @ self._x
-        self._state = State(ft=reading.ft, velocity=reading.velocity)
+        self._reference.start(reading.ft, reading.velocity)
         self._prediction.start(reading.ft)
-        self._told = np.full(2, reading.ft)
-        self._age = 0
+        self._state = State(ft=reading.ft, velocity=reading.velocity)
+        self._sent, self._known = 0.0, (0.0, 0.0)
+        self._age, self._desired = 0, reading.ft
         self.share = Share()
 
     def step(self, reading: Reading, desired: float, missed: int = 0) -> float:
         """Return the torque (N m) that acts from the next sample on.
 
-        desired: N m, at this sample, or two samples later with preview. missed: samples lost since the last
-        one.
+        desired: N m, at this sample, or two samples later with preview. missed: samples lost before it.
         """
-        for _ in range(missed):
-            self._coast(desired)
-        state = _between(self._state, reading, missed)
-        ahead = self._ahead(desired)
-        forward = self._inverse.torque(
-            self._x, ahead[: self._inverse.moves], float(self._next[FT] - self._told[1])
-        )
-        back, state = feedback(
-            self._law, state, float(self._now[FT]) - reading.ft, reading.ft, reading.velocity
-        )
+        for wanted in np.linspace(self._desired, desired, missed + 2)[1:-1]:
+            self._coast(float(wanted))
+        self._hear(reading, missed)
+        ahead, model = self._ahead(desired), self._reference
+        forward, reference = model.torque(ahead), float(model.now[FT])
+        back, state = feedback(self._law, self._state, reference - reading.ft, reading.ft, reading.velocity)
         known, crossing = self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + back + known + crossing
         torque = self._within(asked)
-        self._state = hold(state, torque - known)
-        reference = float(self._now[FT])
-        self._told = np.array([self._told[1], ahead[0]])
-        self._advance(forward + torque - asked)
+        self._remember(hold(state, torque - known), torque, known)
+        model.advance(forward + torque - asked, float(ahead[0]))
         self.share = Share(reference, forward, back, known + crossing, torque, torque != asked)
         return torque
 
     def _ahead(self, desired: float) -> FloatArray:
-        samples = max(self._inverse.moves, 2)
+        self._desired = desired
+        samples = self._reference.samples
         return np.full(samples, desired) if self._preview else self._prediction.ahead(desired, samples)
 
     def _coast(self, desired: float) -> None:
-        """Pass over a sample that did not come: the last torque goes on acting, the model stays."""
-        self._ahead(desired)
-        self._state = hold(self._state, self._state.newest)
-        self._now = self._next
+        """Pass over a sample that did not come: the last torque goes on acting."""
+        ahead = self._ahead(desired)
+        self._reference.advance(self._reference.torque(ahead), float(ahead[0]))
+        self._remember(hold(self._state, self._state.newest), self._sent, self._known[1])
 
-    def _advance(self, torque: float) -> None:
-        self._x = self._model.a @ self._x + self._model.b * torque
-        self._now, self._next = self._next, self._model.c @ self._x
+    def _remember(self, state: State, torque: float, known: float) -> None:
+        self._state = state
+        self._sent, self._known = torque, (self._known[1], known)
         self._age += 1
+
+    def _hear(self, reading: Reading, missed: int) -> None:
+        """Take the measured motor torque for the one that acted; after lost samples, read those between."""
+        s, share = self._state, missed / (missed + 1)
+        acted = reading.motor_torque - self._known[0]
+        self._state = s._replace(
+            ft=s.ft + share * (reading.ft - s.ft),
+            velocity=s.velocity + share * (reading.velocity - s.velocity),
+            applied=acted if math.isfinite(acted) else s.applied,
+        )
 
     def _compensated(self, reading: Reading, forward: float) -> float:
         """Return the torque against friction and ripple, N m, of the motion that the model will make."""
-        c, model = self._compensation, self._model
+        c, model = self._compensation, self._reference
         if not (c.frictions or c.ripples):
             return 0.0
-        end = model.c @ (model.a @ self._x + model.b * forward)
-        off = reading.position - float(self._now[POSITION])
-        friction = c.friction(float(self._next[VELOCITY]), float(end[VELOCITY]))
-        return friction + c.ripple(off + float(self._next[POSITION]), off + float(end[POSITION]))
+        begin, end = model.next, model.after(forward)
+        off = reading.position - float(model.now[POSITION])
+        friction = c.friction(float(begin[VELOCITY]), float(end[VELOCITY]))
+        return friction + c.ripple(off + float(begin[POSITION]), off + float(end[POSITION]))
 
     def _crossing(self, ahead: FloatArray) -> float:
         """Return J w' + b w of the way across the gap, N m, mean over the hold, by central differences."""
         c, h = self._compensation, self._law.period
         if not c.gap:
             return 0.0
-        way = [c.way(float(torque)) for torque in (*self._told, ahead[0], ahead[1])]
+        way = [c.way(float(torque)) for torque in (*self._reference.promised, ahead[0], ahead[1])]
         start, stop = 0.5 * (way[2] - way[0]) / h, 0.5 * (way[3] - way[1]) / h
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
     def _within(self, torque: float) -> float:
-        limits, before = self._limits, self.share.command
-        step = limits.slew * self._law.period
-        grown = min(1.0, (self._age + 1) * self._law.period / limits.ramp) if limits.ramp > 0.0 else 1.0
-        torque = min(max(torque, before - step), before + step)
+        limits, before, h = self._limits, self._sent, self._law.period
+        grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
+        torque = min(max(torque, before - limits.slew * h), before + limits.slew * h)
         return min(max(torque, -limits.torque * grown), limits.torque * grown)
-
-
-def _between(s: State, reading: Reading, missed: int) -> State:
-    """Return the state as if the sample before had been read on a straight line."""
-    share = missed / (missed + 1)
-    return s._replace(
-        ft=s.ft + share * (reading.ft - s.ft), velocity=s.velocity + share * (reading.velocity - s.velocity)
-    )

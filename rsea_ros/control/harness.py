@@ -8,7 +8,7 @@ import numpy as np
 
 from rsea_ros.control.controller import Reading, TorqueController
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import Plant
+from rsea_ros.model.simulation import Plant, Sample
 from rsea_ros.signals import FloatArray
 
 
@@ -45,10 +45,14 @@ def closed_loop(
     plant = Plant(rig, rate, seed=seed, noise=noise)
     sample = plant.step(0.0)
     pending, rows = 0.0, np.empty((len(desired), 3))
-    controller.start(Reading(sample.ft, sample.velocity, sample.position))
+    controller.start(_reading(sample))
     for k, wanted in enumerate(desired):
-        command = controller.step(Reading(sample.ft, sample.velocity, sample.position), float(wanted))
+        command = controller.step(_reading(sample), float(wanted))
         rows[k] = sample.ft, command, sample.velocity
         sample = plant.step(pending)
         pending = command
     return Trace(np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2])
+
+
+def _reading(sample: Sample) -> Reading:
+    return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque)

@@ -22,7 +22,7 @@ ON_FT = ("ft_sensor_lag", "ft_gain_error")
 def lagging(rig: Rig, plant: Sampled, hz: FloatArray) -> ComplexArray:
     """Return the response of a sampled rig with those of its effects that lag, shape (3, n)."""
     response = responses(plant, hz)
-    s: ComplexArray = 2j * np.pi * np.asarray(hz, dtype=np.float64)
+    s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     for setting in rig.effects:
         if setting.name in (*ON_TORQUE, *ON_FT):
             value = effect_named(setting.name).vector(setting.parameters)[0]

@@ -1,0 +1,86 @@
+"""Parameters of the controller node, and what becomes of them: loads, gains, controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.law import Gains
+from rsea_ros.control.loads import load_range
+from rsea_ros.control.synthesis import Demand, Design, check, design
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._parameters import Parameter
+
+Values = Mapping[str, Any]
+
+LIGHTEST = "paper_moving_output"
+GAINS = ("k_p", "k_d", "q_frequency")
+TABLE = (
+    Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
+    Parameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
+    Parameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
+    Parameter("axis", "torque.z", "actuator axis of the wrench on ft"),
+    Parameter("k_p", -1.0, "gain on the torque error; -1: all three gains by synthesis", "", -1.0, 1e4),
+    Parameter("k_d", -1.0, "gain on the rate of the torque error; -1: see k_p", "s", -1.0, 1e3),
+    Parameter("q_frequency", -1.0, "of the disturbance observer's filter; -1: see k_p", "Hz", -1.0, 500.0),
+    Parameter("phase_locked", 45.0, "least phase margin with both ends clamped", "°", 5.0, 89.0),
+    Parameter("phase_free", 35.0, "least phase margin with any other load", "°", 5.0, 89.0),
+    Parameter("gain_margin", 6.0, "least gain margin", "dB", 1.0, 20.0),
+    Parameter("delay_margin", 1.0, "least delay margin", "samples", 0.0, 20.0),
+    Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
+    Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
+    Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
+    Parameter("slew_limit", 40_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
+    Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
+    Parameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
+    Parameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
+)
+
+
+def design_of(values: Values) -> Design:
+    """Return the design that is asked for. Raises ParameterError where it is unstable with a load."""
+    rig = load_rig(values["rig"])
+    loads = load_range(rig, lightest(rig, values["free"]))
+    stated = [values[name] for name in GAINS]
+    if all(value >= 0.0 for value in stated):
+        return check(rig, loads, values["rate"], Gains(*stated))
+    if any(value >= 0.0 for value in stated):
+        given = ", ".join(f"{value:g}" for value in stated)
+        raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all three, or -1 for all")
+    names = ("phase_locked", "phase_free", "gain_margin", "delay_margin")
+    return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
+
+
+def lightest(rig: Rig, name: str = "") -> Rig:
+    """Return the rig whose ends are the lightest load."""
+    if name:
+        return load_rig(name)
+    return load_rig(LIGHTEST) if rig.clamped == set(END_NAMES) else rig
+
+
+def controller_of(values: Values, found: Design) -> TorqueController:
+    """Return the controller that the parameters ask for."""
+    limits = Limits(values["torque_limit"], values["slew_limit"], values["ramp"])
+    options = {} if values["compensate"] else {"compensate": ()}
+    return TorqueController(
+        load_rig(values["rig"]),
+        values["rate"],
+        found.gains,
+        limits=limits,
+        preview=values["preview"],
+        **options,
+    )
+
+
+def summary(found: Design) -> list[str]:
+    """Return gains and margins as lines for the log."""
+    g = found.gains
+    head = f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, Q {g.q_frequency:.1f} Hz at {found.rate:g} Hz"
+    return [head] + [
+        f"{name}: crossover {m.crossover:.1f} Hz, phase margin {m.phase:.1f} deg, "
+        f"gain margin {m.gain:.1f} dB, delay margin {m.delay:.2f} samples"
+        for name, m in found.margins.items()
+    ]
