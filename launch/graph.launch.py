@@ -15,6 +15,7 @@ ARGUMENTS = {
     "namespace": ("rsea", "namespace of all topics"),
     "rig": ("paper_high_impedance", "the bench: a name in config/rigs or a file"),
     "bag": ("", "bag that replay plays"),
+    "model": ("true", "estimate the torques, and say whether the actuator is a pure torque source"),
     "identify": ("true", "fit the rig to what is measured"),
     "record": ("false", "write a bag, as config/nodes/record.yaml says"),
     "excite": ("false", "move the actuator, as config/nodes/excite.yaml says"),
@@ -22,12 +23,12 @@ ARGUMENTS = {
 
 
 FIRST = {"plant": "rig", "driver": "rig", "replay": "bag"}
-OTHERS = {"identify": "rig", "record": None, "excite": None}
+OTHERS = {"model": "rig", "identify": "rig", "record": None, "excite": None}
 """Executables, and the launch argument that is a parameter of theirs."""
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the first node and, each if its argument is true, identify, record and excite."""
+    """Return the first node and, each if its argument is true, model, identify, record and excite."""
     first = LaunchConfiguration("first")
     return LaunchDescription(
         [

@@ -88,7 +88,7 @@ def test_the_graph_declares_every_argument_that_it_uses(describe):
     assert configurations(parts) == set(defaults(parts))
 
 
-def test_only_the_first_node_and_identify_start_unasked(describe):
+def test_only_the_first_node_model_and_identify_start_unasked(describe):
     parts = describe("graph")
     wanted = {name: node["condition"].arguments[0] for name, node in nodes(parts).items()}
     for name in FIRST.values():
@@ -96,7 +96,7 @@ def test_only_the_first_node_and_identify_start_unasked(describe):
         assert (configurations(first), value) == ({"first"}, name)
     assert {name: configurations(part) for name, part in wanted.items()} == {name: {name} for name in wanted}
     assert {name: defaults(parts)[name] for name in wanted} == {
-        "identify": "true", "record": "false", "excite": "false",
+        "model": "true", "identify": "true", "record": "false", "excite": "false",
     }
 
 

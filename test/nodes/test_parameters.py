@@ -11,7 +11,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
-NODES = ("driver", "excite", "identify", "plant", "record", "replay")
+NODES = ("driver", "excite", "identify", "model", "plant", "record", "replay")
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
 KIND = Parameter("kind", "a", "which", choices=("a", "b"))
@@ -60,6 +60,7 @@ WRONG = {
     "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
+    "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 deg"),
     "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
 }
 

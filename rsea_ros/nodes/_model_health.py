@@ -1,0 +1,102 @@
+"""What the model node says on /diagnostics: band and errors, doubt, consistency, and whether ft is there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rsea_ros.model.bandwidth import pure_torque_bandwidth
+from rsea_ros.model.observer import Estimate, Observer
+from rsea_ros.model.observer.consistency import Consistency
+from rsea_ros.model.pure_torque import PureTorque
+from rsea_ros.model.rig import Rig
+from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.nodes._model_inputs import Inputs
+
+CHANGED = 0.1
+"""Part by which period or doubt of the estimates must have changed before their noise is worked out again."""
+
+
+class ModelHealth:
+    """Assesses the node once a second. estimate: the last one."""
+
+    def __init__(self, rig: Rig, observer: Observer, flag: PureTorque, inputs: Inputs) -> None:
+        self._observer, self._flag, self._inputs = observer, flag, inputs
+        j_sc = rig["chassis.inertia"]
+        sprung = j_sc > 0.0 and not rig.rigid_spring
+        self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
+        self._calibrated = (math.nan, math.nan)
+        self.estimate: Estimate | None = None
+
+    def __call__(self) -> Report:
+        """Return the report."""
+        if self.estimate is None:
+            return Report(
+                WARN, "no measurement yet, expected joint_states and ft", {"bandwidth_hz": self._edge()}
+            )
+        tests = self._observer.consistency()
+        troubles = [*self._silence(), *(_told(name, test) for name, test in tests.items() if test.broken)]
+        summary = "; ".join(troubles) or self._flag.verdict
+        return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
+
+    def calibrate(self) -> None:
+        """Tell the flag the noise of the estimates, when that has changed."""
+        if self.estimate is None or math.isnan(self._inputs.period):
+            return
+        now = (self._inputs.period, self.estimate.sigma_distal)
+        alike = all(abs(a - b) <= CHANGED * b for a, b in zip(now, self._calibrated, strict=True))
+        if not alike:
+            self._flag.calibrate(self._observer.error_model(now[0]), now[0])
+            self._calibrated = now
+
+    def _edge(self) -> str:
+        return f"{self._flag.edge:.2f}"
+
+    def _silence(self) -> list[str]:
+        if not self._inputs.ft_silent or self.estimate is None:
+            return []
+        doubt = f"sigma of the distal torque {self.estimate.sigma_distal:.3g} N m"
+        return [f"no ft for {self._inputs.ft_age:.2f} s: estimated without it, {doubt}"]
+
+    def _band(self) -> dict[str, object]:
+        reading = self._flag.reading()
+        here = math.isfinite(reading.occupied)
+        gain, phase = self._flag.error_at(reading.occupied) if here else (math.nan, math.nan)
+        return {
+            "verdict": reading.verdict,
+            "bandwidth_hz": self._edge(),
+            "eq_7_hz": f"{self._eq_7:.2f}",
+            "occupied_hz": f"{reading.occupied:.2f}",
+            "share_above": f"{reading.share_above:.4f}",
+            "gain_error_db": f"{gain:.2f}",
+            "phase_error_deg": f"{phase:.1f}",
+        }
+
+    def _doubt(self) -> dict[str, object]:
+        assert self.estimate is not None
+        return {
+            "sigma_distal": f"{self.estimate.sigma_distal:.4g}",
+            "sigma_proximal": f"{self.estimate.sigma_proximal:.4g}",
+            "disturbance": f"{self.estimate.disturbance:.4g}",
+            "sigma_disturbance": f"{self.estimate.sigma_disturbance:.4g}",
+            "ft_age_ms": f"{1e3 * self._inputs.ft_age:.1f}",
+            "late_samples": self._observer.late,
+            "too_late_samples": self._observer.refused,
+            "refused_messages": self._inputs.refused,
+            "unstamped_commands": self._inputs.unstamped,
+            "restarts": self._observer.restarts,
+        }
+
+
+def _told(name: str, test: Consistency) -> str:
+    return (
+        f"model inconsistent with {name}: innovations {test.ratio:.2f} times theirs (limit {test.limit:.2f})"
+    )
+
+
+def _tested(tests: Mapping[str, Consistency]) -> dict[str, object]:
+    values: dict[str, object] = {}
+    for name, test in tests.items():
+        values |= {f"{name}.innovation": f"{test.ratio:.3f}", f"{name}.innovation_limit": f"{test.limit:.3f}"}
+        values[f"{name}.innovation_mean"] = f"{test.mean:.3g}"
+    return values

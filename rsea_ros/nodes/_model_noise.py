@@ -1,0 +1,40 @@
+"""The noise that the observer believes: as an identification measured it, or as the rig says."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.observer import Noise, noise_of
+from rsea_ros.model.rig import Rig
+
+
+def noise_from(rig: Rig, path: str) -> Noise:
+    """Return the noise of a rig, measured where an identification.json is named.
+
+    Raises ParameterError for a file that is none.
+    """
+    if not path:
+        return noise_of(rig)
+    document = _document(path)
+    return noise_of(rig, _numbers(document, "noise_rms", path), _numbers(document, "residual_rms", path))
+
+
+def _document(path: str) -> Mapping[str, Any]:
+    try:
+        document = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"parameter identification = {path!r}: {error}") from None
+    if not isinstance(document, dict):
+        raise ParameterError(f"parameter identification = {path!r}, expected an identification.json")
+    return document
+
+
+def _numbers(document: Mapping[str, Any], name: str, path: str) -> dict[str, float]:
+    values = document.get(name)
+    if not isinstance(values, dict):
+        raise ParameterError(f"{path}: {name} = {values!r}, expected numbers by channel")
+    return {channel: float(v) for channel, v in values.items() if isinstance(v, (int, float))}

@@ -1,0 +1,108 @@
+"""model: torques on both ends by sample, and whether the actuator is a pure torque source just now."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
+from msg_adapters.topics import AXES
+from rsea_ros.model.observer import Observer
+from rsea_ros.model.pure_torque import PureTorque, Settings
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._commands import WATCHDOG
+from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._health import Health
+from rsea_ros.nodes._model_health import ModelHealth
+from rsea_ros.nodes._model_inputs import Inputs
+from rsea_ros.nodes._model_noise import noise_from
+from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._qos import COMMAND, LATCHED
+from rsea_ros.nodes._run import run_node
+
+TABLE = (
+    Parameter(
+        "rig", "paper_high_impedance", "the model: a name of config/rigs, or a file such as model.yaml"
+    ),
+    Parameter(
+        "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
+    ),
+    Parameter(
+        "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
+    ),
+    Parameter("duration", 60.0, "time over which drifts of the model come to their full size", "s", 1.0, 1e6),
+    Parameter(
+        "ft_timeout", 0.02, "time without ft after which joint_states make the estimates", "s", 1e-3, 1.0
+    ),
+    Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+    Parameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
+    Parameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),
+    Parameter("share", 0.5, "of the torque's power above the edge, of a sine exactly at it", "", 0.05, 0.5),
+    Parameter("hysteresis", 0.025, "part of the edge's frequency, either way", "", 0.0, 0.2),
+    Parameter("window", 0.02, "over which power is measured", "s", 0.001, 0.25),
+    Parameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
+    Parameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
+    Parameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
+)
+NAMES = ("distal", "proximal", "disturbance")
+TICK = 0.02
+"""s between looks at what has come without ft."""
+
+
+class Model:
+    """Wakes at each ft and takes what has come with it; a tick does so while ft is silent."""
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        rig = load_rig(values["rig"])
+        noise = noise_from(rig, values["identification"])
+        observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
+        names = ("tolerance_db", "tolerance_deg", "hysteresis", "window", "hold_on", "hold_off", "quiet")
+        self._flag = PureTorque(rig, Settings(limit=values["share"], **{n: values[n] for n in names}))
+        self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
+        self._pure = node.create_publisher(Bool, "pure_torque", LATCHED)
+        self._pure.publish(bool_message(False))
+        self._inputs = Inputs(
+            node, observer, values["ft_timeout"], values["axis"], values["reliable"], self._work
+        )
+        self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
+        self._health = Health(node, self._assess)
+        node.create_timer(TICK, self._tick)
+        node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
+
+    def _work(self) -> None:
+        """Publish an estimate for each sample that came, and the flag when it changes."""
+        for stamp, estimate in self._inputs.take():
+            efforts = dict(zip(NAMES, estimate, strict=False))
+            self._estimates.publish(efforts_message(stamp, efforts))
+            was = self._flag.verdict == "pure"
+            now = self._flag.take(self._inputs.seconds(stamp), estimate) == "pure"
+            if now != was:
+                self._pure.publish(bool_message(now))
+            self._assess.estimate = estimate
+
+    def _tick(self) -> None:
+        """Go on without ft, and learn the noise of the estimates once it has settled."""
+        self._work()
+        self._assess.calibrate()
+
+    def finished(self) -> bool:
+        """Run until stopped."""
+        return False
+
+    def conclude(self) -> None:
+        """Leave nothing to do."""
+
+    def close(self) -> None:
+        """Leave nothing behind: the flag of a node that is gone is down."""
+        self._pure.publish(bool_message(False))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("model", TABLE, Model)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,135 @@
+"""model on real topics: a bag by replay, F/T that drops out, and a flag that rises and falls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.observer_truth import true_run
+from msg_adapters import write_record
+from msg_adapters.ros import (
+    Bool,
+    DiagnosticArray,
+    JointState,
+    WrenchStamped,
+    joint_state_message,
+    stamp_of,
+    torque_command_message,
+    wrench_message,
+)
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
+
+RIG = "paper_moving_output"
+RATE = 280.0
+EPOCH = 1_700_000_000_000_000_000
+CONTRACT = {"bandwidth_hz", "occupied_hz", "share_above", "gain_error_db", "phase_error_deg"}
+
+
+def sine(f, amplitude, seconds):
+    """A sine, N m."""
+    return amplitude * np.sin(2.0 * np.pi * f * np.arange(round(seconds * RATE)) / RATE)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Two seconds at 8 Hz, below the edge, then two at 100 Hz."""
+    command = np.concatenate([sine(8.0, 12.0, 2.0), sine(100.0, 60.0, 2.0)])
+    return true_run(load_rig(RIG), command, RATE, seed=4)
+
+
+class Heard:
+    """What the node publishes."""
+
+    def __init__(self, listener):
+        self.estimates = listener.hear(JointState, "/rsea/torque_estimate", RECORD_RELIABLE)
+        self.flags = listener.hear(Bool, "/rsea/pure_torque", LATCHED)
+        self._health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+
+    def status(self):
+        """The newest status of the node."""
+        own = [s for m in self._health for s in m.status if s.name == "/rsea/model"]
+        return own[-1] if own else None
+
+    def values(self):
+        """Its values."""
+        return {v.key: v.value for v in self.status().values} if self.status() else {}
+
+
+@pytest.fixture(scope="module")
+def heard(start, listener):
+    """The node, running and heard."""
+    heard = Heard(listener)
+    heard.process = start("model", rig=RIG, reliable=True)
+    listener.until(lambda: heard.flags and listener.node.count_publishers("/rsea/torque_estimate"))
+    return heard
+
+
+def test_a_bag_replayed_gives_an_estimate_for_each_wrench_as_good_as_it_says(
+    heard, truth, start, listener, tmp_path
+):
+    write_record(replace(truth.record, epoch_ns=EPOCH), tmp_path / "run.mcap")
+    replay = start("replay", bag=tmp_path / "run.mcap", rate=2.0)
+    listener.until(lambda: len(heard.estimates) == len(truth.distal))
+    assert replay.wait() == 0, replay.output
+    assert list(heard.estimates[0].name) == ["distal", "proximal", "disturbance"]
+    stamps = np.array([stamp_of(m.header.stamp) for m in heard.estimates])
+    assert np.array_equal(stamps, EPOCH + np.rint(truth.record["ft"].t * 1e9).astype(np.int64))
+    efforts = np.array([m.effort for m in heard.estimates])[100:]
+    for k, true in enumerate((truth.distal, truth.proximal)):
+        assert np.sqrt(np.mean((efforts[:, k] - true[100:]) ** 2)) < 0.015
+
+
+def test_the_flag_rose_below_the_edge_and_fell_above_it(heard, listener):
+    assert [m.data for m in heard.flags] == [False, True, False]
+    values = listener.until(lambda: heard.values().keys() >= CONTRACT and heard.values())
+    assert float(values["bandwidth_hz"]) == pytest.approx(57.04, abs=0.01)
+    assert float(values["eq_7_hz"]) == pytest.approx(53.20, abs=0.01)
+    late = listener.node.create_subscription(Bool, "/rsea/pure_torque", (flags := []).append, LATCHED)
+    listener.until(lambda: flags)
+    listener.node.destroy_subscription(late)
+    assert [m.data for m in flags] == [False]
+
+
+def test_without_ft_it_goes_on_and_says_so_and_takes_it_back_without_a_jump(heard, truth, listener):
+    node, begin = listener.node, EPOCH + 100_000_000_000
+    topics = (("torque_command", JointState), ("joint_states", JointState), ("ft", WrenchStamped))
+    command, state, ft = (node.create_publisher(kind, f"/rsea/{t}", RECORD_RELIABLE) for t, kind in topics)
+    listener.until(lambda: all(p.get_subscription_count() for p in (command, state, ft)))
+    heard.estimates.clear()
+    record = truth.record
+    stamps = begin + np.rint(record["ft"].t * 1e9).astype(np.int64)
+
+    def play(samples, with_ft=True):
+        for k in samples:
+            command.publish(
+                torque_command_message(int(stamps[k]) - round(1e9 / RATE), record["command"].y[k])
+            )
+            values = (record[n].y[k] for n in ("position", "velocity", "motor_torque"))
+            state.publish(joint_state_message(int(stamps[k]), *values))
+            if with_ft:
+                ft.publish(wrench_message(int(stamps[k]), float(record["ft"].y[k])))
+            listener.until(lambda: True)
+
+    def newest(k):
+        """Wait for the estimate at a sample and return it."""
+        listener.until(lambda: any(stamp_of(m.header.stamp) == stamps[k] for m in heard.estimates))
+        return next(m.effort[0] for m in heard.estimates if stamp_of(m.header.stamp) == stamps[k])
+
+    play(range(300))
+    newest(299)
+    play(range(300, 400), with_ft=False)
+    assert newest(399) == pytest.approx(truth.distal[399], abs=0.06)
+    told = listener.until(lambda: "no ft for" in heard.status().message and heard.values())
+    assert heard.status().level == b"\x01" and float(told["sigma_distal"]) > 1.05 * 0.00688
+    doubt = float(told["sigma_distal"])
+    play(range(400, 420))
+    assert newest(400) == pytest.approx(truth.distal[400], abs=3.0 * doubt)
+    assert doubt < 0.1
+
+
+def test_sigint_ends_it_with_status_0_and_the_flag_down(heard, listener):
+    assert heard.process.stop() == 0
+    assert not heard.flags[-1].data
