@@ -132,4 +132,4 @@ def test_without_ft_it_goes_on_and_says_so_and_takes_it_back_without_a_jump(hear
 
 def test_sigint_ends_it_with_status_0_and_the_flag_down(heard, listener):
     assert heard.process.stop() == 0
-    assert not heard.flags[-1].data
+    listener.until(lambda: not heard.flags[-1].data)
