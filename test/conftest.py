@@ -10,6 +10,8 @@ from pathlib import Path
 
 import hypothesis
 
+import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")
 

@@ -43,7 +43,7 @@ MESSAGES = {
 FOREIGN = {
     "effects": NUMERIC,
     "model": NUMERIC | {"yaml"},
-    "identification": NUMERIC,
+    "identification": NUMERIC | {"threadpoolctl"},
     "diagnosis": NUMERIC,
     "control": NUMERIC,
     "design": NUMERIC | {"yaml"},

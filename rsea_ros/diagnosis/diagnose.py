@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.search import search
 from rsea_ros.diagnosis.stages import judged
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
@@ -34,7 +35,7 @@ def diagnose(
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
-    with ThreadPoolExecutor(2) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(2) as pool:
         found = search(cases, nominal, pool, tell)
         tell("looking for a simpler model", 0.9)
         found = pruned(found)

@@ -17,6 +17,7 @@ from rsea_ros.identification.result import FrequencyResponse, Identification, Ov
 from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
 from rsea_ros.identification.start import start_from
 from rsea_ros.identification.statics import statics_of
+from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.identification.unknowns import (
     Unknown,
     apply,
@@ -48,7 +49,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
-    with ThreadPoolExecutor(2) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(2) as pool:
         solution = fit(
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
