@@ -10,18 +10,24 @@ from rsea_ros.model.response import ComplexArray
 from rsea_ros.signals import FloatArray
 
 
-def open_loop(law: Law, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
-    """Return L, the loop broken at the motor torque, one sample of delay included, shape (n,).
+def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return what the law makes of ft (1) and of the velocity (N m s/rad), its own memory and delay included.
 
-    plant: of `sampled.responses`. L = (C P_ft + Q (J (1 - 1/z)/T + b (1 + 1/z)/2) P_w) / (1 - Q / z^2) / z
-    with C = k_p + k_d D + Q (1 + 1/z)/2.
+    (C / z, Q (J (1 - 1/z)/T + b (1 + 1/z)/2) / z), over 1 - Q / z^2, with C = k_p + k_d D + Q (1 + 1/z)/2.
     """
     back = 1.0 / z_of(law.period, hz)
     rate = (1.0 - law.rate_pole) / law.period * (1.0 - back) / (1.0 - law.rate_pole * back)
     q = law.q_gain * (1.0 + back) / (1.0 - law.q_pole * back)
     on_ft = law.gains.k_p + law.gains.k_d * rate + 0.5 * q * (1.0 + back)
     on_velocity = q * (law.inertia * (1.0 - back) / law.period + 0.5 * law.damping * (1.0 + back))
-    loop: ComplexArray = (on_ft * plant[FT] + on_velocity * plant[VELOCITY]) / (1.0 - q * back**2) * back
+    memory = back / (1.0 - q * back**2)
+    return on_ft * memory, on_velocity * memory
+
+
+def open_loop(law: Law, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
+    """Return L, the loop broken at the motor torque behind its current, shape (n,). plant: of `responses`."""
+    on_ft, on_velocity = actions(law, hz)
+    loop: ComplexArray = on_ft * plant[FT] + on_velocity * plant[VELOCITY]
     return loop
 
 
