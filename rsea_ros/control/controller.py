@@ -69,12 +69,16 @@ class TorqueController:
     """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
 
     def __init__(self, rig: Rig, rate: float, gains: Gains, *, limits: Limits | None = None,
-                 compensate: Iterable[str] = COMPENSATED, preview: bool = False) -> None:  # fmt: skip
-        """rate: Hz. preview: desired torques are those of two samples later, known ahead: no prediction."""
+                 compensate: Iterable[str] = COMPENSATED, preview: bool = False,
+                 corner: float = CORNER) -> None:  # fmt: skip
+        """rate: Hz. preview: desired torques are those of two samples later, known ahead: no prediction.
+
+        corner: of the prediction, Hz.
+        """
         self._law: Law = law_of(rig, rate, gains)
         self._reference = Reference(sampled(rig, rate))
         self._compensation: Compensation = compensation(rig, compensate)
-        self._prediction = Prediction(CORNER, 1.0 / rate)
+        self._prediction = Prediction(corner, 1.0 / rate)
         self._preview, self._limits = preview, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
 

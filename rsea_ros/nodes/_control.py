@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.controller import CORNER, Limits, TorqueController
 from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.synthesis import Demand, Design, check, design
@@ -32,6 +32,7 @@ TABLE = (
     Parameter("delay_margin", 1.0, "least delay margin", "samples", 0.0, 20.0),
     Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
     Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
+    Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
     Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
     Parameter("slew_limit", 40_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
@@ -71,6 +72,7 @@ def controller_of(values: Values, found: Design) -> TorqueController:
         found.gains,
         limits=limits,
         preview=values["preview"],
+        corner=values["prediction"],
         **options,
     )
 

@@ -1,0 +1,109 @@
+"""Everything that is to be known of a controlled actuator: design at each rate, trials, impedance, limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.control.impedance import Impedance, impedance
+from rsea_ros.control.large_signal import Reach, reach
+from rsea_ros.control.loads import load_range, locked, with_ends
+from rsea_ros.control.synthesis import Demand, Design, design
+from rsea_ros.control.trials import Compensated, Trial, compensations, response, trials
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.propagator import state_space
+from rsea_ros.model.response import ComplexArray
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+AMPLITUDES = (10.0, 20.0, 40.0)
+
+
+@dataclass(frozen=True)
+class Motor:
+    """What a motor has at the gear output: N m, rad/s (inf: not stated), and where that is said."""
+
+    name: str
+    torque: float
+    speed: float
+    source: str
+
+
+@dataclass(frozen=True)
+class AtRate:
+    """One rate: design, trials, gain of each compensation, T_d / desired (hz, locked, free), impedance."""
+
+    design: Design
+    trials: tuple[Trial, ...]
+    compensations: tuple[Compensated, ...]
+    hz: FloatArray
+    locked: ComplexArray
+    free: ComplexArray
+    impedance: Impedance
+
+
+@dataclass(frozen=True)
+class Study:
+    """rig: both ends clamped; free: the same actuator with the lightest load. resonance: of the open loop, Hz.
+
+    reaches: by motor, for the clamped and for the free rig, at each of AMPLITUDES.
+    """
+
+    rig: Rig
+    free: Rig
+    resonance: float
+    rates: tuple[AtRate, ...]
+    reaches: Mapping[Motor, tuple[tuple[Reach, Reach], ...]]
+
+
+def study(
+    rig: Rig,
+    free: Rig,
+    rates: Sequence[float],
+    motors: Sequence[Motor] = (),
+    demand: Demand | None = None,
+    progress: Callable[[str, float], None] = lambda step, share: None,
+) -> Study:
+    """Return the study of a rig's actuator. free: a rig whose ends are the lightest load.
+
+    Raises ParameterError where the synthesis finds no gains, or where `free` is clamped at both ends.
+    """
+    if not rates:
+        raise ParameterError("no rate, expected at least one, Hz")
+    clamped, light = locked(rig), with_ends(rig, free)
+    resonance = natural_frequency(clamped)
+    done = []
+    for k, rate in enumerate(rates):
+        progress(f"{rate:g} Hz", k / len(rates))
+        found = design(rig, load_range(rig, free), rate, demand)
+        done.append(_at_rate(clamped, light, found, resonance))
+    reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
+    return Study(clamped, light, resonance, tuple(done), reaches)
+
+
+def natural_frequency(rig: Rig) -> float:
+    """Return the lowest natural frequency of a rig's open loop, Hz."""
+    poles = np.linalg.eigvals(state_space(rig).a)
+    return float(np.abs(poles[np.abs(poles) > 0.0]).min()) / (2.0 * math.pi)
+
+
+def _at_rate(clamped: Rig, light: Rig, found: Design, resonance: float) -> AtRate:
+    hz, answer = response(clamped, found)
+    grid = np.geomspace(0.1, 0.45 * found.rate, 300)
+    return AtRate(
+        found,
+        tuple(trials(clamped, light, found, resonance)),
+        tuple(compensations(clamped, found)),
+        hz,
+        answer,
+        response(light, found)[1],
+        impedance(clamped, found.rate, found.gains, grid),
+    )
+
+
+def _reaches(clamped: Rig, light: Rig, amplitude: float, motor: Motor) -> tuple[Reach, Reach]:
+    at, free = (reach(rig, amplitude, motor.torque, motor.speed) for rig in (clamped, light))
+    return at, free
