@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 
 SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "model/call.py", "model/step.py",
-          "model/observer/filter.py", "model/observer/transition.py")  # fmt: skip
+          "model/observer/filter.py", "model/observer/log.py", "model/observer/transition.py")  # fmt: skip
 """Files whose functions and constants are compiled into those of other files."""
 
 

@@ -16,17 +16,17 @@ from rclpy.node import Node
 
 from msg_adapters.ros import JointState, WrenchStamped, effort_of, joint_state_of, wrench_of
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.observer import Estimate, Observer
+from rsea_ros.model.observer import COMMAND as COMMANDED
+from rsea_ros.model.observer import FT, STATE, Estimate, Observer
 from rsea_ros.nodes._bench import Polled
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
-_STATE, _FT = range(2)
 
-Sample = tuple[int, int, float, float]
-"""Stamp, kind, and position with motor torque, or the torque of a wrench."""
+Stamped = tuple[int, int, float, float]
+"""A sample of the observer, with its stamp in ns."""
 
 
 class Inputs:
@@ -52,17 +52,16 @@ class Inputs:
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
         """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
-        for message in _waiting(self._commands, JointState):
-            self._command(message)
-        states = list(_waiting(self._states, JointState))
+        commands = [c for m in _waiting(self._commands, JointState) if (c := self._command(m)) is not None]
+        samples = [s for m in _waiting(self._states, JointState) if (s := self._state(m)) is not None]
         wrenches, self._first = [*self._first, *_waiting(self._ft, WrenchStamped)], []
-        samples = [s for m in states if (s := self._state(m)) is not None]
-        samples += [
-            (stamp, _FT, torque, 0.0) for stamp, torque in (wrench_of(m, self._axis) for m in wrenches)
-        ]
-        for stamp, kind, a, b in sorted(samples):
-            estimate = self._measured(stamp, kind, a, b)
-            if estimate is not None and (kind == _FT or self.ft_silent):
+        samples += [(t, FT, torque, 0.0) for t, torque in (wrench_of(m, self._axis) for m in wrenches)]
+        samples.sort()
+        together = [*commands, *samples]
+        estimates = self._observer.take((self.seconds(t), kind, a, b) for t, kind, a, b in together)
+        for (stamp, kind, _, _), estimate in zip(samples, estimates[len(commands) :], strict=True):
+            self._heard(stamp, kind)
+            if estimate is not None and (kind == FT or self.ft_silent):
                 self._note_period(stamp)
                 yield stamp, estimate
 
@@ -91,42 +90,40 @@ class Inputs:
         """Median time between estimates, s; nan before there are enough."""
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
-    def _measured(self, stamp: int, kind: int, a: float, b: float) -> Estimate | None:
-        if kind == _FT:
+    def _heard(self, stamp: int, kind: int) -> None:
+        if kind == FT:
             self._ft_stamp = stamp
-            return self._observer.ft(self.seconds(stamp), a)
+            return
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
-        return self._observer.state(self.seconds(stamp), a, b)
 
     def _note_period(self, stamp: int) -> None:
         if 0 < stamp - self._told < SECOND:
             self._periods.append((stamp - self._told) / SECOND)
         self._told = stamp
 
-    def _state(self, message: JointState) -> Sample | None:
+    def _state(self, message: JointState) -> Stamped | None:
         try:
             stamp, position, _velocity, torque = joint_state_of(message)
         except ParameterError as error:
             self._refuse("joint_states", error)
             return None
-        return stamp, _STATE, position, torque
+        return stamp, STATE, position, torque
 
-    def _command(self, message: JointState) -> None:
+    def _command(self, message: JointState) -> Stamped | None:
         try:
             stamp, torque = effort_of(message)
         except ParameterError as error:
             self._refuse("torque_command", error)
-            return
+            return None
         newest = max(self._state_stamp, self._ft_stamp)
         if stamp == 0 or (newest and abs(stamp - newest) > HORIZON):
             self.unstamped += 1
             stamp = newest
         if not math.isfinite(torque):
             self.refused += 1
-        elif stamp:
-            self._observer.command(self.seconds(stamp), torque)
+        return (stamp, COMMANDED, torque, 0.0) if stamp and math.isfinite(torque) else None
 
     def _refuse(self, topic: str, error: ParameterError) -> None:
         self.refused += 1

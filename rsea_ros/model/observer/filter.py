@@ -22,8 +22,8 @@ from rsea_ros.model.observer.transition import exponential, transition
 from rsea_ros.model.step import Calls, Linear, advance
 from rsea_ros.signals import FloatArray
 
-POSITION, FT, TORQUE = range(3)
-NOW, COMMAND, SINCE, ERROR, STARTED, CLOCK = range(6)
+POSITION, WRENCH, TORQUE = range(3)
+NOW, FORCED, SINCE, ERROR, STARTED, CLOCK = range(6)
 """In `clock`: time (s), command in force (N m), since when (s), what the drive makes beside it (N m)."""
 SIGMA = 3
 SAME = 1e-6
@@ -93,10 +93,10 @@ def predict(model, state, t):  # type: ignore[no-untyped-def]
     """Go to an instant; a command older than `hold` ends on the way, as the bench ends it."""
     end, reached = state.clock[SINCE] + model.hold, False
     while not reached:
-        reached = state.clock[COMMAND] == 0.0 or t <= end
+        reached = state.clock[FORCED] == 0.0 or t <= end
         _propagate(model, state, t if reached else end)
         if not reached:
-            state.clock[COMMAND] = 0.0
+            state.clock[FORCED] = 0.0
 
 
 @inner
@@ -110,7 +110,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         transition(model.a, model.walk, model.scale, dt, model.f, model.q)
         model.held[1] = dt
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
-    command, out, none = np.full(count, state.clock[COMMAND]), np.empty((count, 4)), np.empty(0)
+    command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, 4)), np.empty(0)
     advance(model.linear, model.calls, command, none, none, state.clock[NOW],
             state.x, state.table, state.own, out)  # fmt: skip
     n = len(state.x)
@@ -118,7 +118,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         state.reach[i] = model.f[i, n]
     _spread(model, state)
     state.clock[NOW] = t
-    state.predicted[POSITION], state.predicted[FT] = out[count - 1, 0], out[count - 1, 3]
+    state.predicted[POSITION], state.predicted[WRENCH] = out[count - 1, 0], out[count - 1, 3]
     state.predicted[TORQUE] = out[count - 1, 2]
     if len(state.extra) > 1:
         state.predicted[POSITION] += state.extra[1]

@@ -10,15 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from rsea_ros.model.observer.filter import (
-    COMMAND,
-    FT,
+    FORCED,
     NOW,
     POSITION,
     SINCE,
     STARTED,
+    WRENCH,
     doubt,
     inner,
     predict,
@@ -27,10 +26,10 @@ from rsea_ros.model.observer.filter import (
 )
 from rsea_ros.signals import FloatArray
 
-STATE, WRENCH, ORDER = range(3)
+STATE, FT, COMMAND = range(3)
 """Kinds: position and motor torque; ft; command."""
 FIRST, COUNT, DONE, LATE, REFUSED = range(5)
-TOO_LATE = -1
+NONE = -1
 LENGTH = 512
 
 
@@ -74,7 +73,7 @@ def _copy(a, out):  # type: ignore[no-untyped-def]
 
 @inner
 def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
-    """Put an event in its place and return that, or TOO_LATE where no checkpoint goes back so far."""
+    """Put an event in its place and return that, or NONE where no checkpoint goes back so far."""
     place = log.place
     if place[COUNT] == LENGTH:
         place[FIRST], place[COUNT] = (place[FIRST] + 1) % LENGTH, LENGTH - 1
@@ -86,7 +85,7 @@ def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
             break
         at -= 1
     if at == 0 and place[DONE] > 0:
-        return TOO_LATE
+        return NONE
     for i in range(place[COUNT], at, -1):
         new, old = _row(log, i), _row(log, i - 1)
         log.t[new], log.kind[new] = log.t[old], log.kind[old]
@@ -102,33 +101,33 @@ def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
     if state.clock[STARTED] == 0.0:
         state.clock[STARTED], state.clock[NOW] = 1.0, t
     predict(model, state, t)
-    if kind == ORDER:
-        state.clock[COMMAND], state.clock[SINCE] = values[0], t
+    if kind == COMMAND:
+        state.clock[FORCED], state.clock[SINCE] = values[0], t
     else:
         if kind == STATE:
             weigh_torque(model, state, values[1])
-        update(model, state, POSITION if kind == STATE else FT, values[0])
+        update(model, state, POSITION if kind == STATE else WRENCH, values[0])
     doubt(model, state)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def receive(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
-    """Take in an event, work off all up to the newest measurement, and return its row, or TOO_LATE."""
+@inner
+def take_in(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
+    """Take in an event, work off all up to the newest measurement, and return its row, or NONE."""
     at = _insert(log, t, kind, a, b)
-    if at == TOO_LATE:
+    if at == NONE:
         log.place[REFUSED] += 1
-        return TOO_LATE
+        return NONE
     if at < log.place[DONE]:
         _copy(log.saved[_row(log, at - 1)], state.whole)
         log.place[DONE] = at
         log.place[LATE] += 1
-    if kind != ORDER:
+    if kind != COMMAND:
         log.horizon[0] = max(log.horizon[0], t)
     while log.place[DONE] < log.place[COUNT]:
         row = _row(log, log.place[DONE])
-        if log.t[row] > log.horizon[0] or (log.kind[row] == ORDER and log.t[row] == log.horizon[0]):
+        if log.t[row] > log.horizon[0] or (log.kind[row] == COMMAND and log.t[row] == log.horizon[0]):
             break
         _apply(model, state, log.kind[row], log.t[row], log.values[row])
         _copy(state.whole, log.saved[row])
         log.place[DONE] += 1
-    return _row(log, at)
+    return NONE if kind == COMMAND else _row(log, at)

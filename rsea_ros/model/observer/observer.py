@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,8 @@ import numpy as np
 from rsea_ros.model.observer.assemble import assemble, without_delay
 from rsea_ros.model.observer.consistency import Consistency, consistency
 from rsea_ros.model.observer.filter import SIGMA
-from rsea_ros.model.observer.log import LATE, ORDER, REFUSED, STATE, TOO_LATE, WRENCH, empty_log, receive
+from rsea_ros.model.observer.handle import handle_of, receive
+from rsea_ros.model.observer.log import COMMAND, FT, LATE, NONE, REFUSED, STATE, empty_log
 from rsea_ros.model.observer.noise import Noise, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
@@ -19,6 +20,12 @@ from rsea_ros.signals import FloatArray, Record
 
 GAP = 1.0
 """s. Stamps that jump so far, either way, are of another run: the observer begins anew."""
+
+
+BATCH = 64
+
+Sample = tuple[float, int, float, float]
+"""Stamp (s), kind (STATE, FT, COMMAND), and position with motor torque, the torque of ft, or of a command."""
 
 
 class Estimate(NamedTuple):
@@ -53,27 +60,46 @@ class Observer:
     """
 
     _score: FloatArray
+    _newest: float
 
     def __init__(self, rig: Rig, noise: Noise | None = None, *, hold: float = math.inf,
                  duration: float = 60.0) -> None:  # fmt: skip
         self._rig, self._delay = without_delay(rig)
         self._noise = noise_of(rig) if noise is None else noise
         self._hold, self._duration = hold, duration
+        self._events, self._rows = np.zeros((BATCH, 4)), np.zeros(BATCH, dtype=np.int64)
         self.restarts = -1
         self._begin()
 
     def command(self, t: float, torque: float) -> None:
         """Take in a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
-        self._look_for_gap(t)
-        receive(self._model, self._state, self._log, t + self._delay, ORDER, torque, 0.0)
+        self.take([(t, COMMAND, torque, 0.0)])
 
     def state(self, t: float, position: float, motor_torque: float = math.nan) -> Estimate | None:
         """Take in position (rad) and motor torque (N m), nan where it is missing; None when too late."""
-        return self._measured(t, STATE, position, motor_torque)
+        return self.take([(t, STATE, position, motor_torque)])[0]
 
     def ft(self, t: float, torque: float) -> Estimate | None:
         """Take in a torque of the F/T sensor (N m); None when it is too late."""
-        return self._measured(t, WRENCH, torque, 0.0)
+        return self.take([(t, FT, torque, 0.0)])[0]
+
+    def take(self, samples: Iterable[Sample]) -> list[Estimate | None]:
+        """Take in samples one after another, which is cheaper together; return the estimate at each.
+
+        None for a command, and for a measurement that came too late.
+        """
+        results: list[Estimate | None] = []
+        batch: list[Sample] = []
+        for sample in samples:
+            t, kind, a, b = sample
+            if abs(t - self._newest) > GAP:
+                results += self._receive(batch)
+                batch = []
+                self._begin()
+            if math.isnan(self._newest) or (kind != COMMAND and t > self._newest):
+                self._newest = t
+            batch.append((t + self._delay, kind, a, b) if kind == COMMAND else sample)
+        return results + self._receive(batch)
 
     @property
     def late(self) -> int:
@@ -105,6 +131,8 @@ class Observer:
     def _begin(self) -> None:
         self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
         self._log = empty_log(len(self._state.whole))
+        self._handle = handle_of(self._model, self._state, self._log)
+        self._scalars = self._model.linear.reads_load, self._hold
         self._at = self._state.whole.size - self._tail()
         self._score, self._newest = np.zeros((3, 3)), math.nan
         self.restarts += 1
@@ -113,17 +141,17 @@ class Observer:
         """Return how far the estimate lies from the end of a state."""
         return sum(part.size for part in (self._state.estimate, self._state.clock, self._state.score))
 
-    def _look_for_gap(self, t: float) -> None:
-        if abs(t - self._newest) > GAP:
-            self._begin()
-        if math.isnan(self._newest):
-            self._newest = t
+    def _receive(self, batch: list[Sample]) -> list[Estimate | None]:
+        results: list[Estimate | None] = []
+        for first in range(0, len(batch), BATCH):
+            part = batch[first : first + BATCH]
+            self._events[: len(part)] = part
+            receive(self._handle, *self._scalars, self._events[: len(part)], self._rows)
+            results += map(self._estimate, self._rows[: len(part)].tolist())
+        return results
 
-    def _measured(self, t: float, kind: int, a: float, b: float) -> Estimate | None:
-        self._look_for_gap(t)
-        self._newest = max(t, self._newest)
-        row = receive(self._model, self._state, self._log, t, kind, a, b)
-        if row == TOO_LATE:
+    def _estimate(self, row: int) -> Estimate | None:
+        if row == NONE:
             return None
         return Estimate(*self._log.saved[row, self._at : self._at + 2 * SIGMA].tolist())
 

@@ -1,0 +1,102 @@
+"""Many arrays as one argument of a compiled function.
+
+Numba unpacks every array of its arguments at every call from Python, 0.2 us each: for all of the filter's that
+takes longer than the filter. So their addresses and shapes go into one, and compiled code makes them again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import carray, njit, types
+from numba.extending import intrinsic
+
+from rsea_ros.model.observer.filter import Model, State, inner
+from rsea_ros.model.observer.log import Log, take_in
+from rsea_ros.model.step import Calls, Linear
+
+ADDRESS, ROWS, COLUMNS = range(3)
+
+
+def handle_of(model: Model, state: State, log: Log) -> npt.NDArray[np.int64]:
+    """Return address and shape of every array, shape (arrays, 3). The arrays must outlive it."""
+    return np.array([_row(array) for array in _arrays((model, state, log))], dtype=np.int64)
+
+
+def _arrays(parts: Sequence[Any]) -> Iterator[Any]:
+    for part in parts:
+        if isinstance(part, tuple):
+            yield from _arrays(part)
+        elif isinstance(part, np.ndarray):
+            yield part
+
+
+def _row(array: npt.NDArray[Any]) -> tuple[int, int, int]:
+    assert array.flags.c_contiguous and array.ndim <= 2
+    return (array.ctypes.data, *(*array.shape, 1)[:2])
+
+
+def _pointer(kind: Any) -> Any:
+    """Return an intrinsic that takes an address for a pointer to numbers of a kind."""
+    to: Any = types.CPointer(kind)  # type: ignore[no-untyped-call]
+
+    @intrinsic
+    def pointer(typingctx: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> ir.Value:
+            return builder.inttoptr(arguments[0], context.get_value_type(to))
+
+        return to(types.intp), generate
+
+    return pointer
+
+
+_floats, _integers = _pointer(types.float64), _pointer(types.int64)
+
+
+@inner
+def _vector(h, i):  # type: ignore[no-untyped-def]
+    return carray(_floats(h[i, ADDRESS]), (h[i, ROWS],))
+
+
+@inner
+def _matrix(h, i):  # type: ignore[no-untyped-def]
+    return carray(_floats(h[i, ADDRESS]), (h[i, ROWS], h[i, COLUMNS]))
+
+
+@inner
+def _numbers(h, i):  # type: ignore[no-untyped-def]
+    return carray(_integers(h[i, ADDRESS]), (h[i, ROWS],))
+
+
+@inner
+def _model(h, reads_load, hold):  # type: ignore[no-untyped-def]
+    m, v, n = _matrix, _vector, _numbers
+    linear = Linear(m(h, 0), m(h, 1), n(h, 2), m(h, 3), m(h, 4), m(h, 5), v(h, 6), reads_load)
+    calls = Calls(n(h, 7), n(h, 8), n(h, 9), n(h, 10), v(h, 11), True)
+    return Model(linear, calls, m(h, 12), v(h, 13), m(h, 14), m(h, 15), v(h, 16), m(h, 17), m(h, 18),
+                 m(h, 19), v(h, 20), m(h, 21), m(h, 22), v(h, 23), hold)  # fmt: skip
+
+
+@inner
+def _state(h):  # type: ignore[no-untyped-def]
+    m, v = _matrix, _vector
+    return State(v(h, 24), v(h, 25), v(h, 26), m(h, 27), v(h, 28), v(h, 29), v(h, 30), v(h, 31), v(h, 32),
+                 v(h, 33), v(h, 34))  # fmt: skip
+
+
+@inner
+def _log(h):  # type: ignore[no-untyped-def]
+    m, v, n = _matrix, _vector, _numbers
+    return Log(v(h, 35), n(h, 36), m(h, 37), m(h, 38), n(h, 39), v(h, 40))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def receive(handle, reads_load, hold, events, rows):  # type: ignore[no-untyped-def]
+    """Take in events (t, kind, two values), shape (n, 4); rows gets where the state behind each is."""
+    model, state, log = _model(handle, reads_load, hold), _state(handle), _log(handle)
+    for i in range(len(events)):
+        rows[i] = take_in(model, state, log, events[i, 0], int(events[i, 1]), events[i, 2], events[i, 3])
