@@ -17,18 +17,19 @@ ARGUMENTS = {
     "bag": ("", "bag that replay plays"),
     "model": ("true", "estimate the torques, and say whether the actuator is a pure torque source"),
     "identify": ("true", "fit the rig to what is measured"),
+    "controller": ("false", "make the torque follow desired_torque"),
     "record": ("false", "write a bag, as config/nodes/record.yaml says"),
     "excite": ("false", "move the actuator, as config/nodes/excite.yaml says"),
 }
 
 
 FIRST = {"plant": "rig", "driver": "rig", "replay": "bag"}
-OTHERS = {"model": "rig", "identify": "rig", "record": None, "excite": None}
+OTHERS = {"model": "rig", "identify": "rig", "controller": "rig", "record": None, "excite": None}
 """Executables, and the launch argument that is a parameter of theirs."""
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the first node and, each if its argument is true, model, identify, record and excite."""
+    """Return the first node and, each if its argument is true, the others."""
     first = LaunchConfiguration("first")
     return LaunchDescription(
         [

@@ -96,7 +96,8 @@ def test_only_the_first_node_model_and_identify_start_unasked(describe):
         assert (configurations(first), value) == ({"first"}, name)
     assert {name: configurations(part) for name, part in wanted.items()} == {name: {name} for name in wanted}
     assert {name: defaults(parts)[name] for name in wanted} == {
-        "model": "true", "identify": "true", "record": "false", "excite": "false",
+        "model": "true", "identify": "true", "controller": "false", "record": "false",
+        "excite": "false",
     }
 
 

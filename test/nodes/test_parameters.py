@@ -11,7 +11,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
-NODES = ("driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
 KIND = Parameter("kind", "a", "which", choices=("a", "b"))
@@ -55,6 +55,7 @@ def test_parameter_file_and_table_agree(name):
 
 
 WRONG = {
+    "controller": ({"k_p": 30.0, "k_d": 0.1, "q_frequency": 50.0}, "unstable at 280 Hz with load 'locked'"),
     "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
     "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
     "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
