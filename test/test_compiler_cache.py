@@ -56,7 +56,7 @@ def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:
     return [
         f
         for f in functions
-        if any(("njit" in d) or (d == "compiled") for d in map(ast.unparse, f.decorator_list))
+        if any(("njit" in d) or (d in ("compiled", "inner")) for d in map(ast.unparse, f.decorator_list))
     ]
 
 

@@ -1,7 +1,7 @@
 """Many arrays as one argument of a compiled function.
 
-Numba unpacks every array of its arguments at every call from Python, 0.2 us each: for all of the filter's that
-takes longer than the filter. So their addresses and shapes go into one, and compiled code makes them again.
+Numba unpacks every array of its arguments at every call from Python, 0.2 us each: for all of the filter's
+it takes longer than the filter. So their addresses and shapes go into one; compiled code makes them again.
 """
 
 from __future__ import annotations

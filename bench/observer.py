@@ -1,0 +1,48 @@
+"""What the observer and the pure-torque flag reach: asked beside measured.
+
+Run: python bench/observer.py [SECTION …] [--hours 10] [--seconds 20]
+rigs     RMS error of both torques, unlumped and lumped observer, in the same run
+effects  the same with each effect of the catalogue in the plant: nominal and extended model
+walk     what the intensity of the disturbance's random walk matters
+sines    how soon the flag is right for sines on either side of the edge
+noise    false alarms on the sensors' noise alone, and on noise with a torque in the band
+timing   time in the node, latency to a third process, CPU; a bare loop in the same run
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from bench.observer_errors import effects, rigs, walk
+from bench.observer_flag import noise, sines
+from bench.observer_timing import timing
+
+SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
+    "rigs": rigs, "effects": effects, "walk": walk, "sines": sines, "noise": noise, "timing": timing,
+}  # fmt: skip
+
+
+def main() -> None:
+    """Measure and print."""
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser.add_argument("--hours", type=float, default=10.0, help="of simulated noise")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each run of the node")
+    args = parser.parse_args()
+    unknown = set(args.sections) - set(SECTIONS)
+    if unknown:
+        parser.error(f"section {', '.join(unknown)}, expected some of {', '.join(SECTIONS)}")
+    for name in args.sections or SECTIONS:
+        print(f"== {name}")
+        for line in SECTIONS[name](args):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()
