@@ -81,9 +81,8 @@ class Plant:
         """Stop the simulation, at zero torque; warn when a bag of it would not tell the truth."""
         self._cycle.stop()
         self._device.close()
-        if self._bench.commands.late:
-            late = f"{self._bench.commands.late} commands came after the instant of their stamp"
-            self._log.warning(f"{late} and acted later than a bag says")
+        if mistimed := self._bench.commands.late + self._bench.commands.unstamped:
+            self._log.warning(f"{mistimed} commands did not act at their stamps, as a bag says they did")
 
 
 def main() -> int:
