@@ -27,8 +27,8 @@ from rsea_ros.control.sampled import FT, POSITION, VELOCITY, sampled
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-CORNER = 50.0
-"""Hz: what a desired torque does faster is not predicted. At 280 Hz 5 Hz are predicted within 1.4 %."""
+CORNER = 80.0
+"""Hz: what a desired torque does faster is not predicted. At 280 Hz 5 Hz are predicted within 0.9 %."""
 
 
 @dataclass(frozen=True)

@@ -37,16 +37,18 @@ def closed_loop(
     *,
     noise: bool = True,
     seed: int = 0,
+    ahead: int = 0,
 ) -> Trace:
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
-    A command that is computed at a sample acts from the next one on: one sample of delay.
+    A command that is computed at a sample acts from the next one on: one sample of delay. ahead: samples by
+    which the controller knows the desired torque before it is due.
     """
     plant = Plant(rig, rate, seed=seed, noise=noise)
     sample = plant.step(0.0)
     pending, rows = 0.0, np.empty((len(desired), 3))
     controller.start(_reading(sample))
-    for k, wanted in enumerate(desired):
+    for k, wanted in enumerate(np.append(desired[ahead:], np.full(ahead, desired[-1]))):
         command = controller.step(_reading(sample), float(wanted))
         rows[k] = sample.ft, command, sample.velocity
         sample = plant.step(pending)

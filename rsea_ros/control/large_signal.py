@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
@@ -15,17 +16,22 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 HIGHEST = 400.0
-LOWEST = 0.5
+LOWEST = 0.01
 POINTS = 4000
 
 
 @dataclass(frozen=True)
 class Reach:
-    """amplitude: N m. hz: where it can no longer be tracked (inf: nowhere). by: torque or speed."""
+    """amplitude: N m. torque, speed: Hz, from where on it takes more of it than there is; inf: nowhere."""
 
     amplitude: float
-    hz: float
-    by: str
+    torque: float
+    speed: float
+
+    @property
+    def hz(self) -> float:
+        """Where it can no longer be tracked."""
+        return min(self.torque, self.speed)
 
 
 def motor_demand(rig: Rig, hz: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -43,12 +49,13 @@ def reach(rig: Rig, amplitude: float, torque: float, speed: float) -> Reach:
     """
     hz = np.geomspace(LOWEST, HIGHEST, POINTS)
     per_torque, per_speed = motor_demand(rig, hz)
-    short = {"torque": amplitude * per_torque > torque, "speed": amplitude * per_speed > speed}
-    first = {by: float(hz[np.argmax(over)]) for by, over in short.items() if over.any()}
-    if not first:
-        return Reach(amplitude, float("inf"), "")
-    by = min(first, key=lambda name: first[name])
-    return Reach(amplitude, first[by], by)
+    return Reach(
+        amplitude, _first(hz, amplitude * per_torque > torque), _first(hz, amplitude * per_speed > speed)
+    )
+
+
+def _first(hz: FloatArray, short: npt.NDArray[np.bool_]) -> float:
+    return float(hz[np.argmax(short)]) if short.any() else float("inf")
 
 
 def largest(rig: Rig, hz: float, torque: float, speed: float) -> float:

@@ -15,6 +15,7 @@ from rsea_ros.control.controller import Limits, TorqueController
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
 from rsea_ros.control.loads import LOCKED
+from rsea_ros.control.prediction import AHEAD
 from rsea_ros.control.synthesis import Design
 from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -76,6 +77,10 @@ def trials(rig: Rig, free: Rig, design: Design, resonance: float) -> Iterator[Tr
     band = 3.0 * resonance
     yield Trial("torque bandwidth, -3 dB, locked", bandwidth(rig, design), "Hz", band, least=True)
     yield Trial("torque bandwidth, -3 dB, free", bandwidth(free, design), "Hz", band, least=True)
+    both = bandwidth(rig, design, both_ways=True)
+    yield Trial("T_d / desired within ±3 dB, locked", both, "Hz", band, least=True)
+    known = bandwidth(rig, design, both_ways=True, preview=True)
+    yield Trial("the same, desired torque known 2 samples ahead", known, "Hz", band, least=True)
     yield Trial("crossover of the feedback loop, locked", at.crossover, "Hz", band, least=True)
     yield Trial("phase margin, locked", at.phase, "deg", 45.0, least=True)
     yield Trial("least phase margin, any other load", min(m.phase for m in others), "deg", 35.0, least=True)
@@ -94,7 +99,7 @@ def trials(rig: Rig, free: Rig, design: Design, resonance: float) -> Iterator[Tr
     yield Trial("3 N m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
     yield Trial("3 N m friction, in the model", 100.0 * sine(rough, rough, design), "%", 2.5)
     yield Trial(
-        "5 arcmin backlash at rest, torque RMS over that without", restlessness(rig, design), "1", 1.1
+        "held with 5 arcmin of backlash: torque RMS over that without", restlessness(rig, design), "1", 1.1
     )
 
 
@@ -144,19 +149,30 @@ def _held(true: Rig, model: Rig, design: Design, torque: float) -> float:
     return float(np.std(ft))
 
 
-def response(rig: Rig, design: Design, seconds: float = 6.0) -> tuple[FloatArray, ComplexArray]:
-    """Return hz and T_d / desired, from the answer of the noise-free simulation to a single sample."""
+def response(
+    rig: Rig, design: Design, *, preview: bool = False, seconds: float = 6.0
+) -> tuple[FloatArray, ComplexArray]:
+    """Return hz and T_d / desired, from the answer of the noise-free simulation to a single sample.
+
+    preview: desired torques are known as far ahead as the controller needs, instead of predicted.
+    """
     n = round(seconds * design.rate)
     wanted = np.zeros(n)
-    wanted[0] = 1.0
+    wanted[AHEAD] = 1.0
     quiet = rig.with_effects()
-    controller = TorqueController(quiet, design.rate, design.gains, limits=UNLIMITED)
-    ft = closed_loop(quiet, design.rate, controller, wanted, noise=False).ft
-    return np.asarray(np.fft.rfftfreq(n, 1.0 / design.rate)[1:]), np.fft.rfft(ft)[1:]
+    controller = TorqueController(quiet, design.rate, design.gains, limits=UNLIMITED, preview=preview)
+    ahead = AHEAD if preview else 0
+    ft = closed_loop(quiet, design.rate, controller, wanted, noise=False, ahead=ahead).ft
+    hz = np.asarray(np.fft.rfftfreq(n, 1.0 / design.rate)[1:])
+    return hz, np.fft.rfft(ft)[1:] / np.fft.rfft(wanted)[1:]
 
 
-def bandwidth(rig: Rig, design: Design) -> float:
-    """Return where T_d / desired leaves -3 dB downward, Hz; half the rate where it never does."""
-    hz, answer = response(rig, design)
-    low = (np.abs(answer) < 1.0 / math.sqrt(2.0)) & (hz > 1.0)
-    return float(hz[np.argmax(low)]) if low.any() else 0.5 * design.rate
+def bandwidth(rig: Rig, design: Design, *, both_ways: bool = False, preview: bool = False) -> float:
+    """Return where T_d / desired leaves -3 dB, Hz; half the rate where it never does.
+
+    both_ways: where it leaves ±3 dB.
+    """
+    hz, answer = response(rig, design, preview=preview)
+    decibel = 20.0 * np.log10(np.abs(answer))
+    out = ((decibel < -3.0) | (both_ways & (decibel > 3.0))) & (hz > 1.0)
+    return float(hz[np.argmax(out)]) if out.any() else 0.5 * design.rate
