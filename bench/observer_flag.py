@@ -78,12 +78,12 @@ def noise(args: argparse.Namespace) -> Iterator[str]:
         record = synthesize(rig, Channel(t, amplitude * np.sin(2.0 * np.pi * 1.0 * t)), seed=1)
         observer, flag = Observer(rig), PureTorque(rig)
         changes = _changes(observer, flag, 0, *(record[n].y for n in ("position", "motor_torque", "ft")))
-        yield f"1 Hz, {amplitude:g} N m, ten minutes: {changes} changes of the flag, last verdict {flag.verdict}"
+        yield f"1 Hz, {amplitude:g} N m, ten minutes: {changes} changes of the flag, then {flag.verdict}"
 
 
 def _changes(observer: Observer, flag: PureTorque, first: int, position: FloatArray, torque: FloatArray,
              ft: FloatArray) -> int:  # fmt: skip
-    """Return how often the flag changed after the first second. The measured torque stands for the command."""
+    """Return how often the flag changed after the first second; measured torque stands for the command."""
     changes = 0
     for k, (q, u, y) in enumerate(zip(position.tolist(), torque.tolist(), ft.tolist(), strict=True), first):
         estimate = observer.take([(k / 280.0, STATE, q, u), (k / 280.0, FT, y, 0.0)])[1]

@@ -1,7 +1,7 @@
 """The model node in a process, with the times of its work written down at its end.
 
-RSEA_BENCH_TIMES names the file: a row for each wrench that woke it: when (ns of the monotonic clock), the whole
-callback to the last publication, and observer with flag alone, ns.
+RSEA_BENCH_TIMES names the file: a row for each wrench that woke it: when (ns of the monotonic clock), the
+whole callback to the last publication, and observer with flag alone, ns.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The model node in its place: plant, excite and model in processes of their own, and this one as the receiver.
+"""The model node in its place: plant, excite and model in processes of their own, this one receives.
 
 Beside it, in the same run: how long ft itself takes to here, and a bare loop with absolute deadlines.
 """

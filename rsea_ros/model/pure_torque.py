@@ -26,6 +26,9 @@ Verdict = Literal["no torque", "pure", "beyond"]
 FALSE_ALARM = 1e-8
 """Probability that noise passes for torque in one window; with 50 windows a second once in 500 hours."""
 
+FAINT = 0.01
+"""The same while there is torque: one that is heard is not lost at every crossing of zero."""
+
 DECIDED = 3.0
 """Sigmas by which the powers must tell on which side of the edge the torque is."""
 
@@ -83,7 +86,7 @@ class PureTorque:
         self._corner = self.edge * odds**0.25
         self._on, self._off = ((1.0 + sign * s.hysteresis) ** 4 / odds for sign in (-1.0, 1.0))
         self._values = max(1.0, 2.0 * self._corner * s.window)  # independent ones of the noise in a window
-        self._surprise = float(chi2.isf(FALSE_ALARM, 1))
+        self._surprise, self._faint = (float(chi2.isf(p, 1)) for p in (FALSE_ALARM, FAINT))
         self._pair, self._floor = empty_pair(), Floor(math.inf, math.inf, 1.0)
         self._verdict: Verdict = "no torque"
         self._heard = self._since = -math.inf
@@ -128,7 +131,8 @@ class PureTorque:
         return 20.0 * math.log10(abs(response)), math.degrees(np.angle(response))
 
     def _decide(self, t: float, high: float, low: float, noise_high: float, noise_low: float) -> None:
-        if high > self._surprise * noise_high or low > self._surprise * noise_low:
+        times = self._surprise if self._verdict == "no torque" else self._faint
+        if high > times * noise_high or low > times * noise_low:
             self._heard = t
         elif t - self._heard > self.settings.quiet:
             self._verdict, self._since = "no torque", t
