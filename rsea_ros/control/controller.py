@@ -33,7 +33,7 @@ CORNER = 80.0
 
 @dataclass(frozen=True)
 class Limits:
-    """torque: N m. slew: N m/s. ramp: s in which the limit grows from zero after the start."""
+    """torque: N m. slew: N m/s. ramp: s in which the limit grows after the start."""
 
     torque: float = 68.0
     slew: float = 40_000.0
@@ -82,13 +82,15 @@ class TorqueController:
         self._preview, self._limits = preview, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
 
-    def start(self, reading: Reading) -> None:
-        """Begin anew, from zero torque, with the bench as it is: nothing jumps."""
-        self._reference.start(reading.ft, reading.velocity)
-        self._prediction.start(reading.ft)
-        self._state = State(ft=reading.ft, velocity=reading.velocity)
-        self._sent, self._known = 0.0, (0.0, 0.0)
-        self._age, self._desired = 0, reading.ft
+    def start(self, reading: Reading, desired: float = 0.0) -> None:
+        """Begin anew with the bench as it is, from the torque that the motor makes now: nothing jumps."""
+        torque = reading.motor_torque if math.isfinite(reading.motor_torque) else 0.0
+        self._reference.start(reading.ft, reading.velocity, desired)
+        self._prediction.start(desired)
+        self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
+        self._begin = self._sent = torque
+        self._known = (0.0, 0.0)
+        self._age, self._desired = 0, desired
         self.share = Share()
 
     def step(self, reading: Reading, desired: float, missed: int = 0) -> float:
@@ -159,4 +161,5 @@ class TorqueController:
         limits, before, h = self._limits, self._sent, self._law.period
         grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
         torque = min(max(torque, before - limits.slew * h), before + limits.slew * h)
-        return min(max(torque, -limits.torque * grown), limits.torque * grown)
+        largest = min(limits.torque, max(abs(self._begin), limits.torque * grown))
+        return min(max(torque, -largest), largest)

@@ -47,7 +47,7 @@ def closed_loop(
     plant = Plant(rig, rate, seed=seed, noise=noise)
     sample = plant.step(0.0)
     pending, rows = 0.0, np.empty((len(desired), 3))
-    controller.start(_reading(sample))
+    controller.start(_reading(sample), float(desired[0]))
     for k, wanted in enumerate(np.append(desired[ahead:], np.full(ahead, desired[-1]))):
         command = controller.step(_reading(sample), float(wanted))
         rows[k] = sample.ft, command, sample.velocity

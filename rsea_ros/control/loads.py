@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from rsea_ros.control.sampled import check_controllable
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
 
@@ -17,8 +18,9 @@ def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
     """Return the rig by load: `locked`, and the free ends of `free` with 1 to 100 times their inertia.
 
     free: a bench whose ends are the lightest load; by default the rig itself. The actuator is the rig's in
-    all. Raises ParameterError where neither has a free end.
+    all. Raises ParameterError where `free` has no free end, or nothing can be controlled.
     """
+    check_controllable(rig)
     loads = {LOCKED: locked(rig)}
     lightest = with_ends(rig, free or rig)
     ends = [end for end in END_NAMES if lightest.end_is_free(end)]

@@ -22,14 +22,14 @@ class Reference:
     def __init__(self, plant: Sampled) -> None:
         self._plant, self._inverse = plant, inverse(plant)
         self.samples = max(self._inverse.moves, 2)
-        self.start(0.0, 0.0)
+        self.start(0.0, 0.0, 0.0)
 
-    def start(self, ft: float, velocity: float) -> None:
-        """Begin where the bench is, N m and rad/s."""
+    def start(self, ft: float, velocity: float, desired: float) -> None:
+        """Begin where the bench is, N m and rad/s, on the way to a desired torque, N m."""
         seen = self._plant.c[[FT, VELOCITY]]
         self._x: FloatArray = np.linalg.lstsq(seen, np.array([ft, velocity]), rcond=None)[0]
         self.now = self.next = self._plant.c @ self._x
-        self.promised = (ft, ft)
+        self.promised = (desired, desired)
 
     def torque(self, desired: FloatArray) -> float:
         """Return the command, N m, that leads to the desired torques from k+2 on, shape (samples,)."""

@@ -10,14 +10,12 @@ import numpy as np
 
 from rsea_ros.control.impedance import Impedance, impedance
 from rsea_ros.control.large_signal import Reach, reach
-from rsea_ros.control.loads import load_range, locked, with_ends
+from rsea_ros.control.loads import LOCKED, load_range, with_ends
 from rsea_ros.control.synthesis import Demand, Design, design
-from rsea_ros.control.trials import Compensated, Trial, compensations, response, trials
+from rsea_ros.control.trials import Compensated, Responses, Trial, compensations, responses_of, trials
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
 
 AMPLITUDES = (10.0, 20.0, 40.0)
 
@@ -34,14 +32,12 @@ class Motor:
 
 @dataclass(frozen=True)
 class AtRate:
-    """One rate: design, trials, gain of each compensation, T_d / desired (hz, locked, free), impedance."""
+    """One rate: design, trials, gain of each compensation, T_d / desired, impedance."""
 
     design: Design
     trials: tuple[Trial, ...]
     compensations: tuple[Compensated, ...]
-    hz: FloatArray
-    locked: ComplexArray
-    free: ComplexArray
+    responses: Responses
     impedance: Impedance
 
 
@@ -74,12 +70,13 @@ def study(
     """
     if not rates:
         raise ParameterError("no rate, expected at least one, Hz")
-    clamped, light = locked(rig), with_ends(rig, free)
+    loads = load_range(rig, free)
+    clamped, light = loads[LOCKED], with_ends(rig, free)
     resonance = natural_frequency(clamped)
     done = []
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
-        found = design(rig, load_range(rig, free), rate, demand)
+        found = design(rig, loads, rate, demand)
         done.append(_at_rate(clamped, light, found, resonance))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)
@@ -92,15 +89,13 @@ def natural_frequency(rig: Rig) -> float:
 
 
 def _at_rate(clamped: Rig, light: Rig, found: Design, resonance: float) -> AtRate:
-    hz, answer = response(clamped, found)
+    seen = responses_of(clamped, light, found)
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
     return AtRate(
         found,
-        tuple(trials(clamped, light, found, resonance)),
+        tuple(trials(clamped, light, found, resonance, seen)),
         tuple(compensations(clamped, found)),
-        hz,
-        answer,
-        response(light, found)[1],
+        seen,
         impedance(clamped, found.rate, found.gains, grid),
     )
 

@@ -56,6 +56,16 @@ class Trial:
 
 
 @dataclass(frozen=True)
+class Responses:
+    """T_d / desired at hz, shape (n,): clamped, free, and clamped with the desired torque known ahead."""
+
+    hz: FloatArray
+    locked: ComplexArray
+    free: ComplexArray
+    known: ComplexArray
+
+
+@dataclass(frozen=True)
 class Compensated:
     """An effect, the error of a sine (relative, RMS) with a model that lacks it and one that has it."""
 
@@ -70,16 +80,16 @@ class Compensated:
         return 1.0 - self.with_model / self.without
 
 
-def trials(rig: Rig, free: Rig, design: Design, resonance: float) -> Iterator[Trial]:
+def trials(rig: Rig, free: Rig, design: Design, resonance: float, seen: Responses) -> Iterator[Trial]:
     """Yield the trials of a clamped rig and the same with free ends. resonance: of the open loop, Hz."""
     at = design.margins[LOCKED]
     others = [m for name, m in design.margins.items() if name != LOCKED]
     band = 3.0 * resonance
-    yield Trial("torque bandwidth, -3 dB, locked", bandwidth(rig, design), "Hz", band, least=True)
-    yield Trial("torque bandwidth, -3 dB, free", bandwidth(free, design), "Hz", band, least=True)
-    both = bandwidth(rig, design, both_ways=True)
+    yield Trial("torque bandwidth, -3 dB, locked", bandwidth(seen.hz, seen.locked), "Hz", band, least=True)
+    yield Trial("torque bandwidth, -3 dB, free", bandwidth(seen.hz, seen.free), "Hz", band, least=True)
+    both = bandwidth(seen.hz, seen.locked, both_ways=True)
     yield Trial("T_d / desired within ±3 dB, locked", both, "Hz", band, least=True)
-    known = bandwidth(rig, design, both_ways=True, preview=True)
+    known = bandwidth(seen.hz, seen.known, both_ways=True)
     yield Trial("the same, desired torque known 2 samples ahead", known, "Hz", band, least=True)
     yield Trial("crossover of the feedback loop, locked", at.crossover, "Hz", band, least=True)
     yield Trial("phase margin, locked", at.phase, "deg", 45.0, least=True)
@@ -149,8 +159,14 @@ def _held(true: Rig, model: Rig, design: Design, torque: float) -> float:
     return float(np.std(ft))
 
 
+def responses_of(rig: Rig, free: Rig, design: Design) -> Responses:
+    """Return the responses of a clamped rig and the same with free ends."""
+    hz, locked = response(rig, design)
+    return Responses(hz, locked, response(free, design)[1], response(rig, design, preview=True)[1])
+
+
 def response(
-    rig: Rig, design: Design, *, preview: bool = False, seconds: float = 6.0
+    rig: Rig, design: Design, *, preview: bool = False, seconds: float = 4.0
 ) -> tuple[FloatArray, ComplexArray]:
     """Return hz and T_d / desired, from the answer of the noise-free simulation to a single sample.
 
@@ -167,12 +183,11 @@ def response(
     return hz, np.fft.rfft(ft)[1:] / np.fft.rfft(wanted)[1:]
 
 
-def bandwidth(rig: Rig, design: Design, *, both_ways: bool = False, preview: bool = False) -> float:
-    """Return where T_d / desired leaves -3 dB, Hz; half the rate where it never does.
+def bandwidth(hz: FloatArray, answer: ComplexArray, *, both_ways: bool = False) -> float:
+    """Return where T_d / desired leaves -3 dB, Hz; the highest frequency where it never does.
 
     both_ways: where it leaves ±3 dB.
     """
-    hz, answer = response(rig, design, preview=preview)
     decibel = 20.0 * np.log10(np.abs(answer))
     out = ((decibel < -3.0) | (both_ways & (decibel > 3.0))) & (hz > 1.0)
-    return float(hz[np.argmax(out)]) if out.any() else 0.5 * design.rate
+    return float(hz[np.argmax(out)]) if out.any() else float(hz[-1])

@@ -88,10 +88,10 @@ class Controller:
 
     def _command(self, stamp: int, reading: Reading) -> None:
         missed = round((stamp - self._last) / self._period) - 1 if self._last else 0
-        if not self._last:
-            self._controller.start(reading)
         self._poll()
         self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
+        if not self._last:
+            self._controller.start(reading, self._desired.torque)
         self._torque = self._controller.step(reading, self._desired.torque, missed)
         self._commands.publish(torque_command_message(stamp + round(self._period), self._torque))
         self._last, self._heard = stamp, time.monotonic_ns()

@@ -63,9 +63,11 @@ def _following(study: Study) -> Figure:
     """Return T_d over desired torque, and the open loop."""
     curves = []
     for at, colour in zip(study.rates, _COLOURS, strict=False):
-        rate, seen = at.design.rate, (at.hz > 0.5) & (at.hz < 0.45 * at.design.rate)
-        curves.append(Response(f"{rate:g} Hz, locked", colour, at.hz[seen], at.locked[seen]))
-        curves.append(Response(f"{rate:g} Hz, free", colour, at.hz[seen], at.free[seen], 1.4, "dot"))
+        rate, found = at.design.rate, at.responses
+        shown = (found.hz > 0.5) & (found.hz < 0.45 * rate)
+        hz = found.hz[shown]
+        curves.append(Response(f"{rate:g} Hz, locked", colour, hz, found.locked[shown]))
+        curves.append(Response(f"{rate:g} Hz, free", colour, hz, found.free[shown], 1.4, "dot"))
     hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)
     for rig, dash in ((study.rig, "solid"), (study.free, "dot")):
         opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)

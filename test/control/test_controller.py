@@ -1,0 +1,143 @@
+"""The controller on the simulated bench: following, compensations, limits, lost and late samples."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rsea_ros.control.compensation import compensation
+from rsea_ros.control.controller import Limits, Reading, TorqueController
+from rsea_ros.control.feedforward import inverse, inverse_poles
+from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.law import Gains
+from rsea_ros.control.prediction import AHEAD, Prediction, prediction_response
+from rsea_ros.control.sampled import sampled
+from rsea_ros.control.synthesis import Design
+from rsea_ros.control.trials import EFFECTS, UNLIMITED, response, restlessness, sine
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
+
+RATE = 280.0
+GAINS = Gains(1.469, 0.01116, 89.2)
+RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
+DESIGN = Design(GAINS, RATE, {}, math.nan)
+
+
+def test_a_sine_is_followed_clamped_and_free():
+    assert sine(RIG, RIG, DESIGN) < 0.02
+    assert sine(FREE, FREE, DESIGN, limits=UNLIMITED) < 0.04
+
+
+@pytest.mark.parametrize(
+    ("effect", "hz", "without", "with_model"),
+    [(EFFECTS[0], 5.0, 0.06, 0.025), (EFFECTS[1], 5.0, 0.06, 0.025), (EFFECTS[2], 1.0, 0.1, 0.01),
+     (EFFECTS[3], 5.0, 0.15, 0.04)],
+    ids=lambda value: getattr(value, "name", None),
+)  # fmt: skip
+def test_an_effect_costs_little_and_less_when_it_is_known(effect, hz, without, with_model):
+    true = RIG.with_effects(effect)
+    unknown, known = sine(true, RIG, DESIGN, hz=hz), sine(true, true, DESIGN, hz=hz)
+    assert unknown < without and known < with_model and known < 0.5 * unknown
+
+
+def test_backlash_makes_no_limit_cycle():
+    assert restlessness(RIG, DESIGN) < 1.1
+
+
+def test_what_the_prediction_does_is_what_the_bench_shows():
+    hz, answer = response(RIG, DESIGN)
+    wanted = prediction_response(80.0, 1.0 / RATE, hz)
+    below = hz < 100.0
+    assert answer[below] == pytest.approx(wanted[below], rel=0.02)
+    hz, answer = response(RIG, DESIGN, preview=True)
+    assert np.abs(answer[hz < 130.0]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_parabola_is_predicted():
+    prediction, k = Prediction(80.0, 1.0 / RATE), np.arange(80)
+    torque = 3.0 + 0.2 * k - 0.01 * k**2
+    ahead = [prediction.ahead(float(t), 1)[0] for t in torque]
+    assert ahead[-20:-AHEAD] == pytest.approx(torque[-20 + AHEAD :], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["paper_high_impedance", "paper_moving_output", "prototype_knee"])
+@pytest.mark.parametrize("rate", [280.0, 1000.0])
+def test_the_inverse_leads_the_model_to_the_desired_torque(name, rate):
+    """Slow torques exactly, also where one sample alone cannot be inverted."""
+    f = inverse(sampled(load_rig(name), rate))
+    assert np.abs(inverse_poles(f)).max() < 1.0 + 1e-6
+    x = np.zeros(len(f.plant.a))
+    for k in range(400):
+        wanted = np.sin(0.02 * (k + 1 + np.arange(f.moves)))
+        x = f.plant.a @ x + f.plant.b * f.torque(x, wanted)
+    assert f.plant.c[0] @ x == pytest.approx(wanted[0], abs=0.02)
+
+
+def test_compensations_are_the_means_of_what_they_cancel():
+    known = compensation(RIG.with_effects(EFFECTS[1], EFFECTS[2], EFFECTS[3]))
+    w = np.linspace(-0.02, 0.03, 20001)
+    size = 1.5 + 2.0 * math.exp(-((0.005 / 0.05) ** 2))
+    assert known.friction(-0.02, 0.03) == pytest.approx(np.mean(size * np.tanh(w / 2e-3)), rel=1e-3)
+    q = np.linspace(0.001, 0.0018, 20001)
+    ripple = -3.0 * np.sin(4.0 * 502.0 * q + 0.7)
+    assert known.ripple(0.001, 0.0018) == pytest.approx(np.mean(ripple), rel=1e-3)
+    assert known.way(100.0) - known.way(-100.0) == pytest.approx(EFFECTS[3].parameters["gap"])
+
+
+def test_a_torque_beyond_the_limit_winds_nothing_up():
+    """200 N m asked for a second with 30 N m to be had; then 5 N m are there within 0.15 s."""
+    wanted = np.concatenate([np.full(280, 200.0), np.full(200, 5.0)])
+    controller = TorqueController(RIG, RATE, GAINS, limits=Limits(torque=30.0))
+    trace = closed_loop(RIG, RATE, controller, wanted)
+    assert np.abs(trace.command).max() == pytest.approx(30.0)
+    assert trace.ft[150:280] == pytest.approx(30.0, abs=0.5)
+    assert trace.ft[280 + 42 :] == pytest.approx(5.0, abs=0.5)
+
+
+def test_it_takes_over_from_another_command_without_a_jump():
+    plant = Plant(RIG, RATE)
+    for _ in range(600):
+        sample = plant.step(20.0)
+    controller, torque, ft, torques = TorqueController(RIG, RATE, GAINS), 20.0, [], [20.0]
+    controller.start(_reading(sample), 20.0)
+    for _ in range(200):
+        torques.append(controller.step(_reading(sample), 20.0))
+        sample = plant.step(torque)
+        torque = torques[-1]
+        ft.append(sample.ft)
+    assert np.abs(np.diff(torques)).max() < 2.0
+    assert np.array(ft) == pytest.approx(20.0, abs=0.3)
+
+
+def test_its_torque_grows_slowly_where_something_else_loads_the_spring():
+    loaded = Reading(20.0, 0.0, 20.0 / 1530.456, 0.0)
+    controller = TorqueController(RIG, RATE, GAINS, limits=Limits(torque=68.0, ramp=0.25))
+    controller.start(loaded, 50.0)
+    torques = [abs(controller.step(loaded, 50.0)) for _ in range(70)]
+    assert np.all(np.array(torques) <= 68.0 / 0.25 / RATE * np.arange(1, 71) + 1e-9)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["torque measured", "torque unknown"])
+def test_lost_and_late_samples_do_no_harm(known):
+    """Two samples lost, and all commands of 30 ms late, in the middle of a sine through friction."""
+    plant, controller = Plant(RIG.with_effects(EFFECTS[0]), RATE), TorqueController(RIG, RATE, GAINS)
+    acting, pending, lost, errors = 0.0, 0.0, 0, []
+    sample = plant.step(0.0)
+    for k in range(700):
+        wanted = 10.0 * math.sin(2.0 * math.pi * 5.0 * k / RATE)
+        errors.append(sample.ft - wanted)
+        if k in (300, 301):
+            lost += 1
+        else:
+            reading = _reading(sample) if known else Reading(sample.ft, sample.velocity, sample.position)
+            command, lost = controller.step(reading, wanted, lost), 0
+        sample = plant.step(acting)
+        acting = acting if 450 <= k < 458 else pending
+        acting, pending = (acting, command)
+    quiet, disturbed = np.array(errors[200:300]), np.array(errors[300:])
+    assert np.abs(disturbed).max() < 6.0
+    assert np.std(disturbed[-100:]) == pytest.approx(np.std(quiet), rel=0.2)
+
+
+def _reading(sample):
+    return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque)

@@ -1,0 +1,100 @@
+"""The loop: its formula against the code that runs, its margins against python-control and a bench."""
+
+import control
+import numpy as np
+import pytest
+
+from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.law import Gains, State, feedback, hold, law_of
+from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.loop import largest_pole, open_loop
+from rsea_ros.control.margins import margins
+from rsea_ros.control.sampled import FT, VELOCITY, responses, sampled
+from rsea_ros.control.synthesis import check, grid
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import Plant
+
+RATE = 280.0
+GAINS = Gains(1.469, 0.01116, 89.2)
+LOCKED_RIG, FREE_RIG = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Margins of GAINS with every load."""
+    return check(LOCKED_RIG, load_range(LOCKED_RIG, FREE_RIG), RATE, GAINS)
+
+
+@pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
+def test_the_sampled_bench_is_the_simulated_one(rig):
+    """A pulse into both; gravity and effects are in neither."""
+    plant, model, x = Plant(rig, RATE, noise=False), sampled(rig, RATE), np.zeros(2)
+    x = np.zeros(len(model.a))
+    for k in range(60):
+        torque = 10.0 if k < 3 else 0.0
+        sample, x = plant.step(torque), model.a @ x + model.b * torque
+        assert [sample.ft, sample.velocity, sample.position] == pytest.approx(model.c @ x, rel=1e-5, abs=1e-9)
+
+
+@pytest.mark.parametrize("hz", [1.0, 5.0, 17.5, 70.0])
+def test_a_sine_through_the_code_gives_the_formula(hz):
+    """The law reads a bench that a sine drives, and answers with -L of it; it remembers its answers."""
+    model, law = sampled(FREE_RIG, RATE), law_of(FREE_RIG, RATE, GAINS)
+    at = np.array([hz])
+    response = responses(model, at)
+    turn = np.exp(2j * np.pi * hz / RATE * np.arange(4000))
+    state, answers = State(), []
+    for ft, velocity in zip((response[FT, 0] * turn).real, (response[VELOCITY, 0] * turn).real, strict=True):
+        torque, state = feedback(law, state, -ft, ft, velocity)
+        state = hold(state, torque)
+        answers.append(torque)
+    late = slice(-round(20 * RATE / hz), None)
+    answer = 2.0 * np.mean((np.array(answers) * turn.conj())[late]) * np.exp(-2j * np.pi * hz / RATE)
+    assert answer == pytest.approx(-open_loop(law, response, at)[0], rel=2e-2)
+
+
+def test_margins_are_those_of_python_control():
+    loop = control.TransferFunction([4.0], [1.0, 3.0, 3.0, 1.0])
+    hz = np.geomspace(1e-3, 10.0, 5000)
+    ours = margins(np.asarray(loop(2j * np.pi * hz)), hz, period=0.01)
+    gain, phase, modulus, _, crossover, _ = control.stability_margins(loop)
+    assert ours.gain == pytest.approx(20.0 * np.log10(gain), rel=1e-3)
+    assert ours.phase == pytest.approx(phase, rel=1e-3)
+    assert ours.crossover == pytest.approx(crossover / (2.0 * np.pi), rel=1e-3)
+    assert ours.sensitivity == pytest.approx(1.0 / modulus, rel=1e-3)
+    assert ours.delay == pytest.approx(np.radians(phase) / crossover / 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
+def test_a_bench_on_either_side_of_the_gain_margin(rig, found):
+    """A motor that makes so much more torque than its current says: the loop holds, or swings up."""
+    name = LOCKED if rig is LOCKED_RIG else "free x 1"
+    gain = 10.0 ** (found.margins[name].gain / 20.0)
+    rms = {}
+    for share in (0.95, 1.05):
+        true = rig.with_effects(EffectSetting("torque_constant_error", {"gain": share * gain}))
+        controller = TorqueController(rig, RATE, GAINS, limits=Limits(1e9, 1e12, 0.0))
+        ft = closed_loop(true, RATE, controller, np.zeros(600)).ft
+        rms[share] = np.std(ft[400:]) / np.std(ft[100:300])
+    assert rms[0.95] < 2.0 and rms[1.05] > 5.0
+
+
+def test_poles_and_encirclements_agree(found):
+    plant, law = sampled(LOCKED_RIG, RATE), law_of(LOCKED_RIG, RATE, GAINS)
+    edge = 10.0 ** (found.margins[LOCKED].gain / 20.0)
+    for share, stable in ((0.98, True), (1.02, False)):
+        stronger = type(plant)(plant.a, plant.b * share * edge, plant.c, plant.period)
+        assert (largest_pole(law, stronger) < 1.0) is stable
+
+
+def test_what_is_unstable_with_any_load_is_refused_with_its_name():
+    loads = load_range(LOCKED_RIG, FREE_RIG)
+    with pytest.raises(ParameterError, match=r"unstable at 280 Hz with load 'locked'.*modulus 1\.\d+"):
+        check(LOCKED_RIG, loads, RATE, Gains(30.0, 0.1, 50.0))
+    slow = LOCKED_RIG.with_effects(EffectSetting("command_delay", {"delay": 0.02}))
+    with pytest.raises(ParameterError, match="the lags of its effects"):
+        check(slow, load_range(slow, FREE_RIG), RATE, GAINS)
+    assert grid(RATE)[-1] < 0.5 * RATE
