@@ -8,9 +8,11 @@ import signal
 import socket
 import subprocess
 import sys
+import venv
 from collections.abc import Iterator
 from pathlib import Path
 
+import pip
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -18,6 +20,13 @@ LOCKS = ("requirements.lock", "requirements-ros.lock")
 PACKAGE = 'import sys\nprint("ran", *sys.argv[1:])\n'
 DECOY = PACKAGE if sys.version_info < (3, 11) else 'print("from the working directory")\n'
 FOREIGN = ("ROS_", "AMENT_", "PYTHON", "_ROS")
+LINK_PIP = f"""
+import glob, os, venv
+def link_pip(self, context):
+    (place,) = glob.glob(os.path.join(glob.escape(context.env_dir), "lib", "python3*", "site-packages"))
+    os.symlink({str(Path(pip.__file__).parent)!r}, os.path.join(place, "pip"))
+venv.EnvBuilder._setup_pip = link_pip
+"""
 
 
 @pytest.fixture
@@ -37,6 +46,17 @@ def clone(tmp_path: Path) -> Path:
     return root
 
 
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where a Python lies whose environments get a link to a pip, which takes seconds to unpack."""
+    place = tmp_path_factory.mktemp("python")
+    venv.create(place, symlinks=True)
+    (packages,) = place.glob("lib/python3*/site-packages")
+    (packages / "link_pip.py").write_text(LINK_PIP)
+    (packages / "link_pip.pth").write_text("import link_pip\n")
+    return place / "bin"
+
+
 @pytest.fixture
 def silent_server() -> Iterator[socket.socket]:
     """Listen as a package server that takes requests and never answers."""
@@ -45,9 +65,9 @@ def silent_server() -> Iterator[socket.socket]:
         yield server
 
 
-def start(root: Path, *arguments: str, path: Path | None = None, **environment: str) -> subprocess.Popen[str]:
-    """Start the launcher in a process group of its own, with this Python's base (or `path`) first on PATH."""
-    search = os.pathsep.join([str(path or Path(sys.base_prefix) / "bin"), os.environ["PATH"]])
+def start(root: Path, path: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """Start the launcher in a process group of its own, with the Python of `path` first on PATH."""
+    search = os.pathsep.join([str(path), os.environ["PATH"]])
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(FOREIGN)}
     return subprocess.Popen(
         [str(root / "rsea"), *arguments], cwd=root.parent, text=True, start_new_session=True,
@@ -56,9 +76,9 @@ def start(root: Path, *arguments: str, path: Path | None = None, **environment: 
     )
 
 
-def run(root: Path, *arguments: str, path: Path | None = None, **environment: str) -> tuple[int, str, str]:
+def run(root: Path, path: Path, *arguments: str, **environment: str) -> tuple[int, str, str]:
     """Run the launcher to its end and return status, stdout, stderr."""
-    process = start(root, *arguments, path=path, **environment)
+    process = start(root, path, *arguments, **environment)
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
 
@@ -77,26 +97,26 @@ def fake_python(directory: Path, body: str) -> Path:
     return directory
 
 
-def test_the_environment_is_made_once_and_anew_when_the_lock_changes(clone):
-    both = [start(clone, "verb", "--flag", "two words") for _ in range(2)]
+def test_the_environment_is_made_once_and_anew_when_the_lock_changes(clone, quick):
+    both = [start(clone, quick, "verb", "--flag", "two words") for _ in range(2)]
     ends = [process.communicate(timeout=120) for process in both]
     assert [process.returncode for process in both] == [0, 0]
     assert [out for out, _ in ends] == ["ran verb --flag two words\n"] * 2
     assert sum(err.count("making .venv with") for _, err in ends) == 1
-    assert run(clone, "verb") == (0, "ran verb\n", "")
+    assert run(clone, quick, "verb") == (0, "ran verb\n", "")
 
     (clone / LOCKS[1]).write_text("# changed\n")
-    status, out, err = run(clone)
+    status, out, err = run(clone, quick)
     assert (status, out) == (0, "ran\n")
     assert "making .venv with" in err
-    assert run(clone) == (0, "ran\n", "")
+    assert run(clone, quick) == (0, "ran\n", "")
 
 
-def test_an_interrupted_environment_is_never_used(clone, silent_server):
+def test_an_interrupted_environment_is_never_used(clone, quick, silent_server):
     ask_for(clone, silent_server.getsockname())
     connections = []
     for end, status in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
-        process = start(clone)
+        process = start(clone, quick)
         connections.append(silent_server.accept()[0])
         os.killpg(process.pid, end)
         out, err = process.communicate(timeout=60)
@@ -106,42 +126,42 @@ def test_an_interrupted_environment_is_never_used(clone, silent_server):
         connection.close()
 
     (clone / LOCKS[0]).write_text("")
-    status, out, err = run(clone)
+    status, out, err = run(clone, quick)
     assert (status, out) == (0, "ran\n")
     assert "making .venv with" in err
 
 
-def test_without_network_it_says_so(clone, silent_server):
+def test_without_network_it_says_so(clone, quick, silent_server):
     address = silent_server.getsockname()
     silent_server.close()
     ask_for(clone, address)
-    status, out, err = run(clone)
+    status, out, err = run(clone, quick)
     assert (status, out) == (2, "")
     assert err.splitlines()[-1].startswith("rsea: no network: the package index does not answer")
 
 
-def test_a_sourced_ros_is_used_instead_of_the_wheels(clone, tmp_path):
+def test_a_sourced_ros_is_used_instead_of_the_wheels(clone, quick, tmp_path):
     ros = tmp_path / "ros"
     ros.mkdir()
     (ros / "rclpy.py").write_text("")
     (clone / LOCKS[1]).write_text("./the-wheels-must-not-be-installed\n")
     (clone / "rsea_ros" / "__main__.py").write_text("import rclpy\nprint(rclpy.__file__)\n")
     sourced = {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": str(ros), "PYTHONPATH": str(ros)}
-    status, out, err = run(clone, **sourced)
+    status, out, err = run(clone, quick, **sourced)
     assert (status, out) == (0, f"{ros / 'rclpy.py'}\n")
     assert "sourced ROS 2 jazzy" in err
     assert "include-system-site-packages = true" in (clone / ".venv" / "pyvenv.cfg").read_text()
-    assert run(clone, **sourced) == (0, f"{ros / 'rclpy.py'}\n", "")
+    assert run(clone, quick, **sourced) == (0, f"{ros / 'rclpy.py'}\n", "")
 
 
 def test_a_python_too_old_is_named(clone, tmp_path):
     old = fake_python(tmp_path / "bin", 'if [ "$1" = --version ]; then echo Python 3.8.10; else exit 1; fi')
-    assert run(clone, path=old) == (2, "", "rsea: Python 3.10 to 3.14 needed, found Python 3.8.10\n")
+    assert run(clone, old) == (2, "", "rsea: Python 3.10 to 3.14 needed, found Python 3.8.10\n")
 
 
 def test_a_python_without_venv_is_named(clone, tmp_path):
     bare = fake_python(tmp_path / "bin", 'case "$2" in *venv*) exit 1;; esac; exit 0')
-    status, out, err = run(clone, path=bare)
+    status, out, err = run(clone, bare)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert f"{bare}/python3 has no venv" in err
 
