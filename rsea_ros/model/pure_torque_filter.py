@@ -72,8 +72,6 @@ def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: fl
 
     a: shape (n, n), b: (n, m), c: (n,), r: (m,). corner: Hz. dt: s.
     """
-    from scipy.linalg import solve_discrete_lyapunov
-
     g, n = math.tan(math.pi * corner * dt), len(a)
     to_high = np.array([-(DAMPING + g), -1.0, 1.0]) / (1.0 + g * (DAMPING + g))  # of s_1, s_2, input
     to_band = g * to_high + np.array([1.0, 0.0, 0.0])
@@ -86,8 +84,16 @@ def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: fl
         steps[:, :2],
         np.outer(steps[:, 2], c @ b),
     )
-    p = solve_discrete_lyapunov(whole, drive @ np.diag(r) @ drive.T)
+    p = _stationary(whole, drive @ np.diag(r) @ drive.T)
     return np.array([_variance(row, a, b, c, r, p) for row in (to_high, to_low)])
+
+
+def _stationary(a: FloatArray, q: FloatArray) -> FloatArray:
+    """Return sum_k a^k q a'^k over the first 2^16 samples, by doubling: also where a has not settled yet."""
+    for _ in range(16):
+        q = q + a @ q @ a.T
+        a = a @ a
+    return q
 
 
 def _variance(

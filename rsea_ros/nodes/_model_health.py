@@ -13,12 +13,15 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.nodes._model_inputs import Inputs
 
+EVERY = 64
+"""Estimates between two looks at their noise."""
+
 CHANGED = 0.1
 """Part by which period or doubt of the estimates must have changed before their noise is worked out again."""
 
 
 class ModelHealth:
-    """Assesses the node once a second. estimate: the last one."""
+    """Assesses the node once a second, and keeps the flag told of the noise of the estimates."""
 
     def __init__(self, rig: Rig, observer: Observer, flag: PureTorque, inputs: Inputs) -> None:
         self._observer, self._flag, self._inputs = observer, flag, inputs
@@ -27,8 +30,16 @@ class ModelHealth:
         self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
         self._calibrated = (math.nan, math.nan)
         self.estimate: Estimate | None = None
+        self.count = 0
 
-    def __call__(self) -> Report:
+    def tell(self, estimate: Estimate) -> None:
+        """Take in the newest estimate; the flag learns the noise once that has settled or has changed."""
+        self.estimate = estimate
+        self.count += 1
+        if self.count % EVERY == 0:
+            self._calibrate()
+
+    def report(self) -> Report:
         """Return the report."""
         if self.estimate is None:
             return Report(
@@ -39,8 +50,7 @@ class ModelHealth:
         summary = "; ".join(troubles) or self._flag.verdict
         return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
 
-    def calibrate(self) -> None:
-        """Tell the flag the noise of the estimates, when that has changed."""
+    def _calibrate(self) -> None:
         if self.estimate is None or math.isnan(self._inputs.period):
             return
         now = (self._inputs.period, self.estimate.sigma_distal)

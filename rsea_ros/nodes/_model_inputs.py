@@ -1,14 +1,10 @@
-"""What the model node hears: commands, states and wrenches, taken together whenever a wrench wakes it.
-
-An executor's turn takes longer than the filter; one for each wrench keeps the node cheap. What waits is
-worked off by stamp, whatever topic it came on.
-"""
+"""What the model node hears: commands, states and wrenches, taken together, worked off by stamp."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from statistics import median
 from typing import Any
 
@@ -32,9 +28,7 @@ Stamped = tuple[int, int, float, float]
 class Inputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
-    def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool,
-                 wake: Callable[[], None]) -> None:  # fmt: skip
-        """wake: called when wrenches have come."""
+    def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool) -> None:
         self._node, self._observer, self._axis = node, observer, axis
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
@@ -42,20 +36,21 @@ class Inputs:
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
         group, deep = Polled(), RECORD_RELIABLE if reliable else None
-        self._commands, self._states = (
-            node.create_subscription(JointState, topic, lambda _: None, deep or usual, callback_group=group)
-            for topic, usual in (("torque_command", COMMAND), ("joint_states", MEASUREMENT))
+        self._commands, self._states, self.ft = (
+            node.create_subscription(kind, topic, lambda _: None, deep or usual, callback_group=group)
+            for kind, topic, usual in (
+                (JointState, "torque_command", COMMAND),
+                (JointState, "joint_states", MEASUREMENT),
+                (WrenchStamped, "ft", MEASUREMENT),
+            )
         )
-        self._first: list[WrenchStamped] = []
-        self._wake = wake
-        self._ft = node.create_subscription(WrenchStamped, "ft", self._on_ft, deep or MEASUREMENT)
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
         """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
         commands = [c for m in _waiting(self._commands, JointState) if (c := self._command(m)) is not None]
         samples = [s for m in _waiting(self._states, JointState) if (s := self._state(m)) is not None]
-        wrenches, self._first = [*self._first, *_waiting(self._ft, WrenchStamped)], []
-        samples += [(t, FT, torque, 0.0) for t, torque in (wrench_of(m, self._axis) for m in wrenches)]
+        wrenches = (wrench_of(m, self._axis) for m in _waiting(self.ft, WrenchStamped))
+        samples += [(t, FT, torque, 0.0) for t, torque in wrenches]
         samples.sort()
         together = [*commands, *samples]
         estimates = self._observer.take((self.seconds(t), kind, a, b) for t, kind, a, b in together)
@@ -64,10 +59,6 @@ class Inputs:
             if estimate is not None and (kind == FT or self.ft_silent):
                 self._note_period(stamp)
                 yield stamp, estimate
-
-    def _on_ft(self, message: WrenchStamped) -> None:
-        self._first = [message]
-        self._wake()
 
     def seconds(self, stamp: int) -> float:
         """Return a stamp in the observer's time, s."""

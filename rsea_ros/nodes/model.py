@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from typing import Any
 
 from rclpy.node import Node
@@ -14,13 +15,14 @@ from rsea_ros.model.pure_torque import PureTorque, Settings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._health import Health
+from rsea_ros.nodes._health import Health, Report
 from rsea_ros.nodes._model_health import ModelHealth
 from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED
 from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._waiter import Waiter
 
 TABLE = (
     Parameter(
@@ -52,7 +54,7 @@ TICK = 0.02
 
 
 class Model:
-    """Wakes at each ft and takes what has come with it; a tick does so while ft is silent."""
+    """Wakes at each ft and takes what has come with it; while ft is silent it looks every 20 ms."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         rig = load_rig(values["rig"])
@@ -63,39 +65,39 @@ class Model:
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
         self._pure = node.create_publisher(Bool, "pure_torque", LATCHED)
         self._pure.publish(bool_message(False))
-        self._inputs = Inputs(
-            node, observer, values["ft_timeout"], values["axis"], values["reliable"], self._work
-        )
+        self._inputs = Inputs(node, observer, values["ft_timeout"], values["axis"], values["reliable"])
         self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
-        self._health = Health(node, self._assess)
-        node.create_timer(TICK, self._tick)
+        self._lock = threading.Lock()
+        self._health = Health(node, self._report)
+        self._waiter = Waiter(node, self._inputs.ft, self._work, TICK)
+        self._waiter.start()
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
 
     def _work(self) -> None:
         """Publish an estimate for each sample that came, and the flag when it changes."""
-        for stamp, estimate in self._inputs.take():
-            efforts = dict(zip(NAMES, estimate, strict=False))
-            self._estimates.publish(efforts_message(stamp, efforts))
-            was = self._flag.verdict == "pure"
-            now = self._flag.take(self._inputs.seconds(stamp), estimate) == "pure"
-            if now != was:
-                self._pure.publish(bool_message(now))
-            self._assess.estimate = estimate
+        with self._lock:
+            for stamp, estimate in self._inputs.take():
+                self._estimates.publish(efforts_message(stamp, dict(zip(NAMES, estimate, strict=False))))
+                was = self._flag.verdict == "pure"
+                now = self._flag.take(self._inputs.seconds(stamp), estimate) == "pure"
+                if now != was:
+                    self._pure.publish(bool_message(now))
+                self._assess.tell(estimate)
 
-    def _tick(self) -> None:
-        """Go on without ft, and learn the noise of the estimates once it has settled."""
-        self._work()
-        self._assess.calibrate()
+    def _report(self) -> Report:
+        with self._lock:
+            return self._assess.report()
 
     def finished(self) -> bool:
         """Run until stopped."""
-        return False
+        return not self._waiter.running()
 
     def conclude(self) -> None:
         """Leave nothing to do."""
 
     def close(self) -> None:
         """Leave nothing behind: the flag of a node that is gone is down."""
+        self._waiter.stop()
         self._pure.publish(bool_message(False))
 
 
