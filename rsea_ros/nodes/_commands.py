@@ -42,7 +42,7 @@ class CommandQueue:
             elif stamp < self._taken_until:
                 self.late += 1
             self._waiting.append((max(stamp, self._taken_until), torque))
-            self._waiting.sort()
+            self._waiting.sort(key=lambda waiting: waiting[0])  # of one instant, the last that came counts
 
     def take(self, until: int) -> list[tuple[int, float]]:
         """Return the changes of torque up to an instant (ns), in order: (when, N m)."""

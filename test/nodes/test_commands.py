@@ -35,6 +35,15 @@ def test_a_late_command_takes_effect_at_once_and_is_counted():
     assert queue.late == 1
 
 
+def test_of_several_late_commands_the_last_one_stays_in_force():
+    queue = _queue()
+    queue.take(NOW + 100)
+    for stamp, torque in ((NOW + 50, 9.0), (NOW + 60, 3.0)):
+        queue.add(stamp, torque, NOW + 101)
+    assert queue.take(NOW + 200) == [(NOW + 100, 9.0), (NOW + 100, 3.0)]
+    assert queue.torque == 3.0
+
+
 def test_a_command_that_arrives_after_its_stamp_but_before_the_cycle_is_not_late():
     queue = _queue()
     queue.take(NOW)
