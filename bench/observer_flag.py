@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from rsea_ros.model.observer import FT, STATE, ErrorModel, Estimate, Observer
+from rsea_ros.model.observer import ErrorModel, Estimate, Observer
 from rsea_ros.model.pure_torque import PureTorque
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -23,7 +23,8 @@ def settled(rig: Rig, rate: float) -> ErrorModel:
     """Return what noise makes of the estimates of an observer that has run for a second."""
     observer = Observer(rig)
     for k in range(round(rate)):
-        observer.take([(k / rate, STATE, 0.0, 0.0), (k / rate, FT, 0.0, 0.0)])
+        observer.state(k / rate, 0.0, 0.0)
+        observer.ft(k / rate, 0.0)
     return observer.error_model(1.0 / rate)
 
 
@@ -86,7 +87,8 @@ def _changes(observer: Observer, flag: PureTorque, first: int, position: FloatAr
     """Return how often the flag changed after the first second; measured torque stands for the command."""
     changes = 0
     for k, (q, u, y) in enumerate(zip(position.tolist(), torque.tolist(), ft.tolist(), strict=True), first):
-        estimate = observer.take([(k / 280.0, STATE, q, u), (k / 280.0, FT, y, 0.0)])[1]
+        observer.state(k / 280.0, q, u)
+        estimate = observer.ft(k / 280.0, y)
         was = flag.verdict == "pure"
         assert estimate is not None
         changes += (flag.take(k / 280.0, estimate) == "pure") != was and k > 280

@@ -1,7 +1,7 @@
 """The model node in a process, with the times of its work written down at its end.
 
-RSEA_BENCH_TIMES names the file: a row for each wrench that came alone: when (ns of the monotonic clock), the
-whole callback to the last publication, and observer with flag alone, ns.
+RSEA_BENCH_TIMES names the file: a row for each wrench that came alone: when (ns of the monotonic clock), then
+wall and CPU time of the callback to the last publication, and of observer with flag alone, ns.
 """
 
 from __future__ import annotations
@@ -23,32 +23,35 @@ def main() -> int:
     from rsea_ros.model.pure_torque import PureTorque
     from rsea_ros.nodes import model
 
-    rows: list[tuple[int, int, int]] = []
-    spent = [0]
+    rows: list[tuple[int, ...]] = []
+    spent = [0, 0]
 
-    def noted(kind: Any) -> None:
-        original = kind.take
+    def noted(kind: Any, name: str) -> None:
+        original = getattr(kind, name)
 
         def take(*args: Any) -> Any:
-            begin = time.perf_counter_ns()
+            wall, cpu = time.perf_counter_ns(), time.thread_time_ns()
             result = original(*args)
-            spent[0] += time.perf_counter_ns() - begin
+            spent[1] += time.thread_time_ns() - cpu
+            spent[0] += time.perf_counter_ns() - wall
             return result
 
-        kind.take = take
+        setattr(kind, name, take)
 
     work = model.Model._work
 
     def woken(self: model.Model) -> None:
-        spent[0], began, begin = 0, self._assess.count, time.perf_counter_ns()
+        spent[:], before = [0, 0], self._assess.count
+        wall, cpu = time.perf_counter_ns(), time.thread_time_ns()
         work(self)
-        if self._assess.count == began + 1:
-            rows.append((time.monotonic_ns(), time.perf_counter_ns() - begin, spent[0]))
+        cpu, wall = time.thread_time_ns() - cpu, time.perf_counter_ns() - wall
+        if self._assess.count == before + 1:
+            rows.append((time.monotonic_ns(), wall, cpu, *spent))
 
-    noted(Observer)
-    noted(PureTorque)
+    noted(Observer, "_take")
+    noted(PureTorque, "take")
     model.Model._work = woken  # type: ignore[method-assign]
-    atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64)))
+    atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))
     return model.main()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
+from operator import itemgetter
 from statistics import median
 from typing import Any
 
@@ -12,8 +13,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import JointState, WrenchStamped, effort_of, joint_state_of, wrench_of
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.observer import COMMAND as COMMANDED
-from rsea_ros.model.observer import FT, STATE, Estimate, Observer
+from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.nodes._bench import Polled
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
@@ -21,8 +21,10 @@ from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
 
-Stamped = tuple[int, int, float, float]
-"""A sample of the observer, with its stamp in ns."""
+_STATE, _FT = range(2)
+
+Sample = tuple[int, float, float, int]
+"""Stamp (ns), position and motor torque, or the torque of a wrench and nan, and which of both it is."""
 
 
 class Inputs:
@@ -47,16 +49,14 @@ class Inputs:
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
         """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
-        commands = [c for m in _waiting(self._commands, JointState) if (c := self._command(m)) is not None]
+        for message in _waiting(self._commands, JointState):
+            self._command(message)
         samples = [s for m in _waiting(self._states, JointState) if (s := self._state(m)) is not None]
-        wrenches = (wrench_of(m, self._axis) for m in _waiting(self.ft, WrenchStamped))
-        samples += [(t, FT, torque, 0.0) for t, torque in wrenches]
-        samples.sort()
-        together = [*commands, *samples]
-        estimates = self._observer.take((self.seconds(t), kind, a, b) for t, kind, a, b in together)
-        for (stamp, kind, _, _), estimate in zip(samples, estimates[len(commands) :], strict=True):
-            self._heard(stamp, kind)
-            if estimate is not None and (kind == FT or self.ft_silent):
+        samples += [(*wrench_of(m, self._axis), math.nan, _FT) for m in _waiting(self.ft, WrenchStamped)]
+        samples.sort(key=itemgetter(0, 3))
+        for stamp, a, b, kind in samples:
+            estimate = self._measured(stamp, a, b, kind)
+            if estimate is not None and (kind == _FT or self.ft_silent):
                 self._note_period(stamp)
                 yield stamp, estimate
 
@@ -81,40 +81,42 @@ class Inputs:
         """Median time between estimates, s; nan before there are enough."""
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
-    def _heard(self, stamp: int, kind: int) -> None:
-        if kind == FT:
+    def _measured(self, stamp: int, a: float, b: float, kind: int) -> Estimate | None:
+        if kind == _FT:
             self._ft_stamp = stamp
-            return
+            return self._observer.ft(self.seconds(stamp), a)
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
+        return self._observer.state(self.seconds(stamp), a, b)
 
     def _note_period(self, stamp: int) -> None:
         if 0 < stamp - self._told < SECOND:
             self._periods.append((stamp - self._told) / SECOND)
         self._told = stamp
 
-    def _state(self, message: JointState) -> Stamped | None:
+    def _state(self, message: JointState) -> Sample | None:
         try:
             stamp, position, _velocity, torque = joint_state_of(message)
         except ParameterError as error:
             self._refuse("joint_states", error)
             return None
-        return stamp, STATE, position, torque
+        return stamp, position, torque, _STATE
 
-    def _command(self, message: JointState) -> Stamped | None:
+    def _command(self, message: JointState) -> None:
         try:
             stamp, torque = effort_of(message)
         except ParameterError as error:
             self._refuse("torque_command", error)
-            return None
+            return
         newest = max(self._state_stamp, self._ft_stamp)
         if stamp == 0 or (newest and abs(stamp - newest) > HORIZON):
             self.unstamped += 1
             stamp = newest
         if not math.isfinite(torque):
             self.refused += 1
-        return (stamp, COMMANDED, torque, 0.0) if stamp and math.isfinite(torque) else None
+        elif stamp:
+            self._observer.command(self.seconds(stamp), torque)
 
     def _refuse(self, topic: str, error: ParameterError) -> None:
         self.refused += 1

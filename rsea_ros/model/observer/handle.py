@@ -16,7 +16,7 @@ from numba import carray, njit, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
 from rsea_ros.model.observer.filter import Model, State, inner
-from rsea_ros.model.observer.log import Log, take_in
+from rsea_ros.model.observer.log import NONE, Log, take_in
 from rsea_ros.model.step import Calls, Linear
 
 ADDRESS, ROWS, COLUMNS = range(3)
@@ -95,8 +95,13 @@ def _log(h):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def receive(handle, reads_load, hold, events, rows):  # type: ignore[no-untyped-def]
-    """Take in events (t, kind, two values), shape (n, 4); rows gets where the state behind each is."""
+def receive(handle, reads_load, hold, t, kind, a, b, estimate):  # type: ignore[no-untyped-def]
+    """Take in an event; put the estimate behind a measurement, shape (6,), and tell whether there is one."""
     model, state, log = _model(handle, reads_load, hold), _state(handle), _log(handle)
-    for i in range(len(events)):
-        rows[i] = take_in(model, state, log, events[i, 0], int(events[i, 1]), events[i, 2], events[i, 3])
+    row = take_in(model, state, log, t, kind, a, b)
+    if row == NONE:
+        return False
+    at = len(state.whole) - len(state.score) - len(state.clock) - len(state.estimate)
+    for i in range(len(state.estimate)):
+        estimate[i] = log.saved[row, at + i]
+    return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from rsea_ros.model.observer.assemble import assemble, without_delay
 from rsea_ros.model.observer.consistency import Consistency, consistency
 from rsea_ros.model.observer.filter import SIGMA
 from rsea_ros.model.observer.handle import handle_of, receive
-from rsea_ros.model.observer.log import COMMAND, FT, LATE, NONE, REFUSED, STATE, empty_log
+from rsea_ros.model.observer.log import COMMAND, FT, LATE, REFUSED, STATE, empty_log
 from rsea_ros.model.observer.noise import Noise, noise_of
 from rsea_ros.model.observer.transition import transition
 from rsea_ros.model.rig import Rig
@@ -20,12 +20,6 @@ from rsea_ros.signals import FloatArray, Record
 
 GAP = 1.0
 """s. Stamps that jump so far, either way, are of another run: the observer begins anew."""
-
-
-BATCH = 64
-
-Sample = tuple[float, int, float, float]
-"""Stamp (s), kind (STATE, FT, COMMAND), and position with motor torque, the torque of ft, or of a command."""
 
 
 class Estimate(NamedTuple):
@@ -67,39 +61,21 @@ class Observer:
         self._rig, self._delay = without_delay(rig)
         self._noise = noise_of(rig) if noise is None else noise
         self._hold, self._duration = hold, duration
-        self._events, self._rows = np.zeros((BATCH, 4)), np.zeros(BATCH, dtype=np.int64)
+        self._estimate = np.zeros(2 * SIGMA)
         self.restarts = -1
         self._begin()
 
     def command(self, t: float, torque: float) -> None:
         """Take in a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
-        self.take([(t, COMMAND, torque, 0.0)])
+        self._take(t, COMMAND, torque, 0.0)
 
     def state(self, t: float, position: float, motor_torque: float = math.nan) -> Estimate | None:
         """Take in position (rad) and motor torque (N m), nan where it is missing; None when too late."""
-        return self.take([(t, STATE, position, motor_torque)])[0]
+        return self._take(t, STATE, position, motor_torque)
 
     def ft(self, t: float, torque: float) -> Estimate | None:
         """Take in a torque of the F/T sensor (N m); None when it is too late."""
-        return self.take([(t, FT, torque, 0.0)])[0]
-
-    def take(self, samples: Iterable[Sample]) -> list[Estimate | None]:
-        """Take in samples one after another, which is cheaper together; return the estimate at each.
-
-        None for a command, and for a measurement that came too late.
-        """
-        results: list[Estimate | None] = []
-        batch: list[Sample] = []
-        for sample in samples:
-            t, kind, a, b = sample
-            if abs(t - self._newest) > GAP:
-                results += self._receive(batch)
-                batch = []
-                self._begin()
-            if math.isnan(self._newest) or (kind != COMMAND and t > self._newest):
-                self._newest = t
-            batch.append((t + self._delay, kind, a, b) if kind == COMMAND else sample)
-        return results + self._receive(batch)
+        return self._take(t, FT, torque, 0.0)
 
     @property
     def late(self) -> int:
@@ -132,28 +108,19 @@ class Observer:
         self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
         self._log = empty_log(len(self._state.whole))
         self._handle = handle_of(self._model, self._state, self._log)
-        self._scalars = self._model.linear.reads_load, self._hold
-        self._at = self._state.whole.size - self._tail()
+        self._reads_load = self._model.linear.reads_load
         self._score, self._newest = np.zeros((3, 3)), math.nan
         self.restarts += 1
 
-    def _tail(self) -> int:
-        """Return how far the estimate lies from the end of a state."""
-        return sum(part.size for part in (self._state.estimate, self._state.clock, self._state.score))
-
-    def _receive(self, batch: list[Sample]) -> list[Estimate | None]:
-        results: list[Estimate | None] = []
-        for first in range(0, len(batch), BATCH):
-            part = batch[first : first + BATCH]
-            self._events[: len(part)] = part
-            receive(self._handle, *self._scalars, self._events[: len(part)], self._rows)
-            results += map(self._estimate, self._rows[: len(part)].tolist())
-        return results
-
-    def _estimate(self, row: int) -> Estimate | None:
-        if row == NONE:
-            return None
-        return Estimate(*self._log.saved[row, self._at : self._at + 2 * SIGMA].tolist())
+    def _take(self, t: float, kind: int, a: float, b: float) -> Estimate | None:
+        if abs(t - self._newest) > GAP:
+            self._begin()
+        if kind == COMMAND:
+            t += self._delay
+        elif not t < self._newest:
+            self._newest = t
+        there = receive(self._handle, self._reads_load, self._hold, t, kind, a, b, self._estimate)
+        return Estimate._make(self._estimate.tolist()) if there else None
 
 
 def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]:
