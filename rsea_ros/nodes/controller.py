@@ -6,10 +6,12 @@ import math
 import sys
 import time
 from collections import deque
+from collections.abc import Iterator
 from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from msg_adapters.ros import (
     JointState,
@@ -34,7 +36,7 @@ WATCH = 0.005
 """s between two looks at the age of the last measurement."""
 
 CLOSING_ZEROS = 3
-WAITING = 50
+WAITING = 500
 """Measurements that wait for their other half."""
 
 
@@ -53,11 +55,14 @@ class Controller:
         self._steps = self._missed = self._unusable = self._limited = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
-        node.create_subscription(JointState, "joint_states", self._on_state, MEASUREMENT)
-        node.create_subscription(WrenchStamped, "ft", self._on_ft, MEASUREMENT)
-        self._wanted = node.create_subscription(
-            JointState, "desired_torque", lambda message: None, COMMAND, callback_group=Polled()
-        )
+        subscribe = node.create_subscription
+        self._on = {
+            "joint_states": subscribe(JointState, "joint_states", self._on_state, MEASUREMENT),
+            "ft": subscribe(WrenchStamped, "ft", self._on_ft, MEASUREMENT),
+            "desired_torque": subscribe(
+                JointState, "desired_torque", lambda message: None, COMMAND, callback_group=Polled()
+            ),
+        }
         node.create_service(Trigger, "~/clear_fault", self._clear)
         node.create_timer(WATCH, self._watch)
         self._health = Health(node, self._report)
@@ -69,7 +74,12 @@ class Controller:
         self._pair()
 
     def _on_ft(self, message: WrenchStamped) -> None:
+        """Take what else has arrived as well, so that a process that was held up has the newest at once."""
         self._fts.append(wrench_of(message, self._values["axis"]))
+        for waiting, _ in _waiting(self._on["joint_states"], JointState):
+            self._states.append(joint_state_of(waiting))
+        for waiting, _ in _waiting(self._on["ft"], WrenchStamped):
+            self._fts.append(wrench_of(waiting, self._values["axis"]))
         self._pair()
 
     def _pair(self) -> None:
@@ -101,15 +111,12 @@ class Controller:
 
     def _poll(self) -> None:
         """Put all desired torques that have arrived into the queue."""
-        handle = self._wanted.handle
-        with handle:
-            while (waiting := handle.take_message(JointState, False)) is not None:
-                message, info = waiting
-                try:
-                    self._desired.add(*effort_of(message), info["received_timestamp"])
-                except ParameterError as error:
-                    self._desired.refused += 1
-                    self._node.get_logger().error(f"desired_torque: {error}", throttle_duration_sec=1.0)
+        for message, received in _waiting(self._on["desired_torque"], JointState):
+            try:
+                self._desired.add(*effort_of(message), received)
+            except ParameterError as error:
+                self._desired.refused += 1
+                self._node.get_logger().error(f"desired_torque: {error}", throttle_duration_sec=1.0)
 
     def _watch(self) -> None:
         """Latch a fault when measurements cease, and take the torque to zero."""
@@ -171,6 +178,14 @@ class Controller:
             return Report(ERROR, self._fault, values)
         waiting = "waiting for joint_states and ft"
         return Report(OK if self._last else WARN, "running" if self._last else waiting, values)
+
+
+def _waiting(subscription: Subscription[Any], kind: Any) -> Iterator[tuple[Any, int]]:
+    """Yield the messages that wait, with the instant of arrival, ns."""
+    handle = subscription.handle
+    with handle:
+        while (taken := handle.take_message(kind, False)) is not None:
+            yield taken[0], taken[1]["received_timestamp"]
 
 
 def main() -> int:

@@ -94,7 +94,7 @@ def loop(start, listener, model):
 
 
 def test_a_sine_is_followed_through_friction_that_the_model_has(loop):
-    assert np.median(loop.sine(3.0)) < 0.025
+    assert np.median(loop.sine(2.5)) < 0.025
 
 
 def test_a_command_acts_with_the_next_measurement(loop):
