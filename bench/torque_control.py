@@ -1,6 +1,7 @@
 """The torque controller on the simulated bench, faster than real time: the table of the README as Markdown.
 
-Run: python bench/control.py [RIG] [--free RIG] [--rate 280 1000]. `bench/control_nodes.py` does it through nodes.
+Run: python bench/torque_control.py [RIG] [--free RIG] [--rate 280 1000].
+Through real nodes: bench/torque_control_nodes.py.
 """
 
 from __future__ import annotations
