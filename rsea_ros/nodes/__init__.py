@@ -1,1 +1,19 @@
 """Nodes, thin: parameters to objects, callbacks of three lines, exceptions to diagnostics and a log line."""
+
+from __future__ import annotations
+
+import sys
+from types import TracebackType
+
+_told_before = sys.excepthook
+
+
+def _tell(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Tell of Ctrl-C in one line: a node's imports take a second, in which it handles no signals yet."""
+    if issubclass(kind, KeyboardInterrupt):
+        print("interrupted before it began", file=sys.stderr)  # noqa: T201
+    else:
+        _told_before(kind, error, trace)
+
+
+sys.excepthook = _tell

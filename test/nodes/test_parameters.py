@@ -2,6 +2,9 @@
 
 import importlib
 import math
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -73,3 +76,9 @@ def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(start):
         assert len(process.output) == 1, process.output
         assert WRONG[name][1] in process.output[0]
         assert "FATAL" in process.output[0]
+
+
+def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():
+    code = "import rsea_ros.nodes\nraise KeyboardInterrupt"
+    done = subprocess.run([sys.executable, "-c", code], cwd=CONFIG.parents[1], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (-signal.SIGINT, "interrupted before it began\n")
