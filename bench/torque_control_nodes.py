@@ -1,7 +1,7 @@
 """The torque controller through real nodes: plant and controller processes, a sender of desired torques here.
 
-Run: python bench/torque_control_nodes.py [--rate 280 1000]. The error is that of a sine of 5 Hz, the median over its
-periods, so a stall of the machine shows in `worst` and in the late commands, not in it.
+Run: python bench/torque_control_nodes.py [--rate 280 1000]. The error is that of a sine of 5 Hz, the median
+over its periods, so a stall of the machine shows in `worst` and in the late commands, not in it.
 """
 
 from __future__ import annotations
