@@ -37,6 +37,7 @@ class Cycle:
 
     A cycle is missed when the next one was due before it began. catch_up: missed cycles are worked off late,
     each with its own stamp (no more than a second of them); else they are left out.
+    `left_out` counts those that never run.
     The system clock is read once: stamps are even whatever is done to the clock later.
     """
 
@@ -45,7 +46,7 @@ class Cycle:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._began: list[int] = []
-        self._missed = 0
+        self._missed = self.left_out = 0
         self.error: Exception | None = None
 
     def start(self, first: int | None = None) -> None:
@@ -89,7 +90,9 @@ class Cycle:
                 self._missed += late > 0
                 self._work(due + self._offset)
                 allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
-                k += 1 + (late if late > allowed else 0)
+                skipped = late if late > allowed else 0
+                self.left_out += skipped
+                k += 1 + skipped
         except Exception as error:  # handed to the main thread by `running`
             self.error = error
 

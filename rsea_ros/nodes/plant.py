@@ -83,6 +83,8 @@ class Plant:
         self._device.close()
         if mistimed := self._bench.commands.late + self._bench.commands.unstamped:
             self._log.warning(f"{mistimed} commands did not act at their stamps, as a bag says they did")
+        if gaps := self._cycle.left_out:
+            self._log.warning(f"{gaps} samples were left out while this machine stood still")
 
 
 def main() -> int:

@@ -20,16 +20,16 @@ TOPICS = ("/rsea/torque_command", "/rsea/joint_states", "/rsea/ft")
 
 @pytest.fixture(scope="module")
 def bag(start, tmp_path_factory):
-    """A bag of a run in which no command was late: a machine that stalls for long makes some so.
+    """A bag of a run without late commands and gaps: a machine that stalls for long makes some.
 
     excite and plant count them themselves; what they do not count is for the tests to find.
     """
     for attempt in range(ATTEMPTS):
         path = tmp_path_factory.mktemp("loop") / f"bag{attempt}"
         excite, plant = run(start, path)
-        if not any("did not act at their stamps" in line for line in plant) and ", 0 left out" in excite[-1]:
+        if not any("WARN" in line for line in plant) and ", 0 left out" in excite[-1]:
             return path
-    raise AssertionError(f"{ATTEMPTS} runs, and in each commands were late: {plant[-1]}, {excite[-1]}")
+    raise AssertionError(f"{ATTEMPTS} runs, and in each the machine stalled: {plant[-1]}, {excite[-1]}")
 
 
 def run(start, path):
@@ -92,13 +92,13 @@ def test_replay_keeps_stamps_and_gives_identify_everything(bag, start, listener,
     )
     identify = start("identify", rig=RIG, out=tmp_path, reliable=True)
     replay = start("replay", bag=bag, rate=10.0, subscribers=2)
-    listener.until(lambda: not replay.running())
+    epoch = read_record(bag).epoch_ns
+    expected = epoch + np.rint(read_record(bag)["position"].t * 1e9).astype(np.int64)
+    listener.until(lambda: not replay.running() and len(states) >= len(expected))
     listener.forget()
     assert replay.wait() == 0, replay.output
     rows = [row for row in iterate(bag) if row[0] in TOPICS]
     stamps = [stamp_of(m.header.stamp) for m in states]
-    epoch = read_record(bag).epoch_ns
-    expected = epoch + np.rint(read_record(bag)["position"].t * 1e9).astype(np.int64)
     assert stamps == expected.tolist()
     ticks = np.array([stamp_of(m.clock) for m in clock])
     assert np.all(np.diff(ticks) > 0) and rows[0][2] <= ticks[0] and ticks[-1] <= rows[-1][2]

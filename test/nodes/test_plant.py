@@ -124,14 +124,13 @@ def test_a_command_without_a_stamp_acts_on_arrival(bench):
 
 
 def test_the_watchdog_zeroes_the_torque_when_commands_cease(bench):
-    def trial():
-        bench.rest()
-        effect = bench.command(9.0)
-        bench.listener.until(lambda: bench.states[-1].effort[0] == 9.0)
-        bench.rest()
-        return max(stamp for stamp, torque in bench.after(effect) if torque == 9.0) - effect
-
-    assert bench.punctual(trial) == pytest.approx(WATCHDOG, abs=2 * PERIOD)
+    """However late the command was: the watchdog counts in the plant's own time."""
+    bench.rest()
+    effect = bench.command(9.0)
+    bench.listener.until(lambda: bench.states[-1].effort[0] == 9.0)
+    bench.rest()
+    held = [stamp for stamp, torque in bench.after(effect) if torque == 9.0]
+    assert held[-1] - held[0] == pytest.approx(WATCHDOG, abs=2 * PERIOD)
 
 
 def test_impossible_commands_change_nothing_and_are_told(bench):
