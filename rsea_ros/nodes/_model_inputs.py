@@ -10,8 +10,11 @@ from statistics import median
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
-from msg_adapters.ros import JointState, WrenchStamped, effort_of, joint_state_of, wrench_of
+from msg_adapters.raw import RawReader
+from msg_adapters.ros import JointState, WrenchStamped
+from msg_adapters.topics import AXES, TYPES
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.nodes._bench import Polled
@@ -23,15 +26,22 @@ PERIODS = 64
 
 _STATE, _FT = range(2)
 
-Sample = tuple[int, float, float, int]
-"""Stamp (ns), position and motor torque, or the torque of a wrench and nan, and which of both it is."""
+
+def _unused(message: object) -> None:
+    """Stand for the callback that rclpy wants: messages are taken."""
 
 
 class Inputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool) -> None:
-        self._node, self._observer, self._axis = node, observer, axis
+        self._node, self._observer = node, observer
+        self._sign = -1.0 if axis.startswith("-") else 1.0
+        self._readers = {
+            "torque_command": RawReader(TYPES["torque_command"], [("effort", 0)]),
+            "joint_states": RawReader(TYPES["joint_states"], [("position", 0), ("effort", 0)]),
+            "ft": RawReader(TYPES["ft"], [("wrench", AXES.index(axis.removeprefix("-")))]),
+        }
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
         self._state_stamp = self._ft_stamp = self._told = 0
@@ -39,7 +49,9 @@ class Inputs:
         self.refused = self.unstamped = 0
         group, deep = Polled(), RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
-            node.create_subscription(kind, topic, lambda _: None, deep or usual, callback_group=group)
+            node.create_subscription(
+                kind, topic, lambda _: None, deep or usual, callback_group=group, raw=True
+            )
             for kind, topic, usual in (
                 (JointState, "torque_command", COMMAND),
                 (JointState, "joint_states", MEASUREMENT),
@@ -49,10 +61,10 @@ class Inputs:
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
         """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
-        for message in _waiting(self._commands, JointState):
-            self._command(message)
-        samples = [s for m in _waiting(self._states, JointState) if (s := self._state(m)) is not None]
-        samples += [(*wrench_of(m, self._axis), math.nan, _FT) for m in _waiting(self.ft, WrenchStamped)]
+        for stamp, (torque,) in self._new("torque_command", self._commands):
+            self._command(stamp, torque)
+        samples = [(t, q, u, _STATE) for t, (q, u) in self._new("joint_states", self._states)]
+        samples += [(t, self._sign * y, math.nan, _FT) for t, (y,) in self._new("ft", self.ft)]
         samples.sort(key=itemgetter(0, 3))
         for stamp, a, b, kind in samples:
             estimate = self._measured(stamp, a, b, kind)
@@ -95,20 +107,7 @@ class Inputs:
             self._periods.append((stamp - self._told) / SECOND)
         self._told = stamp
 
-    def _state(self, message: JointState) -> Sample | None:
-        try:
-            stamp, position, _velocity, torque = joint_state_of(message)
-        except ParameterError as error:
-            self._refuse("joint_states", error)
-            return None
-        return stamp, position, torque, _STATE
-
-    def _command(self, message: JointState) -> None:
-        try:
-            stamp, torque = effort_of(message)
-        except ParameterError as error:
-            self._refuse("torque_command", error)
-            return
+    def _command(self, stamp: int, torque: float) -> None:
         newest = max(self._state_stamp, self._ft_stamp)
         if stamp == 0 or (newest and abs(stamp - newest) > HORIZON):
             self.unstamped += 1
@@ -118,14 +117,13 @@ class Inputs:
         elif stamp:
             self._observer.command(self.seconds(stamp), torque)
 
-    def _refuse(self, topic: str, error: ParameterError) -> None:
-        self.refused += 1
-        self._node.get_logger().error(f"{topic}: {error}", throttle_duration_sec=1.0)
-
-
-def _waiting(subscription: Any, kind: Any) -> Iterator[Any]:
-    """Yield the messages that wait in a subscription."""
-    handle = subscription.handle
-    with handle:
-        while (message := handle.take_message(kind, False)) is not None:
-            yield message[0]
+    def _new(self, topic: str, subscription: Subscription[Any]) -> Iterator[tuple[int, list[float]]]:
+        """Yield stamp and numbers of the messages that wait in a subscription."""
+        reader, handle, kind = self._readers[topic], subscription.handle, subscription.msg_type
+        with handle:
+            while (message := handle.take_message(kind, True)) is not None:
+                try:
+                    yield reader.read(message[0])
+                except ParameterError as error:
+                    self.refused += 1
+                    self._node.get_logger().error(f"{topic}: {error}", throttle_duration_sec=1.0)

@@ -7,9 +7,11 @@ import threading
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.serialization import serialize_message
 
+from msg_adapters.raw import RawWriter
 from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
-from msg_adapters.topics import AXES
+from msg_adapters.topics import AXES, TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
 from rsea_ros.model.rig_file import load_rig
@@ -63,6 +65,8 @@ class Model:
         names = ("tolerance_db", "tolerance_deg", "hysteresis", "window", "hold_on", "hold_off", "quiet")
         self._flag = PureTorque(rig, Settings(limit=values["share"], **{n: values[n] for n in names}))
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
+        template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
+        self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._pure = node.create_publisher(Bool, "pure_torque", LATCHED)
         self._pure.publish(bool_message(False))
         self._inputs = Inputs(node, observer, values["ft_timeout"], values["axis"], values["reliable"])
@@ -77,7 +81,7 @@ class Model:
         """Publish an estimate for each sample that came, and the flag when it changes."""
         with self._lock:
             for stamp, estimate in self._inputs.take():
-                self._estimates.publish(efforts_message(stamp, dict(zip(NAMES, estimate, strict=False))))
+                self._estimates.publish(self._writer.write(stamp, estimate))
                 was = self._flag.verdict == "pure"
                 now = self._flag.take(self._inputs.seconds(stamp), estimate) == "pure"
                 if now != was:
