@@ -36,6 +36,9 @@ WATCH = 0.005
 """s between two looks at the age of the last measurement."""
 
 CLOSING_ZEROS = 3
+LATEST = 1.0
+"""Samples by which a command may come late and still be feedback: what the least delay margin is made for."""
+
 WAITING = 500
 """Measurements that wait for their other half."""
 
@@ -52,7 +55,7 @@ class Controller:
         self._states: deque[tuple[int, float, float, float]] = deque(maxlen=WAITING)
         self._fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self._last, self._heard, self._fault, self._torque, self._fall = 0, 0, "", 0.0, 0.0
-        self._steps = self._missed = self._unusable = self._limited = 0
+        self._steps = self._missed = self._unusable = self._limited = self._late = self._told = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
         subscribe = node.create_subscription
@@ -102,11 +105,13 @@ class Controller:
         self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
         if not self._last:
             self._controller.start(reading, self._desired.torque)
-        self._torque = self._controller.step(reading, self._desired.torque, missed)
+        late = time.time_ns() - stamp > (1.0 + LATEST) * self._period
+        self._torque = self._controller.step(reading, self._desired.torque, missed, late=late)
         self._commands.publish(torque_command_message(stamp + round(self._period), self._torque))
         self._last, self._heard = stamp, time.monotonic_ns()
         self._steps, self._missed = self._steps + 1, self._missed + missed
         self._limited += self._controller.share.limited
+        self._late += late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
 
     def _poll(self) -> None:
@@ -167,6 +172,7 @@ class Controller:
             "missed_measurements": self._missed,
             "unusable_measurements": self._unusable,
             "limited_commands": self._limited,
+            "late_commands": self._late,
             "crossover_hz": f"{self._design.margins['locked'].crossover:.2f}",
             "phase_margin_deg": f"{worst.phase:.1f}",
             "gain_margin_db": f"{worst.gain:.1f}",
@@ -176,8 +182,12 @@ class Controller:
         }
         if self._fault:
             return Report(ERROR, self._fault, values)
-        waiting = "waiting for joint_states and ft"
-        return Report(OK if self._last else WARN, "running" if self._last else waiting, values)
+        if not self._last:
+            return Report(WARN, "waiting for joint_states and ft", values)
+        new, self._told = self._late - self._told, self._late
+        if new:
+            return Report(WARN, f"{new} commands more than a sample late, without feedback", values)
+        return Report(OK, "running", values)
 
 
 def _waiting(subscription: Subscription[Any], kind: Any) -> Iterator[tuple[Any, int]]:

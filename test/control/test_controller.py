@@ -139,5 +139,17 @@ def test_lost_and_late_samples_do_no_harm(known):
     assert np.std(disturbed[-100:]) == pytest.approx(np.std(quiet), rel=0.2)
 
 
+def test_commands_that_come_far_too_late_are_feed_forward_and_swing_nothing_up():
+    """Six samples late at 1 kHz: feedback would diverge, feed-forward is late by 6 ms at 5 Hz, 19 %."""
+    plant, controller = Plant(RIG, 1000.0), TorqueController(RIG, 1000.0, Gains(19.27, 0.01578, 313.6))
+    acting, errors, sample = [0.0] * 8, [], plant.step(0.0)
+    for k in range(2000):
+        wanted = 10.0 * math.sin(2.0 * math.pi * 5.0 * k / 1000.0)
+        errors.append(sample.ft - wanted)
+        acting.append(controller.step(_reading(sample), wanted, late=True))
+        sample = plant.step(acting.pop(0))
+    assert np.sqrt(2.0) * np.std(errors[1000:]) / 10.0 < 0.3
+
+
 def _reading(sample):
     return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque)
