@@ -19,6 +19,8 @@ from numba import njit
 from rsea_ros.signals import FloatArray
 
 DAMPING = math.sqrt(2.0)
+SEEN = 0.45
+"""Corner that the filter can have at most, in sample rates."""
 LENGTH = 256
 """Samples in the longest window."""
 
@@ -47,7 +49,7 @@ def powers(pair, corner, window, t, torque):  # type: ignore[no-untyped-def]
     memory, squares = pair
     dt = t - memory[2]
     memory[2] = t
-    if not 0.0 < dt * corner < 0.45:
+    if not 0.0 < dt * corner < SEEN:
         memory[0], memory[1], memory[4] = 0.0, torque, 0.0
         return 0.0, torque * torque
     g = math.tan(math.pi * corner * dt)
@@ -67,39 +69,50 @@ def powers(pair, corner, window, t, torque):  # type: ignore[no-untyped-def]
     return above / count, below / count
 
 
-def split(a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, corner: float, dt: float) -> FloatArray:
-    """Return the variances of high and low for the stationary signal c e, e = a e + b v, v of variances r.
+NOTHING, PURE, BEYOND = range(3)
+CORNER, WINDOW, NOISE_HIGH, NOISE_LOW, SIGMA, SURPRISE, FAINT = range(7)
+QUIET, ON, OFF, VALUES, HOLD_ON, HOLD_OFF = range(7, 13)
+"""In `limits`. Corner: Hz. Noise: N^2 m^2, while the sigma of the torque is so, N m. Surprise, faint: times
+the noise that are a torque, one that begins and one that goes on. On, off: ratios of powers. Times: s."""
+VERDICT, HEARD, SINCE, LAST, HIGH, LOW, MEMORY = range(7)
+"""In `memory`: verdict, when torque was heard last, since when the powers agree with the verdict, powers."""
 
-    a: shape (n, n), b: (n, m), c: (n,), r: (m,). corner: Hz. dt: s.
-    """
-    g, n = math.tan(math.pi * corner * dt), len(a)
-    to_high = np.array([-(DAMPING + g), -1.0, 1.0]) / (1.0 + g * (DAMPING + g))  # of s_1, s_2, input
-    to_band = g * to_high + np.array([1.0, 0.0, 0.0])
-    to_low = g * to_band + np.array([0.0, 1.0, 0.0])
-    steps = np.array([g * to_high + to_band, g * to_band + to_low])
-    whole, drive = np.zeros((n + 2, n + 2)), np.zeros((n + 2, b.shape[1]))
-    whole[:n, :n], drive[:n] = a, b
-    whole[n:, :n], whole[n:, n:], drive[n:] = (
-        np.outer(steps[:, 2], c @ a),
-        steps[:, :2],
-        np.outer(steps[:, 2], c @ b),
-    )
-    p = _stationary(whole, drive @ np.diag(r) @ drive.T)
-    return np.array([_variance(row, a, b, c, r, p) for row in (to_high, to_low)])
+DECIDED = 3.0
+"""Sigmas by which the powers must tell on which side of the edge the torque is."""
 
 
-def _stationary(a: FloatArray, q: FloatArray) -> FloatArray:
-    """Return sum_k a^k q a'^k over the first 2^16 samples, by doubling: also where a has not settled yet."""
-    for _ in range(16):
-        q = q + a @ q @ a.T
-        a = a @ a
-    return q
+@njit(cache=True, nogil=True, error_model="numpy")
+def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-def]
+    """Take in a torque (N m) and its sigma at a later t (s), and bring the verdict in memory up to date."""
+    if t <= memory[LAST]:
+        return
+    memory[LAST] = t
+    high, low = powers(pair, limits[CORNER], limits[WINDOW], t, torque)
+    memory[HIGH], memory[LOW] = high, low
+    excess = max(1.0, (sigma / limits[SIGMA]) ** 2)
+    noise_high, noise_low = excess * limits[NOISE_HIGH], excess * limits[NOISE_LOW]
+    times = limits[SURPRISE] if memory[VERDICT] == NOTHING else limits[FAINT]
+    if high > times * noise_high or low > times * noise_low:
+        memory[HEARD] = t
+    elif t - memory[HEARD] > limits[QUIET]:
+        memory[VERDICT], memory[SINCE] = NOTHING, t
+        return
+    wanted = _wanted(limits, memory[VERDICT], high - noise_high, low - noise_low, noise_high, noise_low)
+    hold = limits[HOLD_ON] if wanted == PURE else limits[HOLD_OFF]
+    if wanted == memory[VERDICT]:
+        memory[SINCE] = t
+    elif t - memory[SINCE] >= hold:
+        memory[VERDICT], memory[SINCE] = wanted, t
 
 
-def _variance(
-    row: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, r: FloatArray, p: FloatArray
-) -> float:
-    """Return the variance of row . (s_1, s_2, c e) from that of the states before the sample."""
-    before = np.concatenate([row[2] * (c @ a), row[:2]])
-    now = row[2] * (c @ b)
-    return float(before @ p @ before + now @ (r * now))
+@njit(cache=True, nogil=True, error_model="numpy")
+def _wanted(limits, verdict, high, low, noise_high, noise_low):  # type: ignore[no-untyped-def]
+    """Return what the powers without their noise say, or the verdict as it is when that is too little."""
+    spread_high = 2.0 * noise_high**2 + 4.0 * noise_high * max(high, 0.0) / limits[VALUES]
+    spread_low = 2.0 * noise_low**2 + 4.0 * noise_low * max(low, 0.0) / limits[VALUES]
+    off, on = limits[OFF], limits[ON]
+    if high - off * low > DECIDED * math.sqrt(spread_high + off * off * spread_low):
+        return BEYOND
+    if on * low - high > DECIDED * math.sqrt(spread_high + on * on * spread_low):
+        return PURE
+    return int(verdict)

@@ -12,7 +12,8 @@ import pytest
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
-from rsea_ros.model.pure_torque_filter import empty_pair, powers, split
+from rsea_ros.model.pure_torque_filter import empty_pair, powers
+from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
