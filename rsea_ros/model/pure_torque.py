@@ -15,9 +15,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.stats import chi2
 
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_to_end, flat_band
 from rsea_ros.model.observer import ErrorModel, Estimate
+from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_filter import (
     CORNER,
     HEARD,
@@ -86,8 +87,13 @@ class PureTorque:
     """The flag of one rig, fed with the observer's estimates at increasing stamps (s)."""
 
     def __init__(self, rig: Rig, settings: Settings | None = None) -> None:
+        """Raises RigError for a rig without a spring: there is one torque, not two."""
+        if rig.rigid_spring:
+            raise RigError(
+                f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
+            )
         s = settings or Settings()
-        self._function = end_to_end(rig)
+        self._function = end_to_end(structured(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
         odds = (1.0 - s.limit) / s.limit
         corner = self.edge * odds**0.25

@@ -9,12 +9,13 @@ import math
 import numpy as np
 import pytest
 
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
 from rsea_ros.model.pure_torque_filter import empty_pair, powers
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
 
@@ -159,6 +160,18 @@ def test_the_noise_of_white_samples_is_split_as_the_butterworth_pair_does():
     g = math.tan(math.pi * corner * dt)
     assert low == pytest.approx((g**4 + (g - g**3) / math.sqrt(2.0)) / (1.0 + g**4), rel=1e-9)
     assert high + low == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_band_is_that_of_the_extended_model():
+    rig = load_rig("paper_high_impedance")
+    soft = rig.with_effects(EffectSetting("gear_compliance", {"stiffness": 4000.0}))
+    changed = rig.with_values({"gear.stiffness": 4000.0})
+    assert PureTorque(soft).edge == PureTorque(changed).edge != PureTorque(rig).edge
+
+
+def test_a_rig_without_a_spring_is_refused():
+    with pytest.raises(RigError, match=r"rig bare_drive: spring\.rigid = True, expected a spring"):
+        PureTorque(load_rig("bare_drive"))
 
 
 def test_a_limit_that_is_no_share_is_refused():
