@@ -9,8 +9,9 @@ over them:
 e is what the model's torque differs from the desired one at the start: after a limit it comes back within a
 few `fade`, not at once, which would take the limit again and again. One sample is the exact inverse, which
 needs the bench's sampled zeros inside the unit circle and away from -1, where u would jump up and down.
-`moves` is the least number for which the inverse is damped. Since u follows from where the model *is*, the
-model may be told another torque than u (a limit), and there is nothing to wind up.
+`moves` is the least number for which the inverse does not, or at least is stable. Since u follows from
+where the model *is*, the model may be told another torque than u (a limit), and there is nothing to wind
+up.
 """
 
 from __future__ import annotations
@@ -58,11 +59,11 @@ class Inverse:
 
 def inverse(plant: Sampled) -> Inverse:
     """Return the inverse of a bench. Raises ParameterError where none of them is stable."""
-    for moves in range(1, MOST_MOVES + 1):
-        candidate = _inverse(plant, moves)
-        poles = inverse_poles(candidate)
-        if np.abs(poles).max() < 1.0 + FREE and poles.real.min() > JUMPY:
-            return candidate
+    candidates = [_inverse(plant, moves) for moves in range(1, MOST_MOVES + 1)]
+    stable = [c for c in candidates if np.abs(inverse_poles(c)).max() < 1.0 + FREE]
+    smooth = [c for c in stable if inverse_poles(c).real.min() > JUMPY]
+    if stable:
+        return (smooth or stable)[0]
     raise ParameterError(
         f"feed-forward: no inverse over 1 to {MOST_MOVES} samples of {1e3 * plant.period:g} ms is stable, "
         "expected a bench whose torque follows the motor"
