@@ -9,9 +9,15 @@ import numpy as np
 from rsea_ros.diagnosis.fitting import AT_FLOOR, Model
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.split import Score
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
 
+_NEAR = 1e-6
+_FAR = 5.0
+"""RMS of the residual over the noise, in the worst channel, above which a model is far from the floor."""
+_ROOM = 0.1
+"""How much larger the residual of a simpler model may be there, for each parameter that it saves."""
 ENOUGH = 0.1
 """Relative fall of a channel's residual that makes an effect a cause where the floor is not reached."""
 
@@ -27,16 +33,45 @@ def is_progress(model: Model, present: Model) -> bool:
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
-    Of all that are not surely and materially worse than the best, the simplest; of equals, the one that
-    needs the least of what is known beforehand.
+    Of all that are not surely and materially worse than the best, one that does not end at a bound of its
+    effect, the simplest; of equals, the one that needs the least of what is known beforehand.
     """
     if not models:
         return None, ()
     best = min(models, key=lambda m: float(m.choose.loss(present).sum()))
-    contenders = [m for m in models if m is best or not compare(best.choose, m.choose).better]
-    simplest = min(contenders, key=lambda m: (m.parameters, prior_cost(m.solution) + loss_excess(m, best)))
-    rivals = tuple(m for m in contenders if m is not simplest and m.parameters <= simplest.parameters)
+    contenders = [
+        m for m in models if m is best or not compare(best.choose, m.choose).better or is_near(m, best)
+    ]
+
+    def order(m: Model) -> tuple[bool, int, float]:
+        return at_bound(m.solution), m.size, prior_cost(m.solution) + loss_excess(m, best)
+
+    simplest = min(contenders, key=order)
+    rivals = tuple(
+        m
+        for m in contenders
+        if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
+    )
     return simplest, rivals
+
+
+def is_near(model: Model, best: Model) -> bool:
+    """Tell whether a simpler model does nearly as well as the best, which is far from the floor.
+
+    There what is left is no noise, and more parameters always bend a model a little nearer to it.
+    """
+    if max(best.choose.ratio(n) for n in best.choose.sums) < _FAR:
+        return False
+    room = 1.0 + _ROOM * (best.size - model.size)
+    return float(model.choose.loss(best.choose).sum()) < room**2 * float(best.choose.loss(best.choose).sum())
+
+
+def at_bound(solution: Solution) -> bool:
+    """Tell whether the newest effect's main parameter has run to its bound: then it is no such effect."""
+    effect = effect_named(solution.problem.rig.effects[-1].name)
+    value = solution.values[f"{effect.name}.{effect.main.name}"]
+    span = effect.main.high - effect.main.low
+    return not effect.main.low + _NEAR * span < value < effect.main.high - _NEAR * span
 
 
 def prior_cost(solution: Solution) -> float:

@@ -38,7 +38,7 @@ def diagnose(
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
         found = search(cases, nominal, pool, tell)
         tell("looking for a simpler model", 0.9)
-        found = pruned(found)
+        found = pruned(found, pool)
         tell("judging", 0.95)
         stages = list(pool.map(lambda m: judged(found, m, judging, rig), found.models))
     return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig)

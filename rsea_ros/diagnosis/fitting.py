@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
@@ -34,9 +35,19 @@ class Model:
         return tuple(e.name for e in self.solution.problem.rig.effects)
 
     @property
+    def size(self) -> int:
+        """How many numbers describe the effects, optional ones not counted."""
+        return sum(effect_size(name) for name in self.causes)
+
+    @property
     def parameters(self) -> int:
         """How many unknowns the model has."""
         return len(self.solution.theta)
+
+
+def effect_size(name: str) -> int:
+    """Return how many numbers describe an effect, optional ones not counted."""
+    return sum(not p.optional for p in effect_named(name).parameters)
 
 
 def fitted(

@@ -18,7 +18,11 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 _PEAKS = 2
+_GAPS = (0.1, 0.3, 0.6)
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
+_FEWEST_PERIODS = 1.5
+"""As often a ripple must have repeated over the rotor's travel to be one."""
+_MOST_WAVES = 1e7
 _CYCLES = np.arange(0.5, 60.0, 0.125)
 
 
@@ -32,7 +36,10 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         starts += [{**effect.typical, p.name: value} for value in alternatives]
     names = {p.name: p.unit for p in effect.parameters}
     if "cycles_per_revolution" in names:
-        return [{**effect.typical, **hint} for hint in _cycle_hints(case, rig)] or starts
+        return [{**effect.typical, **hint} for hint in _cycle_hints(case, rig)]
+    if "gap" in names and "position" in case.measured:
+        travel = float(np.ptp(case.measured["position"]))
+        return starts + [{**effect.typical, "gap": share * travel} for share in _GAPS]
     if "limit" in names:
         return [{**effect.typical, "limit": limit} for limit in _limit_hints(case)] or starts
     if {"stiffness", "inertia"} <= set(names):
@@ -129,15 +136,15 @@ def _cycle_hints(case: Case, rig: Rig) -> list[dict[str, float]]:
     if found is None:
         return []
     angle, torque = found[0] * rig["gear.ratio"], found[1] - np.mean(found[1])
-    phase = np.exp(1j * angle[:, None] * _CYCLES[None, :]) if len(angle) * len(_CYCLES) < 4e7 else None
-    if phase is None:
-        every = math.ceil(len(angle) * len(_CYCLES) / 4e7)
-        angle, torque = angle[::every], torque[::every]
-        phase = np.exp(1j * angle[:, None] * _CYCLES[None, :])
-    power = np.abs(torque @ phase) ** 2
+    every = math.ceil(len(angle) * len(_CYCLES) / _MOST_WAVES)
+    angle, torque = angle[::every], torque[::every]
+    cycles = _CYCLES[_CYCLES * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS]
+    if not len(cycles):
+        return []
+    power = np.abs(torque @ np.exp(1j * angle[:, None] * cycles[None, :])) ** 2
     hints = []
     for k in _peaks(power, width=6):
-        c = _refined(_CYCLES, power, k)
+        c = _refined(cycles, power, k)
         hints.append({"cycles_per_revolution": c, **_sine_at(angle, torque, c, True)})
     return hints
 

@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, linearised, solve
+from rsea_ros.identification.solver import Solution, solve
 from rsea_ros.identification.unknowns import CLOCK
 from rsea_ros.signals import FloatArray
 
@@ -32,8 +32,7 @@ _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
-_WORTH = 0.4
-"""Of what the best takes off the cost on pieces: what takes less off is not fitted to everything."""
+_PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 
@@ -69,11 +68,12 @@ class Round:
 
     @cached_property
     def on_pieces(self) -> Solution:
-        """The present model on short pieces, with clocks taken as right."""
+        """The present model fitted to short pieces, with clocks taken as right."""
         runs = zip(self.cases, self.present.outputs, strict=True)
         pieces = tuple(heavier(w, self.present.choose) for c, out in runs for w in windows_of(c, out))
         solution = self.present.solution
-        return linearised(*without_clocks(replace(solution.problem, cases=pieces), solution.theta))
+        problem, theta = without_clocks(replace(solution.problem, cases=pieces), solution.theta)
+        return solve(problem, theta, iterations=_PRESENT_ITERATIONS)
 
     def _screened(self) -> list[Hypothesis]:
         """Return what two cheap steps of every effect reach, best first."""
@@ -97,15 +97,13 @@ class Round:
         if not close:
             return []
         best, rivals = close[0].cost, close[0].effect.claims.confusable_with
-        worst = self.on_pieces.cost - _WORTH * (self.on_pieces.cost - best)
-        near = [h for h in close[:_FULL_FITS] if h.cost <= worst]
-        near += [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
+        near = close[:_FULL_FITS] + [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
         heard = {h.name for h in near}
         fitted_on_pieces = {h.name for h in close}
         unheard = [h for h in (*close, *screened) if h.name in rivals and h.name not in heard]
         once = {h.name: h for h in reversed(unheard)}.values()
         late = [h if h.name in fitted_on_pieces else self._fit_pieces(h) for h in once]
-        return [*near, *(h for h in late if h.cost <= worst)]
+        return [*near, *late]
 
     def _fit_pieces(self, h: Hypothesis) -> Hypothesis:
         self._say(f"fitting {h.name}", 0.5)

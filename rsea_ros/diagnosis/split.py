@@ -1,6 +1,8 @@
 """Which samples fit, which choose, which judge: blocks of time that no two of these share.
 
-The pattern of four blocks is fit, fit, choose, judge. With a held-out bag all of that judges instead.
+Of four blocks two next to each other fit, one chooses, one judges, in an order drawn anew for every four:
+with one order for all, an excitation that repeats after four blocks would show each set the same part of it.
+With a held-out bag all of that judges instead.
 """
 
 from __future__ import annotations
@@ -8,23 +10,49 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.identification.problem import BoolArray, Case, Problem
 from rsea_ros.signals import FloatArray
 
-BLOCK = 1.0
-"""s. Longer than any transient of the bench, short enough that every part of a sweep is in every set."""
+IntArray = npt.NDArray[np.int64]
+
+_LONGEST, _SHORTEST = 1.0, 0.25
+"""s. Longer than the bench remembers, short enough that every part of a sweep is in every set."""
+_ENOUGH = 120
 FIT, CHOOSE, JUDGE = (0, 1), (2,), (3,)
+_ORDERS = np.array(
+    [[0, 1, 2, 3], [0, 1, 3, 2], [2, 0, 1, 3], [3, 0, 1, 2], [2, 3, 0, 1], [3, 2, 0, 1]], dtype=np.int64
+)
+_PATTERN = _ORDERS[np.random.default_rng(4).integers(0, len(_ORDERS), 997)]
+"""Set of each block, four in a row; repeats after more than an hour."""
 
 
-def blocks_of(case: Case, channel: str) -> FloatArray:
+def block_length(case: Case) -> float:
+    """Return how long a block is, s: where a record has fewer than enough of the longest, shorter."""
+    return min(max(case.duration / _ENOUGH, _SHORTEST), _LONGEST)
+
+
+def set_of(block: IntArray) -> IntArray:
+    """Return to which set blocks belong: one of FIT, CHOOSE, JUDGE."""
+    return np.asarray(_PATTERN[(block // 4) % len(_PATTERN), block % 4])
+
+
+def fit_starts(case: Case) -> FloatArray:
+    """Return where the pairs of FIT blocks begin, s since the case's start."""
+    groups = int(case.duration / block_length(case)) // 4
+    firsts = np.argmin(_PATTERN[np.arange(groups) % len(_PATTERN)], axis=1)
+    return np.asarray((4 * np.arange(groups) + firsts) * block_length(case))
+
+
+def blocks_of(case: Case, channel: str) -> IntArray:
     """Return the number of the block of each sample of a channel."""
-    return np.maximum(np.floor((case.t[channel] - case.start) / BLOCK), 0).astype(np.int64)
+    return np.maximum(np.floor((case.t[channel] - case.start) / block_length(case)), 0).astype(np.int64)
 
 
-def part(case: Case, places: tuple[int, ...], period: int = 4) -> Case:
-    """Return the case with only the samples of some places of the pattern."""
-    mask: dict[str, BoolArray] = {n: np.isin(blocks_of(case, n) % period, places) for n in case.t}
+def part(case: Case, sets: tuple[int, ...]) -> Case:
+    """Return the case with only the samples of some sets."""
+    mask: dict[str, BoolArray] = {n: np.isin(set_of(blocks_of(case, n)), sets) for n in case.t}
     return case.within(mask)
 
 
@@ -57,7 +85,7 @@ def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, Flo
     sums: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
     counts: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
     for case, out in zip(cases, outputs, strict=True):
-        length = int(case.duration / BLOCK) + 2
+        length = int(case.duration / block_length(case)) + 2
         for n in problem.channels:
             if n not in case.t or n not in out:
                 sums[n].append(np.zeros(length))

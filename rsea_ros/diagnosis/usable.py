@@ -7,8 +7,8 @@ import numpy as np
 from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Channel, Record
 
-SHORTEST = 8.0
-"""s of commands: two of every kind of block (see split.py), so that a gain has an interval."""
+SHORTEST = 4.0
+"""s of commands: four blocks of every set (see split.py) of a quarter of a second each."""
 
 
 def check_diagnosable(record: Record) -> None:

@@ -13,6 +13,8 @@ FLOOR = 1.1
 """RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""
 MISFIT = 1.5
 """RMS of the residual over the noise above which a channel misfits."""
+MUCH = 3.0
+"""RMS of the residual over the noise above which a channel misfits much."""
 HALF = 0.6
 """What may be left of a misfitting channel's residual for causes to be named without reaching the floor."""
 
@@ -36,8 +38,12 @@ def is_trusted(found: Search, first: Score, last: Score) -> bool:
     """Tell whether causes may be named although the floor is not reached.
 
     What is not in the catalogue often looks a little like something that is. A cause is named only if it
-    takes away half of the residual in every channel that misfits, and nothing else does as well as the first.
+    takes away half of the residual in every channel that misfits, or all of one that misfits much
+    without adding to another, and nothing else does as well as the first.
     """
-    falls = [last.ratio(n) / first.ratio(n) for n in first.sums if first.ratio(n) > MISFIT]
-    first_cause = found.last.causes[0]
-    return bool(falls) and max(falls) < HALF and not found.rivals.get(first_cause, ())
+    if found.rivals.get(found.last.causes[0], ()):
+        return False
+    misfitting = [n for n in first.sums if first.ratio(n) > MISFIT]
+    falls = [last.ratio(n) / first.ratio(n) for n in misfitting]
+    explained = [n for n in misfitting if first.ratio(n) > MUCH and last.ratio(n) < MISFIT]
+    return bool(falls) and (max(falls) < HALF or (bool(explained) and max(falls) <= 1.0))

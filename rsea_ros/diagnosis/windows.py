@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import BLOCK, FIT, part
+from rsea_ros.diagnosis.split import FIT, block_length, fit_starts, part
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
@@ -28,23 +28,24 @@ def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...
     drive = case.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
         return (fit,)
-    starts = np.arange(4.0 * BLOCK, drive.duration - 2.0 * BLOCK, 4.0 * BLOCK)
-    half = round(0.5 * _ENOUGH / (2.0 * BLOCK))
+    length = 2.0 * block_length(case)
+    starts = fit_starts(case)[1:]
+    half = round(0.5 * _ENOUGH / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
-    misfit = np.array([_misfit(fit, outputs, float(t)) for t in starts])
+    misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + 2.0 * BLOCK) for t in chosen)
+    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + length) for t in chosen)
 
 
-def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float) -> float:
-    """Return the power of a residual in two blocks, each channel over its power in all, summed."""
+def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
+    """Return the power of a residual in a piece, each channel over its power in all, summed."""
     total = 0.0
     for n in case.measured.keys() & outputs.keys():
         power = np.where(case.mask[n], (case.measured[n] - outputs[n]) ** 2, 0.0)
         t = case.t[n] - case.start
-        inside = (t >= begin) & (t < begin + 2.0 * BLOCK)
+        inside = (t >= begin) & (t < begin + length)
         total += float(power[inside].sum() / max(power.sum(), 1e-300))
     return total
 

@@ -154,19 +154,6 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     return Solution(problem, theta, residual, matrix, cost)
 
 
-def linearised(problem: Problem, theta: FloatArray) -> Solution:
-    """Return where a problem stands at theta, without a step."""
-    residual = problem.residual(theta)
-    prior = sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in zip(theta, problem.unknowns, strict=True))
-    return Solution(
-        problem,
-        theta,
-        residual,
-        jacobian(problem, theta, residual),
-        float(residual @ residual + prior),
-    )
-
-
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:
     """Return theta - normal^-1 slope inside the bounds.
 

@@ -134,7 +134,7 @@ def still(record):
     ("spoil", "line"),
     [
         (without_command, "no command, expected the torques that drove the run beside position, velocity"),
-        (lambda r: r.between(0.0, 5.0), "5 s of commands, expected 8 s or more"),
+        (lambda r: r.between(0.0, 3.0), "3 s of commands, expected 4 s or more"),
         (
             lambda r: Record({"command": r["command"]}, "", r.epoch_ns),
             "every measured channel holds one value",
