@@ -262,18 +262,25 @@ def test_simulations_that_make_no_sense(tmp_path, arguments, words):
     assert list(tmp_path.iterdir()) == []
 
 
+LONG = ("simulate", "paper_high_impedance", "--duration", "600", "--out")
+
+
+@pytest.fixture(scope="module")
+def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a bag that keeps a verb busy for seconds."""
+    bag = tmp_path_factory.mktemp("long") / "bag"
+    assert rsea(*LONG, bag).returncode == 0
+    return bag
+
+
 @pytest.mark.parametrize("verb", ["identify", "simulate", "predict"])
-def test_ctrl_c(verb, tmp_path):
+def test_ctrl_c(verb, long_bag, tmp_path):
     """Interrupted while it works: one line, status 130, nothing under the final name."""
-    bag, out = tmp_path / "bag", tmp_path / "results"
-    rig = "paper_high_impedance"
-    long = ["simulate", rig, "--duration", "600", "--out"]
-    if verb != "simulate":
-        assert rsea(*long, bag).returncode == 0
+    out = tmp_path / "results"
     arguments = {
-        "simulate": [*long, out],
-        "identify": ["identify", bag, "--out", out],
-        "predict": ["predict", rig, bag, "--out", out],
+        "simulate": [*LONG, out],
+        "identify": ["identify", long_bag, "--out", out],
+        "predict": ["predict", "paper_high_impedance", long_bag, "--out", out],
     }[verb]
     process = subprocess.Popen(
         [sys.executable, "-m", "rsea_ros", *map(str, arguments)],

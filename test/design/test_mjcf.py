@@ -56,7 +56,7 @@ def characteristic(mass, damping, stiffness):
     return np.array([np.linalg.det(mass * s**2 + damping * s + stiffness) for s in S]) / np.linalg.det(mass)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(rigs(gravity=True))
 def test_the_xml_holds_the_rigs_equations_of_motion(rig):
     assume(not rig.rigid_spring)

@@ -29,9 +29,9 @@ def standard_errors(result: Identification, true: dict[str, float]) -> dict[str,
     ("name", "kind", "duration"),
     [
         ("paper_high_impedance", "white_noise", 10.0),
-        ("paper_high_impedance", "chirp", 20.0),
-        ("paper_moving_output", "white_noise", 20.0),
-        ("prototype_knee", "white_noise", 20.0),
+        ("paper_high_impedance", "chirp", 10.0),
+        ("paper_moving_output", "white_noise", 10.0),
+        ("prototype_knee", "white_noise", 10.0),
         ("bare_drive", "chirp", 20.0),
     ],
 )

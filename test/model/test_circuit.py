@@ -34,7 +34,7 @@ def worst(rig) -> float:
     return float(max(errors))
 
 
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(rigs(gravity=True))
 def test_nodal_analysis_is_the_equations_of_motion(rig):
     assert worst(rig) < 1e-9

@@ -16,7 +16,7 @@ from rsea_ros.model.equations import mechanics, train_ratio
 from rsea_ros.model.rig_file import load_rig
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(rigs(gravity=True))
 def test_matrices_are_those_of_the_energies(rig):
     m = mechanics(rig)
@@ -30,7 +30,7 @@ def test_matrices_are_those_of_the_energies(rig):
         np.testing.assert_allclose(ours, expected, atol=1e-9 * (np.abs(expected).max() + 1e-9))
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(rigs(gravity=True))
 def test_coordinates_are_what_can_move(rig):
     expected = slow.coordinates(rig)

@@ -34,7 +34,7 @@ def agree(a, b, tolerance=1e-7):
     np.testing.assert_allclose(a, b, rtol=0, atol=tolerance * max(np.abs(b).max(), 1e-12))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(rigs(gravity=True))
 def test_polynomials_and_state_space_are_the_equations_of_motion(rig):
     for output in read_outputs(rig).values():
@@ -44,7 +44,7 @@ def test_polynomials_and_state_space_are_the_equations_of_motion(rig):
             agree(transfer.state_space(rig, output, port)(S), expected)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(rigs(gravity=True))
 def test_response_is_that_of_the_energies(rig):
     a, b, c = slow.state_matrices(rig)
@@ -54,7 +54,7 @@ def test_response_is_that_of_the_energies(rig):
         agree(frequency_response(rig, outputs.end_torque(rig, rig.ft_end), HZ), c[2] @ states)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(rigs(gravity=True))
 def test_a_free_end_moves_by_the_torque_on_it(rig):
     """Newton on the end alone: the torque that it has to hold is what turns it."""
