@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.compare import misfits, spectrum
 from rsea_ros.diagnosis.experiment import amplitude_series, separating
 from rsea_ros.diagnosis.faults import Checked
 from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.sentences import evidence_of, verdict_sentence
+from rsea_ros.diagnosis.sentences import coherence_lost, evidence_of, verdict_sentence
 from rsea_ros.diagnosis.split import JUDGE, Score, part, score
 from rsea_ros.diagnosis.stages import Stage
 from rsea_ros.diagnosis.trial import Trial
@@ -81,7 +82,10 @@ def conclusion(
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
-        statements=what_is_not_told(first.solution.problem.unknowns, confidence),
+        statements=(
+            *what_is_not_told(first.solution.problem.unknowns, confidence),
+            *coherence_lost(lost_above(case, channel), channel),
+        ),
     )
 
 

@@ -133,6 +133,6 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
 
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
-    """Tell whether the residual of every channel is at its noise, on all blocks but those that judge."""
+    """Tell whether the residual of every channel is noise, on all blocks but those that judge."""
     standing = score(model.solution.problem, tuple(part(c, (*FIT, *CHOOSE)) for c in cases), model.outputs)
-    return all(standing.ratio(n) < AT_FLOOR for n in standing.sums)
+    return standing.missed == 0.0 and all(standing.ratio(n) < AT_FLOOR for n in standing.sums)

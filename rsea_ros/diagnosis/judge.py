@@ -2,7 +2,8 @@
 
 Two conditions, both needed. It must be sure: the block bootstrap of the difference of the losses leaves no
 doubt at 95 %, each parameter paid for by the loss that a useless one would gain (Akaike, IEEE TAC 19, 1974).
-And it must matter: the residual of some channel falls by more than a few percent.
+And it must matter: the residual of some channel falls by more than a few percent, or a response that noise
+hides is no longer missed.
 """
 
 from __future__ import annotations
@@ -38,7 +39,10 @@ def compare(model: Score, other: Score, extra_parameters: int = 0) -> Standing:
     price = 2.0 * extra_parameters / len(difference)
     means = bootstrap_means(difference - price)
     falls = [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
-    return Standing(sure=bool(np.quantile(means, 0.025) > 0.0), matters=max(falls, default=0.0) > MATTERS)
+    sees_more = model.missed < 0.5 * other.missed
+    return Standing(
+        sure=bool(np.quantile(means, 0.025) > 0.0), matters=max(falls, default=0.0) > MATTERS or sees_more
+    )
 
 
 def bootstrap_means(values: FloatArray, seed: int = 0) -> FloatArray:

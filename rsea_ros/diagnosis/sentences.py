@@ -47,6 +47,16 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
     )
 
 
+def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
+    """Return what cannot be told because a channel is noise there, as sentences. above: Hz."""
+    if above is None:
+        return ()
+    return (
+        f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
+        "most of it is noise there, and what these data say of those frequencies is said by chance.",
+    )
+
+
 def _data(faults: Sequence[Fault]) -> str:
     if not faults:
         return ""

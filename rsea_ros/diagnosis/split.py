@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.diagnosis.coherence import missed_response
 from rsea_ros.identification.problem import BoolArray, Case, Problem
 from rsea_ros.signals import FloatArray
 
@@ -60,11 +61,13 @@ def part(case: Case, sets: tuple[int, ...]) -> Case:
 class Score:
     """Squared weighted residuals summed by channel and block, and how many samples that were.
 
-    sums, counts: by channel, shape (blocks,), of the blocks that have samples.
+    sums, counts: by channel, shape (blocks,), of the blocks that have samples. missed: coherence^2 of the F/T
+    torque's residual with the command where the model misses a response (coherence.py), the largest of all.
     """
 
     sums: dict[str, FloatArray]
     counts: dict[str, FloatArray]
+    missed: float = 0.0
 
     def loss(self, against: Score) -> FloatArray:
         """Return the loss of each block beside another model's, shape (blocks,).
@@ -84,7 +87,10 @@ def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, Flo
     """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
     sums: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
     counts: dict[str, list[FloatArray]] = {n: [] for n in problem.channels}
+    missed = 0.0
     for case, out in zip(cases, outputs, strict=True):
+        if "ft" in case.measured and "ft" in out:
+            missed = max(missed, missed_response(case, out["ft"], "ft", blocks_of(case, "ft")))
         length = int(case.duration / block_length(case)) + 2
         for n in problem.channels:
             if n not in case.t or n not in out:
@@ -100,4 +106,5 @@ def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, Flo
     all_counts = {n: np.concatenate(parts) for n, parts in counts.items()}
     used = np.sum(list(all_counts.values()), axis=0) > 0
     present = [n for n in problem.channels if all_counts[n].sum() > 0]
-    return Score({n: all_sums[n][used] for n in present}, {n: all_counts[n][used] for n in present})
+    sums_used, counts_used = ({n: a[n][used] for n in present} for a in (all_sums, all_counts))
+    return Score(sums_used, counts_used, missed)
