@@ -144,7 +144,12 @@ def while_others_moved(record: Record, name: str, repeat: BoolArray) -> BoolArra
     return repeat if moved.sum() > _MOVED * repeat.sum() else np.zeros(len(t), bool)
 
 
-_WITNESSES = {"position": ("ft", "velocity"), "ft": ("position", "velocity"), "velocity": ("ft", "position")}
+_WITNESSES = {
+    "position": ("ft", "velocity"),
+    "ft": ("position", "velocity"),
+    "velocity": ("ft", "position"),
+    "motor_torque": ("command",),
+}
 _MOVED = 0.3
 """Share of the repeats that fall into motion when a sensor freezes at any time; by chance 0.5."""
 

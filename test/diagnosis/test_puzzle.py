@@ -1,4 +1,4 @@
-"""The paper's own puzzle (section 3.2.2): out of sync at 19 Hz and a bump at 33 Hz. A resonance, or a delay?"""
+"""The paper's own puzzle (section 3.2.2): out of sync at 19 Hz, a bump at 33 Hz. A resonance, or a delay?"""
 
 from __future__ import annotations
 

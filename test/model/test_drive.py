@@ -65,6 +65,13 @@ def test_stamps_rounded_to_microseconds_are_on_the_grid():
     assert not drive.impulse["ft"].any()
 
 
+def test_coarse_stamps_make_no_period_too_many_or_too_few():
+    """Stamps of 64-bit seconds since 1970 are 2^-22 s apart: the median interval is 2e-5 off."""
+    stamps = np.round(np.arange(44_800) / RATE * 2**22) / 2**22
+    drive = drive_from(record_of(stamps, white(44_800), stamps + 1 / RATE))
+    assert drive.step * steps_per_sample(1 / RATE) == pytest.approx(1 / RATE, rel=1e-8)
+
+
 def test_a_command_that_did_not_come_is_held_on():
     """A dropped command message: the last one goes on acting."""
     stamps, command = np.arange(400) / RATE, white(400)

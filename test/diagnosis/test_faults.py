@@ -1,0 +1,29 @@
+"""Faults of the data: each kind put into a good record is found in its channel, and only there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+from independent.faults import FAULTS
+
+from rsea_ros.diagnosis.diagnose import nominal_rig
+from rsea_ros.diagnosis.faults import check
+from rsea_ros.model.rig_file import load_rig
+
+
+@pytest.fixture(scope="module")
+def good():
+    return record_run(drawn_bench(np.random.default_rng(7)), 8, "chirp_noise", 12.0)
+
+
+def test_a_good_record_has_none(good):
+    assert check(good, nominal_rig(load_rig("paper_high_impedance"))).faults == ()
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_a_fault_is_found_and_what_stays_is_whole(good, kind):
+    checked = check(FAULTS[kind](good, np.random.default_rng(9)), load_rig("paper_high_impedance"))
+    assert {f.kind for f in checked.faults} == {kind}
+    for channel in checked.record.channels.values():
+        assert np.all(np.isfinite(channel.y)) and np.all(np.diff(channel.t) > 0.0)
