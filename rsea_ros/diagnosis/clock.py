@@ -22,7 +22,7 @@ def repair_clock(record: Record) -> tuple[Record, list[Fault]]:
         if repeated.any():
             faults.append(Fault("duplicate_stamps", name, float(repeated.mean())))
             channel = Channel(channel.t[~repeated], channel.y[~repeated])
-        faults += _dropped(channel, name)
+        faults += _dropped(channel, name, int(repeated.sum()))
         channels[name] = channel
     return record.with_channels(**channels), faults
 
@@ -57,11 +57,12 @@ def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channe
     return Channel(channel.t - shift, channel.y), [Fault("clock_jump", name, share, detail)]
 
 
-def _dropped(channel: Channel, name: str) -> list[Fault]:
+def _dropped(channel: Channel, name: str, taken_out: int) -> list[Fault]:
+    """Return the fault of missing samples. taken_out: how many had a stamp that was not theirs."""
     step = np.diff(channel.t)
     period = float(np.median(step))
     gaps = step > _GAP * period
-    lost = float(np.sum(np.round(step[gaps] / period) - 1.0))
+    lost = float(np.sum(np.round(step[gaps] / period) - 1.0)) - taken_out
     if lost < 1.0:
         return []
     return [Fault("dropped_samples", name, lost / (len(channel) + lost))]

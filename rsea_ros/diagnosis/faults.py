@@ -114,8 +114,9 @@ def _common(y: FloatArray, extreme: float) -> bool:
 def frozen(channel: Channel, name: str) -> BoolArray:
     """Return which samples repeat the one before more often than a quantum explains.
 
-    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then. A sensor
-    that repeats every other sample or more is slower than the log, which is no fault.
+    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then, give or
+    take three standard deviations. A sensor that repeats every other sample or more is slower than the log,
+    which is no fault.
     """
     if name in ("command", "reference"):
         return np.zeros(len(channel), bool)
@@ -125,7 +126,7 @@ def frozen(channel: Channel, name: str) -> BoolArray:
     if not len(moving):
         return repeat
     by_chance = float((moving < 1.5 * float(moving.min())).sum()) / 2.0
-    surplus = float(repeat.sum()) - 1.5 * by_chance
+    surplus = float(repeat.sum()) - 1.5 * by_chance - 3.0 * float(np.sqrt(repeat.sum()))
     is_fault = max(5.0, _SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
     return repeat if is_fault else np.zeros(len(channel), bool)
 
@@ -155,8 +156,8 @@ _MOVED = 0.3
 
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
     "nan": not_finite,
-    "frozen_samples": frozen,
     "clipping": clipping,
+    "frozen_samples": frozen,
     "outliers": outliers,
 }
 
