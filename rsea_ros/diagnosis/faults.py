@@ -23,6 +23,10 @@ _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
 _SMALLEST_SHARE = 1e-3
 _SLOW = 0.25
+_FEW = 0.2
+"""Share of a channel's samples: fewer different values are steps."""
+_COARSE = 5.0
+"""Steps of so many times what the rig's sensor makes are told."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +54,29 @@ def check(record: Record, rig: Rig) -> Checked:
                 faults.append(Fault(kind, name, float(found.mean())))
                 bad |= found
         masked[name] = bad
+    faults += [fault for n in repaired.channels if n in rig.sensors for fault in coarse(repaired[n], n, rig)]
     return Checked(_filled(repaired, masked), masked, tuple(faults))
 
 
 def missing(record: Record, rig: Rig) -> tuple[str, ...]:
     """Return the channels that the rig's sensors would give and the record has not."""
     return tuple(n for n in rig.sensors if n not in record)
+
+
+def coarse(channel: Channel, name: str, rig: Rig) -> list[Fault]:
+    """Return the fault of a sensor whose values come in much larger steps than the rig's sensor makes.
+
+    Nothing is masked: such a sensor is noisy, not wrong.
+    """
+    values = np.unique(channel.y[np.isfinite(channel.y)])
+    if not 3 <= len(values) < _FEW * len(channel):
+        return []
+    step, sensor = float(np.median(np.diff(values))), rig.sensors[name]
+    places = (values - values[0]) / step
+    stated = max(sensor.quantum, sensor.noise)
+    if step < _COARSE * stated or np.max(np.abs(places - np.round(places))) > 1e-3:
+        return []
+    return [Fault("coarse_steps", name, 1.0, f"steps of {step:.3g} where the rig's sensor has {stated:.3g}")]
 
 
 def not_finite(channel: Channel, name: str) -> BoolArray:

@@ -61,7 +61,7 @@ def _data(faults: Sequence[Fault]) -> str:
     if not faults:
         return ""
     return (
-        " The data have faults, which were masked: "
+        " The data have faults, wrong samples were masked: "
         + ", ".join(f"{f.kind.replace('_', ' ')} in {f.channel}" for f in faults)
         + "."
     )

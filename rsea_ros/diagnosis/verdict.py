@@ -15,7 +15,7 @@ MISFIT = 1.5
 """RMS of the residual over the noise above which a channel misfits."""
 MUCH = 3.0
 """RMS of the residual over the noise above which a channel misfits much."""
-HALF = 0.6
+HALF = 0.5
 """What may be left of a misfitting channel's residual for causes to be named without reaching the floor."""
 
 

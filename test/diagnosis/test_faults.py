@@ -10,6 +10,7 @@ from independent.faults import FAULTS
 from rsea_ros.diagnosis.diagnose import nominal_rig
 from rsea_ros.diagnosis.faults import check
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
 
 
 @pytest.fixture(scope="module")
@@ -27,3 +28,11 @@ def test_a_fault_is_found_and_what_stays_is_whole(good, kind):
     assert {f.kind for f in checked.faults} == {kind}
     for channel in checked.record.channels.values():
         assert np.all(np.isfinite(channel.y)) and np.all(np.diff(channel.t) > 0.0)
+
+
+def test_coarse_steps_are_told_and_nothing_is_masked(good):
+    ft = good["ft"]
+    stepped = good.with_channels(ft=Channel(ft.t, np.round(ft.y / 0.8) * 0.8))
+    checked = check(stepped, load_rig("paper_high_impedance"))
+    assert [(f.kind, f.channel) for f in checked.faults] == [("coarse_steps", "ft")]
+    assert not checked.masked["ft"].any()
