@@ -10,9 +10,8 @@ from control import StateSpace
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs, transfer
 from rsea_ros.model.outputs import Output
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 FT, VELOCITY, POSITION = range(3)
 

@@ -10,13 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.diagnosis.coherence import missed_response
-from rsea_ros.identification.problem import BoolArray, Case, Problem
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
 _LONGEST, _SHORTEST = 1.0, 0.25
 """s. Longer than the bench remembers, short enough that every part of a sweep is in every set."""

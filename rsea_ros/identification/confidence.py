@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import CLOCK, Unknown
 from rsea_ros.model.rig import FIELDS
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import FloatArray, IntArray
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
