@@ -48,9 +48,7 @@ def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple
 
     simplest = min(contenders, key=order)
     rivals = tuple(
-        m
-        for m in contenders
-        if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
+        m for m in contenders if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
     )
     return simplest, rivals
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rsea_ros.diagnosis.conclusion import conclusion
@@ -15,9 +15,8 @@ from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
-
-Progress = Callable[[str, float], None]
 
 
 def diagnose(
@@ -41,7 +40,7 @@ def diagnose(
         found = pruned(found, pool)
         tell("judging", 0.95)
         stages = list(pool.map(lambda m: judged(found, m, judging, rig), found.models))
-    return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig)
+        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, pool)
 
 
 def nominal_rig(rig: Rig) -> Rig:

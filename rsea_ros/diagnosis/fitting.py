@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
+from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import CLOCK
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
@@ -75,7 +74,7 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     rest in the clocks. None for a model without a delay.
     """
     names = [u.name for u in solution.problem.unknowns]
-    clocks = [i for i, n in enumerate(names) if n.startswith(CLOCK + ".")]
+    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock]
     if DELAY not in names or not clocks:
         return None
     theta = solution.theta.copy()
@@ -96,7 +95,7 @@ def heavier(case: Case, weights: Score | None) -> Case:
 def as_model(cases: Sequence[Case], solution: Solution) -> Model:
     """Return a solution with its outputs and its score on the blocks that choose."""
     outputs = solution.problem.outputs(solution.theta)
-    return Model(solution, outputs, score(solution.problem, tuple(part(c, CHOOSE) for c in cases), outputs))
+    return Model(solution, outputs, score_on(solution.problem, cases, CHOOSE, outputs))
 
 
 def refitted(cases: Sequence[Case], model: Model) -> Model:
@@ -110,7 +109,7 @@ def rescored(cases: Sequence[Case], model: Model) -> Model:
     return Model(
         replace(model.solution, problem=problem),
         model.outputs,
-        score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs),
+        score_on(problem, cases, CHOOSE, model.outputs),
     )
 
 
@@ -134,5 +133,5 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
     """Tell whether the residual of every channel is noise, on all blocks but those that judge."""
-    standing = score(model.solution.problem, tuple(part(c, (*FIT, *CHOOSE)) for c in cases), model.outputs)
+    standing = score_on(model.solution.problem, cases, (*FIT, *CHOOSE), model.outputs)
     return standing.missed == 0.0 and all(standing.ratio(n) < AT_FLOOR for n in standing.sums)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -24,10 +23,9 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import CLOCK
+from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
-MOST_CAUSES = 4
 _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
@@ -35,13 +33,6 @@ _CLOSE = 1.1
 _PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
-
-
-class Tell(Protocol):
-    """Hears what is being tried and which share of the work is done, 0 … 1."""
-
-    def __call__(self, step: str, share: float, /) -> None:
-        """Hear it."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +43,7 @@ class Round:
     present: Model
     number: int
     pool: Executor
-    tell: Tell
+    tell: Progress
 
     def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
         """Return the model to accept, all other trials, and the models that do as well as it."""
@@ -147,13 +138,13 @@ def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatA
 
     Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
     """
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(CLOCK + ".")]
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
     return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
 def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
     """Return a problem and its theta with the clocks of another problem free again, at zero."""
-    clocks = tuple(u for u in model.unknowns if u.name.startswith(CLOCK + "."))
+    clocks = tuple(u for u in model.unknowns if u.is_clock)
     return replace(problem, unknowns=(*problem.unknowns, *clocks)), np.concatenate(
         [theta, np.zeros(len(clocks))]
     )

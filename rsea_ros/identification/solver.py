@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem, simulated
-from rsea_ros.identification.unknowns import CLOCK, Unknown, apply, start_vector
+from rsea_ros.identification.unknowns import Unknown, apply, start_vector
 from rsea_ros.signals import FloatArray
 
 _DIFFERENCE = 1e-4
@@ -65,7 +65,7 @@ def jacobian_columns(
 ) -> FloatArray:
     """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta."""
 
-    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if _is_clock(problem.unknowns[i])}
+    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if problem.unknowns[i].is_clock}
     others = [i for i in which if i not in clocks]
 
     def column(i: int) -> FloatArray:
@@ -102,16 +102,12 @@ def _channel_of_rows(problem: Problem) -> npt.NDArray[np.int64]:
     return np.concatenate(rows)
 
 
-def _is_clock(unknown: Unknown) -> bool:
-    return unknown.name.startswith(CLOCK + ".")
-
-
 def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
     """Return d residual / d theta by central differences, which leave no trace of curvature, shape (m, n)."""
     columns = []
     for i, unknown in enumerate(problem.unknowns):
         step = np.zeros(len(theta))
-        step[i] = _CLOCK_DIFFERENCE if _is_clock(unknown) else _DIFFERENCE * unknown.scale
+        step[i] = _CLOCK_DIFFERENCE if unknown.is_clock else _DIFFERENCE * unknown.scale
         columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
     return np.column_stack(columns)
 
