@@ -14,9 +14,10 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.diagnosis.choice import choose, is_progress, loss_excess
-from rsea_ros.diagnosis.fitting import Model, fitted, heavier, refitted
+from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
 from rsea_ros.diagnosis.hints import starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.effects.catalogue import catalogue
@@ -30,6 +31,8 @@ _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
+_MOVED = 0.02
+"""Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
 _PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
@@ -103,10 +106,31 @@ class Round:
 
     def _fit_all(self, h: Hypothesis) -> Model:
         self._say(f"fitting {h.name} on everything", 0.8)
-        first = fitted(
-            self.cases, *self._with_clocks(h), iterations=_FULL_ITERATIONS, weights=self.present.choose
+        weights = self.present.choose
+        problem, theta = self._with_clocks(h)
+        masked = on_places(problem, self.cases, FIT, weights)
+        start = min(self._starts_of_all(theta), key=lambda t: float(np.sum(masked.residual(t) ** 2)))
+        first = fitted(self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights)
+        return refitted(self.cases, first) if self._has_moved(first) else first
+
+    def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:
+        """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.
+
+        The pieces were fitted without clocks: what these do, other values have taken over there.
+        """
+        there = self.present.solution
+        clocks = sum(u.is_clock for u in there.problem.unknowns)
+        own = theta[len(there.theta) - clocks : len(theta) - clocks]
+        values, moved = np.split(there.theta, [len(there.theta) - clocks])
+        return [theta, np.concatenate([values, own, moved])]
+
+    def _has_moved(self, model: Model) -> bool:
+        """Tell whether a model leaves so much more or less of a channel than the present one, its weight."""
+        channels = model.choose.sums
+        now, before = (
+            np.array([max(s.ratio(n), 1.0) for n in channels]) for s in (model.choose, self.present.choose)
         )
-        return refitted(self.cases, first)
+        return bool(np.any(np.abs(now / before - 1.0) > _MOVED))
 
     def _with_clocks(self, h: Hypothesis) -> tuple[Problem, FloatArray]:
         return with_clocks(replace(h.problem, cases=self.cases), h.theta, self.present.solution.problem)
@@ -145,6 +169,5 @@ def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatA
 def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
     """Return a problem and its theta with the clocks of another problem free again, at zero."""
     clocks = tuple(u for u in model.unknowns if u.is_clock)
-    return replace(problem, unknowns=(*problem.unknowns, *clocks)), np.concatenate(
-        [theta, np.zeros(len(clocks))]
-    )
+    larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
+    return larger, np.concatenate([theta, np.zeros(len(clocks))])

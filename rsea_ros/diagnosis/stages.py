@@ -17,6 +17,9 @@ from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
+_GAIN = 1e-6
+"""Relative fall of the cost below which a fit is done."""
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -36,7 +39,9 @@ class Stage:
 def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> Stage:
     """Re-fit a model on all that does not judge, and judge it."""
     start, weights = chosen.solution, rescored(found.cases, chosen).choose
-    model = fitted(found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights)
+    model = fitted(
+        found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights, gain=_GAIN
+    )
     problem = model.solution.problem
     train = score_on(problem, found.cases, (*FIT, *CHOOSE), model.outputs)
     if judging is None:

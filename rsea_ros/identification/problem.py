@@ -132,6 +132,17 @@ def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
     return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
 
 
+def weights_of(cases: Sequence[Case], channels: Sequence[str]) -> FloatArray:
+    """Return 1 / noise of every sample that counts, case after case, channel after channel."""
+    parts = [
+        np.full(np.count_nonzero(case.mask[n]), 1.0 / case.noise[n])
+        for case in cases
+        for n in channels
+        if n in case.measured
+    ]
+    return np.concatenate(parts)
+
+
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
     """Return (simulated - measured) / noise of the samples that count, channel after channel."""
     return np.concatenate([((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels])
