@@ -58,10 +58,15 @@ def is_near(model: Model, best: Model) -> bool:
 
     There what is left is no noise, and more parameters always bend a model a little nearer to it.
     """
-    if max(best.choose.ratio(n) for n in best.choose.sums) < _FAR:
+    if not is_far(best):
         return False
     room = 1.0 + _ROOM * (best.size - model.size)
     return float(model.choose.loss(best.choose).sum()) < room**2 * float(best.choose.loss(best.choose).sum())
+
+
+def is_far(model: Model) -> bool:
+    """Tell whether a model is far from the floor in its worst channel."""
+    return max(model.choose.ratio(n) for n in model.choose.sums) >= _FAR
 
 
 def at_bound(solution: Solution) -> bool:

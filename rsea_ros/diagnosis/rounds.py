@@ -13,17 +13,18 @@ from functools import cached_property
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import choose, is_progress, loss_excess
+from rsea_ros.diagnosis.choice import choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
 from rsea_ros.diagnosis.hints import starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
 from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.solver import Solution, jacobian, solve
+from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
@@ -33,6 +34,7 @@ _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
 _MOVED = 0.02
 """Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
+_PAIRED = 3
 _PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
@@ -50,15 +52,35 @@ class Round:
 
     def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
         """Return the model to accept, all other trials, and the models that do as well as it."""
-        screened = self._screened()
+        screened = self._screened(self.on_pieces)
         finalists = self._finalists(screened)
         models = list(self.pool.map(self._fit_all, finalists))
         better = [m for m in models if is_progress(m, self.present)]
+        if not better and is_far(self.present):
+            better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
         chosen, equals = choose(better, self.present.choose)
         final = {h.name for h in finalists}
         trials = [self._far_behind(h) for h in screened if h.name not in final]
         trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
         return chosen, trials, equals
+
+    def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
+        """Return models with two more effects, for where none helps alone: each of some with every other."""
+        close = []
+        for first in firsts[:_PAIRED]:
+            seconds = self._screened(self._unfitted(first.effect))[:_PAIRED]
+            close += list(self.pool.map(self._fit_pieces, seconds))
+        best = sorted((h for h in close if h.cost < self.on_pieces.cost), key=lambda h: h.cost)
+        return list(self.pool.map(self._fit_all, best[:2]))
+
+    def _unfitted(self, effect: Effect) -> Solution:
+        """Return the present model on the pieces with an effect of typical size, as it stands."""
+        there = self.on_pieces
+        problem = extended_problem(there.problem, effect, dict(effect.typical))
+        theta = np.concatenate([there.theta, start_vector(problem.unknowns)[len(there.theta) :]])
+        residual = problem.residual(theta)
+        matrix = jacobian(problem, theta, residual)
+        return Solution(problem, theta, residual, matrix, float(residual @ residual))
 
     @cached_property
     def on_pieces(self) -> Solution:
@@ -69,10 +91,10 @@ class Round:
         problem, theta = without_clocks(replace(solution.problem, cases=pieces), solution.theta)
         return solve(problem, theta, iterations=_PRESENT_ITERATIONS)
 
-    def _screened(self) -> list[Hypothesis]:
-        """Return what two cheap steps of every effect reach, best first."""
-        effects = [e for n, e in catalogue().items() if n not in self.present.causes]
-        there = self.on_pieces
+    def _screened(self, there: Solution) -> list[Hypothesis]:
+        """Return what two cheap steps of every other effect reach beside a solution, best first."""
+        acting = {e.name for e in there.problem.rig.effects}
+        effects = [e for n, e in catalogue().items() if n not in acting]
 
         def screen_one(i: int) -> Hypothesis | None:
             self._say(effects[i].name, 0.4 * i / len(effects))
@@ -82,7 +104,9 @@ class Round:
         return sorted(found, key=lambda h: h.cost)
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
-        return starts_of(effect, self.cases[0], self.present.solution.problem.rig, self.present.outputs[0])
+        there = self.present.solution
+        rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
+        return starts_of(effect, self.cases[0], rig, self.present.outputs[0])
 
     def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return the best on pieces, and what is said to be confused with the very best."""
