@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_to_end, flat_band
@@ -98,7 +98,7 @@ class PureTorque:
         odds = (1.0 - s.limit) / s.limit
         corner = self.edge * odds**0.25
         on, off = ((1.0 + sign * s.hysteresis) ** 4 / odds for sign in (-1.0, 1.0))
-        surprise, faint = (float(chi2.isf(p, 1)) for p in (FALSE_ALARM, STILL_THERE))
+        surprise, faint = (float(chdtri(1, p)) for p in (FALSE_ALARM, STILL_THERE))
         values = max(1.0, 2.0 * corner * s.window)  # independent ones of the noise in a window
         deaf = (math.inf, math.inf, 1.0)  # until it is calibrated
         self._limits = np.array(
