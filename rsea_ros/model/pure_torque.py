@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.errors import ParameterError, RigError
-from rsea_ros.model.bandwidth import end_to_end, flat_band
+from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import ErrorModel, Estimate
 from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_filter import (
@@ -93,7 +93,7 @@ class PureTorque:
                 f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
             )
         s = settings or Settings()
-        self._function = end_to_end(structured(rig))
+        self._function = end_over_end(structured(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
         odds = (1.0 - s.limit) / s.limit
         corner = self.edge * odds**0.25
@@ -140,5 +140,5 @@ class PureTorque:
 
     def error_at(self, hz: float) -> tuple[float, float]:
         """Return |T_d / T_p|, dB, and its phase, degrees: the error of who takes them for the same."""
-        response = complex(self._function(2j * math.pi * hz))
+        response = self._function(2j * math.pi * hz)
         return 20.0 * math.log10(abs(response)), math.degrees(np.angle(response))
