@@ -39,7 +39,7 @@ class Loop:
         self._desired = listener.node.create_publisher(JointState, "/rsea/desired_torque", COMMAND)
 
     def ready(self):
-        """Wait until the controller commands and all else is heard too: each is discovered at its own time."""
+        """Wait until the controller commands and all is heard: each topic is discovered at its own time."""
         self.listener.until(lambda: self._desired.get_subscription_count() and len(self.commands) > 100)
         self.listener.until(lambda: self.states and self.wrenches)
 
