@@ -32,6 +32,8 @@ _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
+_HOPE = {1: 0.98, 2: 0.9}
+"""Of the present cost on pieces, far from the floor: above it, one or two effects cannot be progress."""
 _MOVED = 0.02
 """Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
 _PAIRED = 3
@@ -70,7 +72,7 @@ class Round:
         for first in firsts[:_PAIRED]:
             seconds = self._screened(self._unfitted(first.effect))[:_PAIRED]
             close += list(self.pool.map(self._fit_pieces, seconds))
-        best = sorted((h for h in close if h.cost < self.on_pieces.cost), key=lambda h: h.cost)
+        best = sorted((h for h in close if h.cost < _HOPE[2] * self.on_pieces.cost), key=lambda h: h.cost)
         return list(self.pool.map(self._fit_all, best[:2]))
 
     def _unfitted(self, effect: Effect) -> Solution:
@@ -115,6 +117,8 @@ class Round:
         if not close:
             return []
         best, rivals = close[0].cost, close[0].effect.claims.confusable_with
+        if is_far(self.present):
+            close = [h for h in close if h.cost < _HOPE[1] * self.on_pieces.cost] or close[:1]
         near = close[:_FULL_FITS] + [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
         heard = {h.name for h in near}
         fitted_on_pieces = {h.name for h in close}

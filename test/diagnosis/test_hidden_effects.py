@@ -6,6 +6,7 @@ both. `conceal` is the only place that knows.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ class Concealed:
     size: float
 
 
+@functools.cache
 def conceal(seed: int) -> Concealed:
     """Draw a bench, an effect, its severity and the excitation."""
     rng = np.random.default_rng(seed)
