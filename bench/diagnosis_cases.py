@@ -54,6 +54,11 @@ READINGS = (
     ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 0.5}),
     ("backlash", {"gap": 2.0e-3}, {"encoder_on_chassis": 1.0}),
     ("gear_compliance", {"stiffness": 2.2e3}, {"encoder_on_chassis": 0.0}),
+    (
+        "torque_ripple",
+        {"amplitude": 1.2, "cycles_per_revolution": 2.0 * np.pi / (502 * 0.011), "phase": 0.0},
+        {"ripple": 0.0, "cogging": 1.2, "cogging_period": 0.011},  # a wave of the output angle: the same law
+    ),
 )
 """Effect, its size, and values of the bench that make another sentence of the contract's row of it."""
 
