@@ -19,6 +19,7 @@ from independent.faults import FAULTS
 from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.signals import Record
 
 PAIRS = (
@@ -75,11 +76,15 @@ class Case:
     group: str = "single"
     mimics: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a case is made from; group: single, pair, clean, off_catalogue, faulty or reading."""
+    """What a case is made from; without: effects that the diagnosis has to do without.
+
+    group: single, pair, clean, off_catalogue, taken_out, faulty or reading.
+    """
 
     name: str
     group: str
@@ -89,6 +94,7 @@ class Plan:
     values: Mapping[str, float] = field(default_factory=dict)
     off: tuple[str, float] | None = None
     faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
     duration: float = 60.0
 
     def bench(self) -> Bench:
@@ -110,12 +116,14 @@ class Plan:
             record = FAULTS[fault](record, rng)
         mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
         causes = tuple(self.hidden)
-        return Case(self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults)
+        return Case(
+            self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults, self.without
+        )
 
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
     """Return all cases that a seed makes, each with a seed of its own."""
-    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings)
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out)
     rng = np.random.default_rng(seed)
     return tuple(case for maker in makers for case in maker(rng))
 
@@ -154,6 +162,16 @@ def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
         for factor in (0.7, 1.4):
             off = (effect, factor * rng.uniform(0.9, 1.1))
             yield Plan(f"off-{effect}-{factor}", "off_catalogue", _seed(rng), _excitation(k), off=off)
+
+
+def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
+    """Every effect hidden, and taken out of the catalogue with all that are said to be confused with it."""
+    for k, (name, effect) in enumerate(catalogue().items()):
+        if name in SIZES:
+            kin = [n for n, e in catalogue().items() if name in e.claims.confusable_with]
+            without = (name, *dict.fromkeys([*effect.claims.confusable_with, *kin]))
+            hidden = {name: drawn_parameters(name, "medium", rng)}
+            yield Plan(f"taken_out-{name}", "taken_out", _seed(rng), _excitation(k), hidden, without=without)
 
 
 def _faulty(rng: np.random.Generator) -> Iterator[Plan]:

@@ -14,14 +14,15 @@ from rsea_ros.diagnosis.hypothesise import extended_problem
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
-from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import start_vector
 
 
-def pruned(found: Search, pool: Executor) -> Search:
+def pruned(found: Search, effects: Sequence[Effect], pool: Executor) -> Search:
     """Return the search with no cause more than the data need, and its models as they nest."""
-    smaller = Smaller(found.cases, pool)
+    smaller = Smaller(found.cases, effects, pool)
     return sequenced(with_simpler(without_needless(found, smaller), smaller), smaller)
 
 
@@ -30,6 +31,7 @@ class Smaller:
     """Fits models again without one of their causes, or with another in its place; each only once."""
 
     cases: tuple[Case, ...]
+    effects: Sequence[Effect]
     pool: Executor
     known: dict[tuple[str, ...], dict[str, Model]] = field(default_factory=dict)
 
@@ -45,11 +47,16 @@ class Smaller:
         pairs = [
             (name, rival)
             for name in model.causes
-            for rival in _taken_for(name)
+            for rival in self._taken_for(name)
             if rival not in model.causes and effect_size(rival) < effect_size(name)
         ]
         found = self.pool.map(lambda pair: _changed(self.cases, model, *pair), pairs)
         return [(*pair, simpler) for pair, simpler in zip(pairs, found, strict=True)]
+
+    def _taken_for(self, name: str) -> list[str]:
+        """Return the effects that are said to be confused with one, from either side."""
+        own = effect_named(name).claims.confusable_with
+        return [e.name for e in self.effects if e.name in own or name in e.claims.confusable_with]
 
 
 def without_needless(found: Search, smaller: Smaller) -> Search:
@@ -70,12 +77,6 @@ def with_simpler(found: Search, smaller: Smaller) -> Search:
             without, why = smaller.without(last)[name], f"no better than {rival}, which is simpler"
             return with_simpler(_replaced(found, simpler, trial_of(last, name, without, why)), smaller)
     return found
-
-
-def _taken_for(name: str) -> list[str]:
-    """Return the effects that are said to be confused with one, from either side."""
-    own = effect_named(name).claims.confusable_with
-    return [n for n, e in catalogue().items() if n in own or name in e.claims.confusable_with]
 
 
 def sequenced(found: Search, smaller: Smaller) -> Search:

@@ -20,7 +20,6 @@ from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
 from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
-from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, jacobian, solve
@@ -44,9 +43,10 @@ _FULL_ITERATIONS = 6
 
 @dataclass(frozen=True)
 class Round:
-    """What a round starts from: every sample of the cases, and the model so far."""
+    """What a round starts from: every sample of the cases, the effects to try, and the model so far."""
 
     cases: tuple[Case, ...]
+    effects: Sequence[Effect]
     present: Model
     number: int
     pool: Executor
@@ -96,7 +96,7 @@ class Round:
     def _screened(self, there: Solution) -> list[Hypothesis]:
         """Return what two cheap steps of every other effect reach beside a solution, best first."""
         acting = {e.name for e in there.problem.rig.effects}
-        effects = [e for n, e in catalogue().items() if n not in acting]
+        effects = [e for e in self.effects if e.name not in acting]
 
         def screen_one(i: int) -> Hypothesis | None:
             self._say(effects[i].name, 0.4 * i / len(effects))

@@ -81,8 +81,8 @@ def quick(known, monkeypatch):
     """The verb with an engine that has its answer ready; returns what it was asked."""
     asked = []
 
-    def answer(records, rig, holdout, tell):
-        asked.append((records, rig, holdout))
+    def answer(records, rig, holdout, tell, without):
+        asked.append((records, rig, holdout, without))
         tell("round 1: backlash", 0.5)
         return known
 
@@ -126,8 +126,10 @@ def test_bags_rig_and_holdout_reach_the_engine(quick, bag, record, tmp_path):
     run = bag()
     write_record(record, tmp_path / "other.mcap")
     other = str(tmp_path / "other.mcap")
-    main(["diagnose", run, other, "--holdout", other, "--rig", "pendulum", "--out", str(tmp_path / "out")])
-    ((records, rig, holdout),) = quick
+    options = ["--holdout", other, "--rig", "pendulum", "--without", "backlash", "ft_bias"]
+    main(["diagnose", run, other, *options, "--out", str(tmp_path / "out")])
+    ((records, rig, holdout, without),) = quick
+    assert without == ["backlash", "ft_bias"]
     assert [r.source for r in records] == [run, other] and holdout.source == other
     assert rig.name == "pendulum"
 
@@ -195,6 +197,11 @@ def test_a_file_in_place_of_the_directory_is_refused_before_any_work(quick, bag,
         == f"rsea diagnose: --out {path}: is a file, expected a directory or a new name\n"
     )
     assert quick == []
+
+
+def test_an_unknown_effect_is_refused_in_one_line(quick, bag, tmp_path, capsys):
+    assert main(["diagnose", bag(), "--out", str(tmp_path / "out"), "--without", "gremlins"]) == 2
+    assert "effect 'gremlins': not in the catalogue" in capsys.readouterr().err.strip().splitlines()[-1]
 
 
 def test_an_unknown_verdict_is_refused(capsys):
