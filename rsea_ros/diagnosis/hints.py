@@ -74,21 +74,32 @@ def _limit_hints(case: Case) -> list[float]:
 def _mode_hints(
     effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]
 ) -> list[dict[str, float]]:
-    """Return starts of a part on a spring of its own, its mode at a peak of the residual."""
+    """Return starts of a part on a spring of its own, its mode at a peak of the residual.
+
+    It gives beside the rig's spring, which is stiffer then: both in series are what the fit knows.
+    """
     if rig.rigid_spring:
         return []
-    channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
+    channel = max(outputs.keys() & case.measured.keys(), key=lambda n: _left_of(case, n, outputs[n]))
     stiffness = next(p for p in effect.parameters if p.name == "stiffness")
     peaks = _line_hints(case, channel, outputs[channel], {}, "frequency", effect)
     return [
         {
             **effect.typical,
             "stiffness": k,
-            "inertia": (k + rig[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
+            "inertia": (k + spring) / (2.0 * math.pi * peak["frequency"]) ** 2,
+            STIFFNESS: spring,
         }
-        for k in (*stiffness.starts[:1], stiffness.typical)
+        for k in (max(k, 2.0 * rig[STIFFNESS]) for k in (*stiffness.starts[:1], stiffness.typical))
+        for spring in [1.0 / (1.0 / rig[STIFFNESS] - 1.0 / k)]
         for peak in peaks
     ]
+
+
+def _left_of(case: Case, channel: str, simulated: FloatArray) -> float:
+    """Return the RMS of a channel's residual over its noise."""
+    left = (case.measured[channel] - simulated)[case.mask[channel]]
+    return float(np.sqrt(np.mean(left**2))) / case.noise[channel]
 
 
 def _line_hints(
