@@ -18,7 +18,7 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-STIFFNESS = "spring.stiffness"
+STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _PEAKS = 2
 _GAPS = (0.1, 0.3, 0.6)
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
@@ -46,6 +46,8 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         return [{**effect.typical, "limit": limit} for limit in _limit_hints(case)] or starts
     if {"stiffness", "inertia"} <= set(names):
         return _mode_hints(effect, case, rig, outputs) or starts
+    if "stiffness" in names:
+        return [{**effect.typical, **_beside_a_train(s["stiffness"], rig)} for s in starts]
     if "Hz" in names.values():
         frequency = next(n for n, unit in names.items() if unit == "Hz")
         channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
@@ -74,26 +76,40 @@ def _limit_hints(case: Case) -> list[float]:
 def _mode_hints(
     effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]
 ) -> list[dict[str, float]]:
-    """Return starts of a part on a spring of its own, its mode at a peak of the residual.
-
-    It gives beside the rig's spring, which is stiffer then: both in series are what the fit knows.
-    """
-    if rig.rigid_spring:
-        return []
+    """Return starts of a part on a spring of its own, its mode at a peak of the residual."""
     channel = max(outputs.keys() & case.measured.keys(), key=lambda n: _left_of(case, n, outputs[n]))
-    stiffness = next(p for p in effect.parameters if p.name == "stiffness")
     peaks = _line_hints(case, channel, outputs[channel], {}, "frequency", effect)
     return [
         {
             **effect.typical,
-            "stiffness": k,
-            "inertia": (k + spring) / (2.0 * math.pi * peak["frequency"]) ** 2,
-            STIFFNESS: spring,
+            **hint,
+            "inertia": (hint["stiffness"] + hint[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
         }
-        for k in (max(k, 2.0 * rig[STIFFNESS]) for k in (*stiffness.starts[:1], stiffness.typical))
-        for spring in [1.0 / (1.0 / rig[STIFFNESS] - 1.0 / k)]
+        for hint in _series_hints(effect, rig)
         for peak in peaks
     ]
+
+
+def _series_hints(effect: Effect, rig: Rig) -> list[dict[str, float]]:
+    """Return starts of a spring that gives beside the rig's own, N m/rad.
+
+    The rig's is stiffer then: both in series are what the fit without the effect knows.
+    """
+    if rig.rigid_spring:
+        return []
+    stiffness, own = next(p for p in effect.parameters if p.name == "stiffness"), rig[STIFFNESS]
+    starts = (max(k, 2.0 * own) for k in (*stiffness.starts[:1], stiffness.typical))
+    return [{"stiffness": k, STIFFNESS: 1.0 / (1.0 / own - 1.0 / k)} for k in starts]
+
+
+def _beside_a_train(stiffness: float, rig: Rig) -> dict[str, float]:
+    """Return a start of a gear train that gives between rotor and spring, N m/rad.
+
+    The rotor moves 1 + K_s / stiffness as far as the spring: the fit without it takes that for more inertia
+    and damping.
+    """
+    farther = 1.0 if rig.rigid_spring else 1.0 + rig[STIFFNESS] / stiffness
+    return {"stiffness": stiffness, **{name: rig[name] / farther for name in (INERTIA, DAMPING)}}
 
 
 def _left_of(case: Case, channel: str, simulated: FloatArray) -> float:
