@@ -22,6 +22,8 @@ STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "ro
 _PEAKS = 2
 _GAPS = (0.1, 0.3, 0.6)
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
+_STIFFER = (4.0, 9.0, 20.0)
+"""Than the rig's spring what gives beside it may be: softer is told at once, stiffer hardly shows."""
 _FEWEST_PERIODS = 1.5
 """As often a ripple must have repeated over the rotor's travel to be one."""
 _MOST_WAVES = 1e7
@@ -85,21 +87,20 @@ def _mode_hints(
             **hint,
             "inertia": (hint["stiffness"] + hint[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
         }
-        for hint in _series_hints(effect, rig)
-        for peak in peaks
+        for hint in _series_hints(rig)
+        for peak in peaks[:1]
     ]
 
 
-def _series_hints(effect: Effect, rig: Rig) -> list[dict[str, float]]:
+def _series_hints(rig: Rig) -> list[dict[str, float]]:
     """Return starts of a spring that gives beside the rig's own, N m/rad.
 
     The rig's is stiffer then: both in series are what the fit without the effect knows.
     """
     if rig.rigid_spring:
         return []
-    stiffness, own = next(p for p in effect.parameters if p.name == "stiffness"), rig[STIFFNESS]
-    starts = (max(k, 2.0 * own) for k in (*stiffness.starts[:1], stiffness.typical))
-    return [{"stiffness": k, STIFFNESS: 1.0 / (1.0 / own - 1.0 / k)} for k in starts]
+    own = rig[STIFFNESS]
+    return [{"stiffness": k * own, STIFFNESS: own / (1.0 - 1.0 / k)} for k in _STIFFER]
 
 
 def _beside_a_train(stiffness: float, rig: Rig) -> dict[str, float]:
