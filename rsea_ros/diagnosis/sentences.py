@@ -26,7 +26,8 @@ def verdict_sentence(
     """Return the verdict as one sentence. before, after: held-out residual over noise."""
     name, data = _CHANNELS[channel], _data(faults)
     named = " and ".join(c.name.replace("_", " ") for c in causes)
-    fall = f"the {name} residual falls from {before:.1f} to"
+    them = "them" if len(causes) > 1 else "it"
+    fall = f"with {them} the {name} residual falls from {before:.1f} to"
     if verdict == "nothing_wrong":
         return (
             f"Nothing is wrong with the model: with its values re-fitted the {name} residual "
@@ -35,8 +36,8 @@ def verdict_sentence(
     if verdict == "unexplained":
         return f"The {name} residual is {before:.1f} times the noise; no known effect explains it.{data}"
     if verdict == "explained":
-        return f"{named.capitalize()}: with it {fall} {after:.2f} times the noise, which is the floor.{data}"
-    return f"{named.capitalize()} explains part: {fall} {after:.1f} times the noise; the rest is open.{data}"
+        return f"{named.capitalize()}: {fall} {after:.2f} times the noise, which is the floor.{data}"
+    return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
 
 
 def evidence_of(effect: Effect, channel: str, before: float, after: float, gain: float) -> str:
