@@ -36,6 +36,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
     parser.add_argument("--seconds", type=float, default=30.0, help="of each run of the loop")
+    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
+    parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
     parser.add_argument("--strings", type=int, default=1_000_000, help="damaged byte strings")
     args = parser.parse_args()
     unknown = set(args.sections) - set(SECTIONS)

@@ -7,6 +7,7 @@ zero it and switch it off. A fault zeroes it until the service clear_fault or re
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 import time
@@ -16,7 +17,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, TransitionCallbackReturn
 
 from msg_adapters.ros import Trigger
-from rsea_ros.errors import RseaError
+from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
 from rsea_ros.nodes._bench import Bench
@@ -24,6 +25,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._realtime import HIGHEST, raise_priority, usual_priority
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -32,11 +34,12 @@ TABLE = (
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     Parameter("autostart", False, "whether to configure and activate at once"),
+    Parameter("realtime_priority", 0, "of the loop, SCHED_FIFO; 0: as any process", "", 0, HIGHEST),
     *MOTOR,
     *SENSOR,
     *LIMITS,
 )
-SWITCH_INTERVAL = 2e-4
+SWITCH_INTERVAL = 1e-5
 """s after which a thread of Python must let the cycle in; the default of 5 ms is longer than a cycle."""
 
 
@@ -71,7 +74,10 @@ class Driver(ManagedEntity):
         self._guarded.guard.clear()
         self._bench = Bench(self._node, strict=True, every_record=self._values["ft_all"])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
+        gc.collect()
+        gc.freeze()  # or a collection that looks at everything takes several cycles
         self._cycle.start()
+        self._hurry(self._cycle)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -99,8 +105,13 @@ class Driver(ManagedEntity):
     on_shutdown = on_error = on_cleanup
 
     def finished(self) -> bool:
-        """Tell of faults; go back to unconfigured when the cycle has ended with an exception."""
+        """Tell of faults; go back to unconfigured when the cycle has ended with an exception.
+
+        What the executor does next begins between two cycles.
+        """
         self._tell()
+        if self._cycle is not None:
+            self._cycle.rest()
         error = self._cycle.error if self._cycle is not None else None
         if error is not None:
             self._fail(error)
@@ -120,11 +131,21 @@ class Driver(ManagedEntity):
                 self._cycle.stop()
         finally:
             self._guarded.device.close()
+        if self._cycle is not None and self._values["realtime_priority"]:
+            usual_priority()
         if self._bench is not None:
             self._bench.close()
         if self._cycle is not None:
             self._node.get_logger().info("torque zero, device closed")
         self._cycle = self._bench = None
+
+    def _hurry(self, cycle: Cycle) -> None:
+        """Give the cycle the priority that was asked for; without it where it is not permitted."""
+        if priority := self._values["realtime_priority"]:
+            try:
+                raise_priority(cycle.thread, priority)
+            except ParameterError as error:
+                self._node.get_logger().warning(f"{error}; runs without")
 
     def _step(self, stamp: int) -> None:
         """Write the command that is in force from this cycle on (its stamp rounded), read, publish."""
@@ -184,6 +205,7 @@ class Driver(ManagedEntity):
     def _report(self) -> Report:
         if self._cycle is None or self._bench is None:
             return Report(ERROR if self._ended else OK, self._ended or "not configured", {})
+        self._cycle.rest()
         fault: Fault | None = self._guarded.fault
         report = self._bench.report(self._cycle)
         values = {

@@ -113,6 +113,8 @@ class Motor:
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
         size and cannot be taken for the new one.
         """
+        if self._supervisor is not None:
+            self._supervisor.beat()  # to wait for a reply that is lost is not to hang
         table = self._known
         start, size = table.sample
         begin = time.monotonic_ns()

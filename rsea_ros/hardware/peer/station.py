@@ -41,11 +41,13 @@ class Station:
                 self._bus.serve(now)
             if self._sensor.descriptor in ready:
                 self._sensor.serve(now)
-            self._sensor.tick(now)
+            advanced = self._sensor.tick(now)
             self._bus.flush(now)
             self._motor.serve(now)
-            if now >= self._tick:
+            if now >= self._tick and not advanced:
                 self._plant.read()
+                advanced = True
+            if advanced:
                 self._tick = now + TICK
             if self._requests.descriptor in ready and not self._requests.serve(now):
                 return
