@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -10,9 +11,9 @@ import numpy as np
 import rclpy
 from rclpy.qos import QoSProfile
 
-from msg_adapters.raw import RawReader
-from msg_adapters.topics import TYPES
+from msg_adapters.cdr import STAMP
 from rsea_ros.nodes._bench import Polled
+from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._waiter import Waiter
 from rsea_ros.signals import FloatArray
 
@@ -34,12 +35,13 @@ class Reception:
         subscription = self._node.create_subscription(
             kind, f"/rsea/{topic}", lambda message: None, qos, callback_group=Polled(), raw=True
         )
-        reader, delays = RawReader(TYPES.get(topic, TYPES["joint_states"]), ()), self._delays[topic]
+        delays = self._delays[topic]
 
         def take() -> None:
             while (waiting := subscription.handle.take_message(kind, True)) is not None:
                 raw, info = waiting
-                delays.append(info["received_timestamp"] - reader.read(raw)[0])
+                seconds, nanoseconds = struct.unpack_from("<iI", raw, STAMP)
+                delays.append(info["received_timestamp"] - seconds * SECOND - nanoseconds)
 
         waiter = Waiter(self._node, subscription, take, TICK)
         waiter.start()

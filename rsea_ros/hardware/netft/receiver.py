@@ -22,6 +22,8 @@ PAUSE = 0.01
 ASK_AGAIN = 0.2
 """s of silence after which the stream is asked for again."""
 KEPT = 4096
+STAMPING = 100
+"""Tries, of 1 ms each."""
 
 
 class Arrival(NamedTuple):
@@ -55,6 +57,7 @@ class Receiver:
             self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
             self._socket.connect(self._address)  # from nobody else
+            _until_stamped()
             self._socket.send(request(STREAM))
         except OSError as error:
             raise DeviceError(f"F/T sensor {self._address[0]}:{self._address[1]}: {error}") from None
@@ -122,6 +125,21 @@ class Receiver:
 
 SIZE_AND_MORE = 64
 """Bytes asked of the socket: more than a record, so that one which is too long is seen to be."""
+
+
+def _until_stamped() -> None:
+    """Wait until the kernel stamps what arrives: it begins some ms after it was asked to, and gives the time
+    of fetching until then. A datagram that is fetched a while after it was sent shows it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        probe.bind(("127.0.0.1", 0))
+        probe.connect(probe.getsockname())
+        for _ in range(STAMPING):
+            probe.send(b"")
+            sent = time.time_ns()
+            time.sleep(1e-3)
+            if _arrived(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
+                return
 
 
 def _arrived(ancillary: list[tuple[int, int, bytes]]) -> int:
