@@ -57,7 +57,7 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the path from start to end = free - gain * mean."""
     low, high = free - abs(gain), free + abs(gain)
-    end, from_start = min(max(start, low), high), _ln_cosh(start)
+    end, from_start = min(max(start, low), high), ln_cosh(start)
     for _ in range(40):
         mean, slope = _mean_sign(start, end, from_start)
         change = (end + gain * mean - free) / (1.0 + gain * slope)
@@ -70,16 +70,16 @@ def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
-    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: _ln_cosh(a)."""
+    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: ln_cosh(a)."""
     path = b - a
     if abs(path) < 1e-3:
         mean = math.tanh(0.5 * (a + b))
         return mean, 0.5 * (1.0 - mean * mean)
-    mean = (_ln_cosh(b) - from_a) / path
+    mean = (ln_cosh(b) - from_a) / path
     return mean, (math.tanh(b) - mean) / path
 
 
 @njit(inline="always")
-def _ln_cosh(x):  # type: ignore[no-untyped-def]
+def ln_cosh(x):  # type: ignore[no-untyped-def]
     """Return ln cosh x + ln 2, which no large x overflows."""
     return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))

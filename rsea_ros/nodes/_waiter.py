@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._realtime import exact_timers
 
 
 class Waiter:
@@ -45,6 +46,7 @@ class Waiter:
         return self._thread.is_alive()
 
     def _run(self) -> None:
+        exact_timers()
         try:
             context, subscription = self._context.handle, self._subscription.handle
             assert context is not None

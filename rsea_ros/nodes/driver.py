@@ -7,7 +7,6 @@ zero it and switch it off. A fault zeroes it until the service clear_fault or re
 
 from __future__ import annotations
 
-import gc
 import sys
 import threading
 import time
@@ -25,7 +24,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._parameters import Parameter
-from rsea_ros.nodes._realtime import HIGHEST, raise_priority, usual_priority
+from rsea_ros.nodes._realtime import HIGHEST, let_in_at_once, raise_priority, usual_priority
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -39,15 +38,12 @@ TABLE = (
     *SENSOR,
     *LIMITS,
 )
-SWITCH_INTERVAL = 1e-5
-"""s after which a thread of Python must let the cycle in; the default of 5 ms is longer than a cycle."""
 
 
 class Driver(ManagedEntity):
     """One device behind its limits, its cycle and its topics, from configure to cleanup."""
 
     def __init__(self, node: LifecycleNode, values: dict[str, Any]) -> None:
-        sys.setswitchinterval(SWITCH_INTERVAL)
         self._node, self._values = node, values
         self._guarded = Guarded(DEVICES[values["device"]](values), limits_of(values), values["rate"])
         self._cycle: Cycle | None = None
@@ -74,8 +70,7 @@ class Driver(ManagedEntity):
         self._guarded.guard.clear()
         self._bench = Bench(self._node, strict=True, every_record=self._values["ft_all"])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
-        gc.collect()
-        gc.freeze()  # or a collection that looks at everything takes several cycles
+        let_in_at_once()
         self._cycle.start()
         self._hurry(self._cycle)
         return TransitionCallbackReturn.SUCCESS
