@@ -51,8 +51,10 @@ class DynamixelNetft:
 
     def read(self) -> State:
         """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError."""
-        self._take_wrenches()
-        sample = self._motor.read()
+        try:
+            sample = self._motor.read()
+        finally:
+            self._take_wrenches()
         wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
         stamp, wrench = wrenches[-1] if wrenches else (0, None)
         self._last = State(
