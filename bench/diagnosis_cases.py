@@ -19,6 +19,7 @@ from independent.faults import FAULTS
 from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.signals import Record
 
 PAIRS = (
@@ -54,6 +55,11 @@ READINGS = (
     ("spring_hysteresis", {"torque": 1.2, "angle": 2.5e-3}, {"bouc_wen_beta": 0.5}),
     ("backlash", {"gap": 2.0e-3}, {"encoder_on_chassis": 1.0}),
     ("gear_compliance", {"stiffness": 2.2e3}, {"encoder_on_chassis": 0.0}),
+    (
+        "torque_ripple",
+        {"amplitude": 1.2, "cycles_per_revolution": 2.0 * np.pi / (502 * 0.011), "phase": 0.0},
+        {"ripple": 0.0, "cogging": 1.2, "cogging_period": 0.011},  # a wave of the output angle: the same law
+    ),
 )
 """Effect, its size, and values of the bench that make another sentence of the contract's row of it."""
 
@@ -70,11 +76,15 @@ class Case:
     group: str = "single"
     mimics: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a case is made from; group: single, pair, clean, off_catalogue, faulty or reading."""
+    """What a case is made from; without: effects that the diagnosis has to do without.
+
+    group: single, pair, clean, off_catalogue, taken_out, faulty or reading.
+    """
 
     name: str
     group: str
@@ -84,6 +94,7 @@ class Plan:
     values: Mapping[str, float] = field(default_factory=dict)
     off: tuple[str, float] | None = None
     faults: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
     duration: float = 60.0
 
     def bench(self) -> Bench:
@@ -105,12 +116,14 @@ class Plan:
             record = FAULTS[fault](record, rng)
         mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
         causes = tuple(self.hidden)
-        return Case(self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults)
+        return Case(
+            self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults, self.without
+        )
 
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
     """Return all cases that a seed makes, each with a seed of its own."""
-    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings)
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out)
     rng = np.random.default_rng(seed)
     return tuple(case for maker in makers for case in maker(rng))
 
@@ -149,6 +162,16 @@ def _off_catalogue(rng: np.random.Generator) -> Iterator[Plan]:
         for factor in (0.7, 1.4):
             off = (effect, factor * rng.uniform(0.9, 1.1))
             yield Plan(f"off-{effect}-{factor}", "off_catalogue", _seed(rng), _excitation(k), off=off)
+
+
+def _taken_out(rng: np.random.Generator) -> Iterator[Plan]:
+    """Every effect hidden, and taken out of the catalogue with all that are said to be confused with it."""
+    for k, (name, effect) in enumerate(catalogue().items()):
+        if name in SIZES:
+            kin = [n for n, e in catalogue().items() if name in e.claims.confusable_with]
+            without = (name, *dict.fromkeys([*effect.claims.confusable_with, *kin]))
+            hidden = {name: drawn_parameters(name, "medium", rng)}
+            yield Plan(f"taken_out-{name}", "taken_out", _seed(rng), _excitation(k), hidden, without=without)
 
 
 def _faulty(rng: np.random.Generator) -> Iterator[Plan]:

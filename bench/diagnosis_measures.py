@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from diagnosis_outcome import FLOOR, Found, Outcome
+from diagnosis_outcome import FLOOR, OUTSIDE, Found, Outcome
 from independent.hidden import CATALOGUE
 
 NOTHING, UNEXPLAINED, OFF = "nothing wrong", "unexplained", "not in the catalogue"
@@ -46,6 +46,9 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         ),
         _at_least(
             "the same, or an effect that looks alike, %", _lenient(groups.get("off_catalogue", ())), 90.0
+        ),
+        _at_least(
+            "unexplained, effect taken out of the catalogue, %", _right(groups.get("taken_out", ())), 90.0
         ),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
         _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
@@ -121,7 +124,7 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
     for o in outcomes:
         if o.group == "reading":
             continue
-        truths = o.truth or ((OFF,) if o.group == "off_catalogue" else (NOTHING,))
+        truths = o.truth or ((OFF,) if o.group in OUTSIDE else (NOTHING,))
         for truth in truths:
             rows.setdefault(truth, Counter())[_answer(o, truth)] += 1
     order = (*CATALOGUE, OFF, NOTHING)

@@ -18,6 +18,8 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
 ERROR = "error"
+OUTSIDE = ("off_catalogue", "taken_out")
+"""Groups whose effect the diagnosis cannot know."""
 FLOOR = 1.1
 """A held-out residual at most so many times the noise is at the noise floor."""
 
@@ -76,7 +78,7 @@ class Outcome:
             return False
         if self.group == "clean":
             return not self.named and self.verdict == "nothing_wrong"
-        if self.group == "off_catalogue":
+        if self.group in OUTSIDE:
             return not self.named and (self.verdict != "nothing_wrong" or bool(self.faults_found))
         return set(self.named[: max(len(self.truth), 1)]) == set(self.truth)
 
@@ -84,7 +86,7 @@ class Outcome:
     def right_or_rival(self) -> bool:
         """The same, when a cause that the first is said to be confusable with counts as well."""
         lenient = len(self.truth) == 1 and self.truth[0] in self.named[:1] + self.confusable
-        mimic = self.group == "off_catalogue" and set(self.named) <= set(self.mimics)
+        mimic = self.group in OUTSIDE and set(self.named) <= set(self.mimics)
         return self.right or (not self.error and (lenient or mimic))
 
 
@@ -92,7 +94,7 @@ def run_case(case: Case, rig_name: str = "paper_high_impedance") -> Outcome:
     """Diagnose a case and set the result beside the truth; an exception is an outcome too."""
     start = time.perf_counter()
     try:
-        diagnosis = diagnose([case.record], load_rig(rig_name))
+        diagnosis = diagnose([case.record], load_rig(rig_name), without=case.without)
     except Exception:
         told = traceback.format_exc(limit=-3)
         named = ()
@@ -107,7 +109,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
     return Outcome(
         name=case.name,
         group=case.group,
-        truth=tuple(case.truth_causes),
+        truth=() if case.group == "taken_out" else tuple(case.truth_causes),
         named=tuple(cause.name for cause in causes),
         verdict=diagnosis.verdict,
         confusable=tuple(causes[0].confusable_with) if causes else (),

@@ -69,4 +69,3 @@ def _calm(loop: Loop, service: str) -> None:
     if loop.guarded.fault is not None:
         loop.guarded.clear()
         _calm(loop, service)
-

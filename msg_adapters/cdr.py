@@ -17,9 +17,8 @@ import numpy.typing as npt
 
 from msg_adapters.topics import WRENCH
 from rsea_ros.errors import BagError
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import FloatArray, IntArray
 
-IntArray = npt.NDArray[np.int64]
 ByteMatrix = npt.NDArray[np.uint8]
 
 HEADER = 4

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from msg_adapters.cdr import IntArray
 from rsea_ros.errors import BagError
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

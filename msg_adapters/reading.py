@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from msg_adapters.bags import BagPath, read_contents
-from msg_adapters.cdr import Block, IntArray, blocks
+from msg_adapters.cdr import Block, blocks
 from msg_adapters.checks import Series, checked
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.topics import AXES, FIELDS, ROLES, TYPES, TopicMap
 from rsea_ros.errors import BagError
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 
 LATEST = 2**63 - 1
 """The highest stamp in ns that a 64-bit integer holds; a damaged log time may be higher."""

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import encoding
-from msg_adapters.cdr import IntArray
 from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap
 from msg_adapters.writing import BagWriter
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.signals import FloatArray, IntArray, Record
 
 JOINT = "joint"
 

@@ -12,6 +12,9 @@ import numpy.typing as npt
 from rsea_ros.errors import ChannelError
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+ComplexArray = npt.NDArray[np.complex128]
 
 UNITS: Mapping[str, str] = MappingProxyType(
     {

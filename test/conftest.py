@@ -1,4 +1,4 @@
-"""What every test shares: a ROS domain of its own for each worker, and reproducible examples."""
+"""What every test shares: its worker, a ROS domain of its own for each, and reproducible examples."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import tempfile
 from pathlib import Path
 
 import hypothesis
+import pytest
+from xdist.scheduler import LoadFileScheduling
 
 import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 
@@ -34,3 +36,37 @@ os.environ["ROS_DOMAIN_ID"] = str(_take_domain())
 
 # A background job of a shell ignores SIGINT, and so would every program that a test starts and interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+DEAREST = (
+    "diagnosis/test_hidden_effects", "cli/test_bad_input", "model/test_pure_torque", "cli/test_demo",
+    "diagnosis/test_puzzle", "nodes/test_driver_on_wire", "identification/test_identify", "nodes/test_loop",
+    "report/", "hardware/test_faults", "test_realdata", "nodes/test_controller", "nodes/test_model",
+    "nodes/test_identify_diagnosis", "nodes/test_parameters", "test_package", "cli/test_diagnose",
+)  # fmt: skip
+"""What takes longest, first, so that no worker is left with it at the end; what computes and what waits for
+nodes by turns, so that the cores are busy and the nodes are not late."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the dearest files first and leave the rest in its order."""
+
+    def place(item: pytest.Item) -> int:
+        found = (k for k, name in enumerate(DEAREST) if item.nodeid.startswith(f"test/{name}"))
+        return next(found, len(DEAREST))
+
+    items.sort(key=place)
+
+
+class OneWorker(LoadFileScheduling):
+    """Give a worker whole files, and those that share a diagnosis together."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "test/report" if nodeid.startswith("test/report/") else super()._split_scope(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> OneWorker | None:
+    """Hand the files out in the order of the collection, not by their number of tests."""
+    if config.option.dist != "loadfile":
+        return None
+    config.option.loadscopereorder = False
+    return OneWorker(config, log)

@@ -29,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
     add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
     add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG)")
+    add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help="effects not to try")
     add("--json", action="store_true", help="print diagnosis.json to stdout and nothing else")
     add(
         "--fail-on",
@@ -44,9 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Diagnose and write the results."""
-    from rsea_ros.diagnosis.diagnose import diagnose
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.diagnosis_files import write_diagnosis
 
     out = directory(args.out or Path("out") / f"diagnose-{Path(args.bags[0]).stem}")
     rig, topics = load_rig(args.rig), topic_map(args)
@@ -54,7 +53,12 @@ def run(args: argparse.Namespace) -> int:
         tell("reading", 0.0)
         records = [readable(bag, topics) for bag in args.bags]
         holdout = readable(args.holdout, topics) if args.holdout else None
-        result = diagnose(records, rig, holdout, tell)
+        from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
+        from rsea_ros.effects.catalogue import effect_named
+        from rsea_ros.report.diagnosis_files import write_diagnosis
+
+        without = [effect_named(name).name for name in args.without]
+        result = diagnose(records, rig, holdout, tell, without)
         report = write_diagnosis(result, records[0], out, write_overlay)
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")

@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from rsea_ros.effects._friction import ln_cosh
+from rsea_ros.effects._friction import ln_cosh_and_tanh
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
@@ -30,7 +30,7 @@ from rsea_ros.model.rig import Rig
 SMOOTHING = 0.3
 """Of K_s gap. A sharper crossing takes more torque than helps: of 0.15 to 1 the best for 3 to 30 N m."""
 
-_ln_cosh: Callable[[float], float] = ln_cosh.py_func
+_ln_cosh_and_tanh: Callable[[float], tuple[float, float]] = ln_cosh_and_tanh.py_func
 """Without its compiler: a controller that compiles in its first cycles is late."""
 
 COMPENSATED = ("coulomb_friction", "stribeck_friction", "torque_ripple", "backlash")
@@ -52,7 +52,8 @@ class Friction:
         change = (end - start) / self.creep
         if abs(change) < 1e-3:
             return size * math.tanh(middle / self.creep)
-        return size * (_ln_cosh(end / self.creep) - _ln_cosh(start / self.creep)) / change
+        over, under = (_ln_cosh_and_tanh(speed / self.creep)[0] for speed in (end, start))
+        return size * (over - under) / change
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from rsea_ros.control.sampled import FT, VELOCITY, responses, sampled
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
-from rsea_ros.model.response import ComplexArray, frequency_response
+from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ import numpy as np
 
 from rsea_ros.control.sampled import FT, Sampled, responses
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 ON_TORQUE = ("command_delay", "current_loop_lag", "torque_constant_error")
 ON_FT = ("ft_sensor_lag", "ft_gain_error")

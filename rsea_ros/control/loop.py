@@ -6,8 +6,7 @@ import numpy as np
 
 from rsea_ros.control.law import Law, State, feedback, hold
 from rsea_ros.control.sampled import FT, VELOCITY, Sampled, z_of
-from rsea_ros.model.response import ComplexArray
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from control import StateSpace
+from scipy.linalg import expm
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.model import outputs, transfer
+from rsea_ros.model import outputs, propagator
+from rsea_ros.model.equations import PORTS
 from rsea_ros.model.outputs import Output
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.model.transfer import read
+from rsea_ros.signals import ComplexArray, FloatArray
 
 FT, VELOCITY, POSITION = range(3)
 
@@ -39,10 +40,12 @@ def sampled(rig: Rig, rate: float) -> Sampled:
     position = outputs.position()
     velocity = Output(np.roll(position.c, 1, axis=0), position.d)
     wanted = (outputs.end_torque(rig, rig.ft_end), velocity, position)
-    systems = [transfer.state_space(rig, output) for output in wanted]
-    c = np.vstack([np.asarray(s.C) for s in systems])
-    held = StateSpace(systems[0].A, systems[0].B, c, np.zeros((3, 1))).sample(1.0 / rate, method="zoh")
-    return Sampled(np.asarray(held.A), np.asarray(held.B)[:, 0], c, 1.0 / rate)
+    system = propagator.state_space(rig)
+    n = len(system.a)
+    generator = np.zeros((n + 1, n + 1))
+    generator[:n] = np.column_stack([system.a, system.b[:, PORTS.index("gear")]])
+    held = expm(generator / rate)
+    return Sampled(held[:n, :n], held[:n, n], np.vstack([read(system, o)[0] for o in wanted]), 1.0 / rate)
 
 
 def check_controllable(rig: Rig) -> None:

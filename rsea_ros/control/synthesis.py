@@ -28,9 +28,8 @@ from rsea_ros.control.loop import largest_pole, open_loop
 from rsea_ros.control.margins import Margins, margins
 from rsea_ros.control.sampled import FT, Sampled, sampled
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 LOWEST = 0.2
 """Hz, where the grid of frequencies begins."""

@@ -17,9 +17,8 @@ from rsea_ros.control.large_signal import largest
 from rsea_ros.control.loads import LOCKED
 from rsea_ros.control.prediction import AHEAD
 from rsea_ros.control.synthesis import Design
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 HZ, AMPLITUDE = 5.0, 10.0
 SECONDS, SETTLE = 3.0, 1.0

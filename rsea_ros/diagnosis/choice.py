@@ -18,16 +18,17 @@ _FAR = 5.0
 """RMS of the residual over the noise, in the worst channel, above which a model is far from the floor."""
 _ROOM = 0.1
 """How much larger the residual of a simpler model may be there, for each parameter that it saves."""
-ENOUGH = 0.1
-"""Relative fall of a channel's residual that makes an effect a cause where the floor is not reached."""
+ENOUGH = {1: 0.1, 2: 0.3}
+"""Relative fall of a channel's residual that makes one effect, or two at once, causes above the floor."""
 
 
 def is_progress(model: Model, present: Model) -> bool:
-    """Tell whether a model is surely better, and by enough: a tenth of a channel's residual, or all of it."""
+    """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it."""
     if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
         return False
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
-    return fall > ENOUGH or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
+    added = len(model.causes) - len(present.causes)
+    return fall > ENOUGH[added] or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
 
 
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:
@@ -48,9 +49,7 @@ def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple
 
     simplest = min(contenders, key=order)
     rivals = tuple(
-        m
-        for m in contenders
-        if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
+        m for m in contenders if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
     )
     return simplest, rivals
 
@@ -60,10 +59,15 @@ def is_near(model: Model, best: Model) -> bool:
 
     There what is left is no noise, and more parameters always bend a model a little nearer to it.
     """
-    if max(best.choose.ratio(n) for n in best.choose.sums) < _FAR:
+    if not is_far(best):
         return False
     room = 1.0 + _ROOM * (best.size - model.size)
     return float(model.choose.loss(best.choose).sum()) < room**2 * float(best.choose.loss(best.choose).sum())
+
+
+def is_far(model: Model) -> bool:
+    """Tell whether a model is far from the floor in its worst channel."""
+    return max(model.choose.ratio(n) for n in model.choose.sums) >= _FAR
 
 
 def at_bound(solution: Solution) -> bool:

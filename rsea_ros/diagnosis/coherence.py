@@ -7,15 +7,11 @@ segments of mere noise it exceeds 1 - a^(1 / (K - 1)) with probability a (Carter
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy import signal
 
-from rsea_ros.identification.problem import BoolArray, Case
+from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
-ComplexArray = npt.NDArray[np.complex128]
+from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
 
 _FALSE_ALARM = 0.01
 _CLEAR = 0.3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -16,13 +17,13 @@ from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.sentences import coherence_lost, evidence_of, verdict_sentence
-from rsea_ros.diagnosis.split import JUDGE, Score, part, score
+from rsea_ros.diagnosis.split import JUDGE, Score, score_on
 from rsea_ros.diagnosis.stages import Stage
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.verdict import reached, verdict_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import confidence_of, what_is_not_told
+from rsea_ros.identification.confidence import what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
@@ -37,8 +38,14 @@ PRIMARY = ("ft", "position", "motor_torque")
 
 
 def conclusion(
-    found: Search, stages: list[Stage], checked: Sequence[Checked], records: Sequence[Record], rig: Rig
+    found: Search,
+    stages: list[Stage],
+    checked: Sequence[Checked],
+    records: Sequence[Record],
+    rig: Rig,
+    pool: Executor,
 ) -> Diagnosis:
+    """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
     channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
     if channel is None:
         raise IdentificationError(
@@ -50,8 +57,9 @@ def conclusion(
     first, last = stages[0], stages[-1]
     causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
     named = {c.name for c in causes}
-    rejected = [_rejected(t, found.cases, channel) for t in _latest(found.trials) if t.name not in named]
-    confidence, case = confidence_of(first.solution), found.cases[0]
+    others = [t for t in _latest(found.trials) if t.name not in named]
+    rejected = pool.map(lambda t: _rejected(t, found.cases, channel), others)
+    case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)
     return Diagnosis(
@@ -64,9 +72,9 @@ def conclusion(
         duration=sum(r.stop - r.start for r in records),
         rate=records[0]["command"].rate,
         faults=faults,
-        baseline_rig=identified_rig(first.solution, confidence),
-        baseline=parameters_of(first.solution, confidence),
-        extended_rig=identified_rig(last.solution, confidence_of(last.solution)),
+        baseline_rig=identified_rig(first.solution, first.confidence),
+        baseline=parameters_of(first.solution, first.confidence),
+        extended_rig=identified_rig(last.solution, last.confidence),
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.judged, case),
         fit_percent=_fit(first, found.cases),
@@ -83,7 +91,7 @@ def conclusion(
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
         statements=(
-            *what_is_not_told(first.solution.problem.unknowns, confidence),
+            *what_is_not_told(first.solution.problem.unknowns, first.confidence),
             *coherence_lost(lost_above(case, channel), channel),
         ),
     )
@@ -104,7 +112,7 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     train, _ = gain(with_it.train, without.train, speaks)
     estimates = {
         p.name.split(".")[1]: p
-        for p in parameters_of(last.solution, confidence_of(last.solution))
+        for p in parameters_of(last.solution, last.confidence)
         if p.name.startswith(effect.name + ".")
     }
     return Cause(
@@ -160,10 +168,9 @@ def _latest(trials: Sequence[Trial]) -> list[Trial]:
 
 def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
     """Return a trial with its gain, on data that judge, over the model that it was tried beside."""
-    judges = tuple(part(c, JUDGE) for c in cases)
     problem = replace(trial.problem, cases=cases)
-    with_it = score(problem, judges, problem.outputs(trial.theta))
-    without = score(problem, judges, trial.beside.outputs)
+    with_it = score_on(problem, cases, JUDGE, problem.outputs(trial.theta))
+    without = score_on(problem, cases, JUDGE, trial.beside.outputs)
     return Rejected(trial.name, gain(with_it, without, channel)[0], trial.why)
 
 

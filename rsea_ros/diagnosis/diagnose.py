@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from rsea_ros.diagnosis.conclusion import conclusion
@@ -11,21 +11,26 @@ from rsea_ros.diagnosis.pruning import pruned
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.search import search
 from rsea_ros.diagnosis.stages import judged
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
-
-Progress = Callable[[str, float], None]
 
 
 def diagnose(
-    records: Sequence[Record], rig: Rig, holdout: Record | None = None, progress: Progress | None = None
+    records: Sequence[Record],
+    rig: Rig,
+    holdout: Record | None = None,
+    progress: Progress | None = None,
+    without: Collection[str] = (),
 ) -> Diagnosis:
     """Say where a rig's simulation and the records part, why, and what extending the model gains.
 
     holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
+    without: effects of the catalogue that are not to be tried.
     Raises IdentificationError when the records do not hold what the rig needs.
     """
     tell = progress or (lambda step, share: None)
@@ -35,13 +40,14 @@ def diagnose(
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
+    effects = [e for name, e in catalogue().items() if name not in without]
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        found = search(cases, nominal, pool, tell)
+        found = search(cases, nominal, effects, pool, tell)
         tell("looking for a simpler model", 0.9)
-        found = pruned(found, pool)
+        found = pruned(found, effects, pool)
         tell("judging", 0.95)
         stages = list(pool.map(lambda m: judged(found, m, judging, rig), found.models))
-    return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig)
+        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, pool)
 
 
 def nominal_rig(rig: Rig) -> Rig:

@@ -12,9 +12,8 @@ import numpy as np
 
 from rsea_ros.diagnosis.clock import repair_clock
 from rsea_ros.diagnosis.result import Fault
-from rsea_ros.identification.problem import BoolArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 
 _AROUND = 10
 _SPIKE = 12.0

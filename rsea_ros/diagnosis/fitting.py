@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score
+from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Case, Problem, weights_of
 from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import CLOCK
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
 """RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
 DELAY = "command_delay.delay"
 _ITERATIONS = 12
+SEARCH_GAIN = 2e-4
+"""Relative fall of the cost below which a fit of the search is done; what is accepted is fitted further."""
+_FARTHEST = 20.0
+"""RMS of the residual over the noise up to which that gain grows with it: there small falls mean nothing."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +61,40 @@ def fitted(
     places: tuple[int, ...] = FIT,
     iterations: int = _ITERATIONS,
     weights: Score | None = None,
+    gain: float | None = None,
+    near: Solution | None = None,
 ) -> Model:
-    """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise."""
-    masked = replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
-    solution = solve(masked, theta, iterations=iterations)
+    """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise.
+
+    near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
+    """
+    masked = on_places(problem, cases, places, weights)
+    fit = partial(solve, masked, iterations=iterations, gain=gain or SEARCH_GAIN * _distance(weights))
+    solution = fit(theta, matrix=None if near is None else _reweighted(near, masked))
     moved = with_common_clock_in_delay(solution)
     if moved is not None:
-        again = solve(masked, moved, iterations=iterations)
-        solution = min(solution, again, key=lambda s: s.cost)
+        solution = min(solution, fit(moved), key=lambda s: s.cost)
     return as_model(cases, solution)
+
+
+def _distance(weights: Score | None) -> float:
+    """Return the RMS of a residual over the noise in its worst channel, at least 1."""
+    ratios = [] if weights is None else [weights.ratio(n) for n in weights.sums]
+    return min(max([1.0, *ratios]), _FARTHEST)
+
+
+def on_places(
+    problem: Problem, cases: Sequence[Case], places: tuple[int, ...], weights: Score | None
+) -> Problem:
+    """Return a problem on some blocks of the cases. weights: a score whose misfit counts as noise."""
+    return replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
+
+
+def _reweighted(solution: Solution, problem: Problem) -> FloatArray:
+    """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
+    new, old = (weights_of(p.cases, p.channels) for p in (problem, solution.problem))
+    result: FloatArray = solution.jacobian * (new / old)[:, None]
+    return result
 
 
 def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
@@ -75,7 +104,7 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     rest in the clocks. None for a model without a delay.
     """
     names = [u.name for u in solution.problem.unknowns]
-    clocks = [i for i, n in enumerate(names) if n.startswith(CLOCK + ".")]
+    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock]
     if DELAY not in names or not clocks:
         return None
     theta = solution.theta.copy()
@@ -96,21 +125,22 @@ def heavier(case: Case, weights: Score | None) -> Case:
 def as_model(cases: Sequence[Case], solution: Solution) -> Model:
     """Return a solution with its outputs and its score on the blocks that choose."""
     outputs = solution.problem.outputs(solution.theta)
-    return Model(solution, outputs, score(solution.problem, tuple(part(c, CHOOSE) for c in cases), outputs))
+    return Model(solution, outputs, score_on(solution.problem, cases, CHOOSE, outputs))
 
 
 def refitted(cases: Sequence[Case], model: Model) -> Model:
     """Fit a model again with each channel in units of what the model leaves of it."""
-    return fitted(cases, model.solution.problem, model.solution.theta, weights=rescored(cases, model).choose)
+    there = model.solution
+    return fitted(cases, there.problem, there.theta, weights=rescored(cases, model).choose, near=there)
 
 
 def rescored(cases: Sequence[Case], model: Model) -> Model:
     """Return the model with its score against the cases' present noise."""
     problem = replace(model.solution.problem, cases=tuple(part(c, FIT) for c in cases))
     return Model(
-        replace(model.solution, problem=problem),
+        replace(model.solution, problem=problem, jacobian=_reweighted(model.solution, problem)),
         model.outputs,
-        score(problem, tuple(part(c, CHOOSE) for c in cases), model.outputs),
+        score_on(problem, cases, CHOOSE, model.outputs),
     )
 
 
@@ -134,5 +164,5 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:
     """Tell whether the residual of every channel is noise, on all blocks but those that judge."""
-    standing = score(model.solution.problem, tuple(part(c, (*FIT, *CHOOSE)) for c in cases), model.outputs)
+    standing = score_on(model.solution.problem, cases, (*FIT, *CHOOSE), model.outputs)
     return standing.missed == 0.0 and all(standing.ratio(n) < AT_FLOOR for n in standing.sums)

@@ -13,10 +13,12 @@ from scipy import signal
 
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
+STIFFNESS = "spring.stiffness"
 _PEAKS = 2
 _GAPS = (0.1, 0.3, 0.6)
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
@@ -27,7 +29,7 @@ _CYCLES = np.arange(0.5, 60.0, 0.125)
 
 
 def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]) -> list[dict[str, float]]:
-    """Return the parameters from which fits of an effect begin."""
+    """Return from where fits of an effect begin: its parameters, and values of the rig that go with them."""
     starts = [dict(effect.typical)]
     for p in effect.parameters:
         alternatives = list(p.starts) + (
@@ -39,7 +41,7 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         return [{**effect.typical, **hint} for hint in _cycle_hints(case, rig)]
     if "gap" in names and "position" in case.measured:
         travel = float(np.ptp(case.measured["position"]))
-        return starts + [{**effect.typical, "gap": share * travel} for share in _GAPS]
+        return starts + [{**effect.typical, **hint} for hint in _gap_hints(travel, rig)]
     if "limit" in names:
         return [{**effect.typical, "limit": limit} for limit in _limit_hints(case)] or starts
     if {"stiffness", "inertia"} <= set(names):
@@ -50,6 +52,14 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         hints = _line_hints(case, channel, outputs[channel], names, frequency, effect)
         return [{**effect.typical, **hint} for hint in hints] or starts
     return starts
+
+
+def _gap_hints(travel: float, rig: Rig) -> list[dict[str, float]]:
+    """Return gaps that are shares of the travel, rad; a spring nearly unknown is as much stiffer then."""
+    hints = [{"gap": share * travel} for share in _GAPS]
+    if rig.rigid_spring or rig.spread(STIFFNESS) <= WELL_KNOWN:
+        return hints
+    return hints + [{"gap": share * travel, STIFFNESS: rig[STIFFNESS] / (1.0 - share)} for share in _GAPS]
 
 
 def _limit_hints(case: Case) -> list[float]:
@@ -74,7 +84,7 @@ def _mode_hints(
         {
             **effect.typical,
             "stiffness": k,
-            "inertia": (k + rig["spring.stiffness"]) / (2.0 * math.pi * peak["frequency"]) ** 2,
+            "inertia": (k + rig[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
         }
         for k in (*stiffness.starts[:1], stiffness.typical)
         for peak in peaks
@@ -166,11 +176,7 @@ def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None
         if "velocity" in case.measured
         else np.gradient(q, t)
     )
-    load = (
-        np.interp(t, case.t["ft"], case.measured["ft"])
-        if "ft" in case.measured
-        else rig["spring.stiffness"] * q
-    )
+    load = np.interp(t, case.t["ft"], case.measured["ft"]) if "ft" in case.measured else rig[STIFFNESS] * q
     acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
     steps = np.clip(((t[1:-1] - case.start) / case.drive.step).astype(int), 0, len(case.drive.command) - 1)
     width = max(1, round(float(np.median(np.diff(t))) / case.drive.step))

@@ -7,7 +7,7 @@ too sharp for that: near it the nominal values need derivatives of their own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,17 +44,31 @@ def extended_problem(present: Problem, effect: Effect, start: dict[str, float]) 
 
 
 def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
-    """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have."""
-    try_start = _with_new_derivatives if is_mode(effect) else _from_start
+    """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have.
+
+    A start may also name values of the rig, which begin there then: no longer where the derivatives are.
+    """
     best: Hypothesis | None = None
     for start in starts:
+        own = {name: value for name, value in start.items() if "." not in name}
+        there = moved(present, {name: value for name, value in start.items() if "." in name})
+        try_start = _with_new_derivatives if is_mode(effect) or there is not present else _from_start
         try:
-            tried = try_start(present, effect, start)
+            tried = try_start(there, effect, own)
         except RseaError:
             continue
-        if best is None or tried.cost < best.cost:
+        if tried is not None and (best is None or tried.cost < best.cost):
             best = tried
     return best
+
+
+def moved(present: Solution, values: Mapping[str, float]) -> Solution:
+    """Return a solution with some of its unknowns at other values; itself when there are none to move."""
+    theta = present.theta.copy()
+    for i, unknown in enumerate(present.problem.unknowns):
+        if unknown.name in values:
+            theta[i] = unknown.inner(values[unknown.name])
+    return present if (theta == present.theta).all() else replace(present, theta=theta)
 
 
 def is_mode(effect: Effect) -> bool:
@@ -69,7 +83,8 @@ def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, fl
     return Hypothesis(effect, problem, solution.theta, solution.cost)
 
 
-def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:
+def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis | None:
+    """Return where two steps lead; None for an effect that no channel shows there."""
     problem = extended_problem(present.problem, effect, start)
     n = len(present.theta)
     prior = np.array([1.0 / u.doubt for u in problem.unknowns])
@@ -77,6 +92,8 @@ def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> H
     theta = np.concatenate([present.theta, centre[n:]])
     residual = problem.residual(theta)
     own = jacobian_columns(problem, theta, residual, range(n, len(theta)))
+    if not own.any():
+        return None
     matrix = np.column_stack([present.jacobian, own])
     normal = matrix.T @ matrix + np.diag(prior**2)
     normal += np.diag(1e-6 * np.diag(normal) + 1e-12)

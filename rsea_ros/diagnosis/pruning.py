@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -14,55 +14,78 @@ from rsea_ros.diagnosis.hypothesise import extended_problem
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
-from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import start_vector
 
 
-def pruned(found: Search, pool: Executor) -> Search:
+def pruned(found: Search, effects: Sequence[Effect], pool: Executor) -> Search:
     """Return the search with no cause more than the data need, and its models as they nest."""
-    return sequenced(with_simpler(without_needless(found)), pool)
+    smaller = Smaller(found.cases, effects, pool)
+    return sequenced(with_simpler(without_needless(found, smaller), smaller), smaller)
 
 
-def without_needless(found: Search) -> Search:
+@dataclass(frozen=True)
+class Smaller:
+    """Fits models again without one of their causes, or with another in its place; each only once."""
+
+    cases: tuple[Case, ...]
+    effects: Sequence[Effect]
+    pool: Executor
+    known: dict[tuple[str, ...], dict[str, Model]] = field(default_factory=dict)
+
+    def without(self, model: Model) -> dict[str, Model]:
+        """Return by cause the model without it."""
+        if model.causes not in self.known:
+            found = self.pool.map(partial(_changed, self.cases, model), model.causes)
+            self.known[model.causes] = dict(zip(model.causes, found, strict=True))
+        return self.known[model.causes]
+
+    def with_simpler(self, model: Model) -> list[tuple[str, str, Model]]:
+        """Return cause, simpler effect that it is said to be confused with, and the model with that."""
+        pairs = [
+            (name, rival)
+            for name in model.causes
+            for rival in self._taken_for(name)
+            if rival not in model.causes and effect_size(rival) < effect_size(name)
+        ]
+        found = self.pool.map(lambda pair: _changed(self.cases, model, *pair), pairs)
+        return [(*pair, simpler) for pair, simpler in zip(pairs, found, strict=True)]
+
+    def _taken_for(self, name: str) -> list[str]:
+        """Return the effects that are said to be confused with one, from either side."""
+        own = effect_named(name).claims.confusable_with
+        return [e.name for e in self.effects if e.name in own or name in e.claims.confusable_with]
+
+
+def without_needless(found: Search, smaller: Smaller) -> Search:
     """Take out every accepted cause without which the others do as well."""
     last = found.last
-    for name in last.causes if len(last.causes) > 1 else ():
-        smaller = _changed(found.cases, last, name)
-        if not compare(last.choose, smaller.choose, last.parameters - smaller.parameters).better:
-            trial = trial_of(last, name, smaller, "not needed beside the other causes")
-            return without_needless(_replaced(found, smaller, trial))
+    for name, rest in smaller.without(last).items() if len(last.causes) > 1 else ():
+        if not compare(last.choose, rest.choose, last.parameters - rest.parameters).better:
+            trial = trial_of(last, name, rest, "not needed beside the other causes")
+            return without_needless(_replaced(found, rest, trial), smaller)
     return found
 
 
-def with_simpler(found: Search) -> Search:
+def with_simpler(found: Search, smaller: Smaller) -> Search:
     """Put in a cause's place the simpler ones that it is said to be confused with, where they do as well."""
     last = found.last
-    for name in last.causes:
-        size = effect_size(name)
-        for rival in _taken_for(name):
-            if rival in last.causes or effect_size(rival) >= size:
-                continue
-            simpler = _changed(found.cases, last, name, rival)
-            if not compare(last.choose, simpler.choose, last.parameters - simpler.parameters).better:
-                without, why = _changed(found.cases, last, name), f"no better than {rival}, which is simpler"
-                return with_simpler(_replaced(found, simpler, trial_of(last, name, without, why)))
+    for name, rival, simpler in smaller.with_simpler(last):
+        if not compare(last.choose, simpler.choose, last.parameters - simpler.parameters).better:
+            without, why = smaller.without(last)[name], f"no better than {rival}, which is simpler"
+            return with_simpler(_replaced(found, simpler, trial_of(last, name, without, why)), smaller)
     return found
 
 
-def _taken_for(name: str) -> list[str]:
-    """Return the effects that are said to be confused with one, from either side."""
-    own = effect_named(name).claims.confusable_with
-    return [n for n, e in catalogue().items() if n in own or name in e.claims.confusable_with]
-
-
-def sequenced(found: Search, pool: Executor) -> Search:
+def sequenced(found: Search, smaller: Smaller) -> Search:
     """Return the search with its models as they nest: from all causes back, what tells least goes first."""
     models = [found.last]
     while len(models[-1].causes) > 1:
         largest = models[-1]
-        smaller = pool.map(partial(_changed, found.cases, largest), largest.causes)
-        models.append(min(smaller, key=lambda m: float(m.choose.loss(largest.choose).sum())))
+        rests = smaller.without(largest).values()
+        models.append(min(rests, key=lambda m: float(m.choose.loss(largest.choose).sum())))
     nominal = [found.models[0]] if found.last.causes else []
     return replace(found, models=(*nominal, *_in_order(list(reversed(models)))))
 

@@ -10,61 +10,79 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import choose, is_progress, loss_excess
-from rsea_ros.diagnosis.fitting import Model, fitted, heavier, refitted
+from rsea_ros.diagnosis.choice import choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
 from rsea_ros.diagnosis.hints import starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
+from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
-from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import CLOCK
+from rsea_ros.identification.solver import Solution, jacobian, solve
+from rsea_ros.identification.unknowns import apply, start_vector
+from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
-MOST_CAUSES = 4
 _FITS_ON_PIECES = 9
 _FULL_FITS = 3
 _CLOSE = 1.1
 """Of the best cost on pieces: so close an effect is fitted to everything too."""
+_HOPE = {1: 0.98, 2: 0.9}
+"""Of the present cost on pieces, far from the floor: above it, one or two effects cannot be progress."""
+_MOVED = 0.02
+"""Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
+_PAIRED = 3
 _PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 
 
-class Tell(Protocol):
-    """Hears what is being tried and which share of the work is done, 0 … 1."""
-
-    def __call__(self, step: str, share: float, /) -> None:
-        """Hear it."""
-
-
 @dataclass(frozen=True)
 class Round:
-    """What a round starts from: every sample of the cases, and the model so far."""
+    """What a round starts from: every sample of the cases, the effects to try, and the model so far."""
 
     cases: tuple[Case, ...]
+    effects: Sequence[Effect]
     present: Model
     number: int
     pool: Executor
-    tell: Tell
+    tell: Progress
 
     def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
         """Return the model to accept, all other trials, and the models that do as well as it."""
-        screened = self._screened()
+        screened = self._screened(self.on_pieces)
         finalists = self._finalists(screened)
         models = list(self.pool.map(self._fit_all, finalists))
         better = [m for m in models if is_progress(m, self.present)]
+        if not better and is_far(self.present):
+            better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
         chosen, equals = choose(better, self.present.choose)
         final = {h.name for h in finalists}
         trials = [self._far_behind(h) for h in screened if h.name not in final]
         trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
         return chosen, trials, equals
+
+    def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
+        """Return models with two more effects, for where none helps alone: each of some with every other."""
+        close = []
+        for first in firsts[:_PAIRED]:
+            seconds = self._screened(self._unfitted(first.effect))[:_PAIRED]
+            close += list(self.pool.map(self._fit_pieces, seconds))
+        best = sorted((h for h in close if h.cost < _HOPE[2] * self.on_pieces.cost), key=lambda h: h.cost)
+        return list(self.pool.map(self._fit_all, best[:2]))
+
+    def _unfitted(self, effect: Effect) -> Solution:
+        """Return the present model on the pieces with an effect of typical size, as it stands."""
+        there = self.on_pieces
+        problem = extended_problem(there.problem, effect, dict(effect.typical))
+        theta = np.concatenate([there.theta, start_vector(problem.unknowns)[len(there.theta) :]])
+        residual = problem.residual(theta)
+        matrix = jacobian(problem, theta, residual)
+        return Solution(problem, theta, residual, matrix, float(residual @ residual))
 
     @cached_property
     def on_pieces(self) -> Solution:
@@ -75,10 +93,10 @@ class Round:
         problem, theta = without_clocks(replace(solution.problem, cases=pieces), solution.theta)
         return solve(problem, theta, iterations=_PRESENT_ITERATIONS)
 
-    def _screened(self) -> list[Hypothesis]:
-        """Return what two cheap steps of every effect reach, best first."""
-        effects = [e for n, e in catalogue().items() if n not in self.present.causes]
-        there = self.on_pieces
+    def _screened(self, there: Solution) -> list[Hypothesis]:
+        """Return what two cheap steps of every other effect reach beside a solution, best first."""
+        acting = {e.name for e in there.problem.rig.effects}
+        effects = [e for e in self.effects if e.name not in acting]
 
         def screen_one(i: int) -> Hypothesis | None:
             self._say(effects[i].name, 0.4 * i / len(effects))
@@ -88,7 +106,9 @@ class Round:
         return sorted(found, key=lambda h: h.cost)
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
-        return starts_of(effect, self.cases[0], self.present.solution.problem.rig, self.present.outputs[0])
+        there = self.present.solution
+        rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
+        return starts_of(effect, self.cases[0], rig, self.present.outputs[0])
 
     def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return the best on pieces, and what is said to be confused with the very best."""
@@ -97,6 +117,8 @@ class Round:
         if not close:
             return []
         best, rivals = close[0].cost, close[0].effect.claims.confusable_with
+        if is_far(self.present):
+            close = [h for h in close if h.cost < _HOPE[1] * self.on_pieces.cost] or close[:1]
         near = close[:_FULL_FITS] + [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
         heard = {h.name for h in near}
         fitted_on_pieces = {h.name for h in close}
@@ -112,10 +134,31 @@ class Round:
 
     def _fit_all(self, h: Hypothesis) -> Model:
         self._say(f"fitting {h.name} on everything", 0.8)
-        first = fitted(
-            self.cases, *self._with_clocks(h), iterations=_FULL_ITERATIONS, weights=self.present.choose
+        weights = self.present.choose
+        problem, theta = self._with_clocks(h)
+        masked = on_places(problem, self.cases, FIT, weights)
+        start = min(self._starts_of_all(theta), key=lambda t: float(np.sum(masked.residual(t) ** 2)))
+        first = fitted(self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights)
+        return refitted(self.cases, first) if self._has_moved(first) else first
+
+    def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:
+        """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.
+
+        The pieces were fitted without clocks: what these do, other values have taken over there.
+        """
+        there = self.present.solution
+        clocks = sum(u.is_clock for u in there.problem.unknowns)
+        own = theta[len(there.theta) - clocks : len(theta) - clocks]
+        values, moved = np.split(there.theta, [len(there.theta) - clocks])
+        return [theta, np.concatenate([values, own, moved])]
+
+    def _has_moved(self, model: Model) -> bool:
+        """Tell whether a model leaves so much more or less of a channel than the present one, its weight."""
+        channels = model.choose.sums
+        now, before = (
+            np.array([max(s.ratio(n), 1.0) for n in channels]) for s in (model.choose, self.present.choose)
         )
-        return refitted(self.cases, first)
+        return bool(np.any(np.abs(now / before - 1.0) > _MOVED))
 
     def _with_clocks(self, h: Hypothesis) -> tuple[Problem, FloatArray]:
         return with_clocks(replace(h.problem, cases=self.cases), h.theta, self.present.solution.problem)
@@ -147,13 +190,12 @@ def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatA
 
     Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
     """
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(CLOCK + ".")]
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
     return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
 def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
     """Return a problem and its theta with the clocks of another problem free again, at zero."""
-    clocks = tuple(u for u in model.unknowns if u.name.startswith(CLOCK + "."))
-    return replace(problem, unknowns=(*problem.unknowns, *clocks)), np.concatenate(
-        [theta, np.zeros(len(clocks))]
-    )
+    clocks = tuple(u for u in model.unknowns if u.is_clock)
+    larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
+    return larger, np.concatenate([theta, np.zeros(len(clocks))])

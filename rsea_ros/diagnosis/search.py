@@ -5,16 +5,19 @@ A model is fitted on FIT blocks and chosen on CHOOSE blocks; JUDGE blocks are no
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, refitted, requieted, rescored
-from rsea_ros.diagnosis.rounds import MOST_CAUSES, Round, Tell
+from rsea_ros.diagnosis.rounds import Round
 from rsea_ros.diagnosis.trial import Trial
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.progress import Progress
 
 _FIRST_ITERATIONS = 25
+_MOST_CAUSES = 4
 
 
 @dataclass(frozen=True)
@@ -35,17 +38,19 @@ class Search:
         return self.models[-1]
 
 
-def search(cases: tuple[Case, ...], nominal: Problem, pool: Executor, tell: Tell) -> Search:
-    """Find the causes, most telling first. tell: progress (what is being tried, share done)."""
+def search(
+    cases: tuple[Case, ...], nominal: Problem, effects: Sequence[Effect], pool: Executor, tell: Progress
+) -> Search:
+    """Find the causes among some effects, most telling first."""
     models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS)]
     cases = requieted(cases, models[0])
     models = [refitted(cases, models[0])]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
-    for number in range(MOST_CAUSES):
+    for number in range(_MOST_CAUSES):
         if at_floor(models[-1], cases):
             break
-        accepted, tried, rivals = Round(cases, models[-1], number, pool, tell).play()
+        accepted, tried, rivals = Round(cases, effects, models[-1], number, pool, tell).play()
         trials += tried
         if accepted is None:
             break

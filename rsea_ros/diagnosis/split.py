@@ -7,16 +7,14 @@ With a held-out bag all of that judges instead.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.diagnosis.coherence import missed_response
-from rsea_ros.identification.problem import BoolArray, Case, Problem
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
 _LONGEST, _SHORTEST = 1.0, 0.25
 """s. Longer than the bench remembers, short enough that every part of a sweep is in every set."""
@@ -81,6 +79,13 @@ class Score:
     def ratio(self, channel: str) -> float:
         """RMS of the residual over the noise of a channel."""
         return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))
+
+
+def score_on(
+    problem: Problem, cases: Sequence[Case], places: tuple[int, ...], outputs: list[dict[str, FloatArray]]
+) -> Score:
+    """Return the score of simulated outputs on some of the blocks of `cases`."""
+    return score(problem, tuple(part(c, places) for c in cases), outputs)
 
 
 def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, FloatArray]]) -> Score:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from rsea_ros.diagnosis.faults import Checked
 from rsea_ros.diagnosis.fitting import Model, fitted, rescored
 from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, part, score
+from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, score, score_on
+from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
+
+_GAIN = 1e-6
+"""Relative fall of the cost below which a fit is done."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +30,23 @@ class Stage:
     train: Score
     judged: Score
 
+    @cached_property
+    def confidence(self) -> Confidence:
+        """How sure the fit is."""
+        return confidence_of(self.solution)
+
 
 def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> Stage:
     """Re-fit a model on all that does not judge, and judge it."""
     start, weights = chosen.solution, rescored(found.cases, chosen).choose
-    model = fitted(found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights)
+    model = fitted(
+        found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights, gain=_GAIN
+    )
     problem = model.solution.problem
-    train = score(problem, tuple(part(c, (*FIT, *CHOOSE)) for c in found.cases), model.outputs)
+    train = score_on(problem, found.cases, (*FIT, *CHOOSE), model.outputs)
     if judging is None:
-        judges = tuple(part(c, JUDGE) for c in found.cases)
-        return Stage(model.solution, model.outputs, train, score(problem, judges, model.outputs))
+        on_judge = score_on(problem, found.cases, JUDGE, model.outputs)
+        return Stage(model.solution, model.outputs, train, on_judge)
     case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
     moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
     moved = in_phase(moved, judging.record)

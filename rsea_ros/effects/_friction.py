@@ -57,11 +57,11 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the path from start to end = free - gain * mean."""
     low, high = free - abs(gain), free + abs(gain)
-    end, from_start = min(max(start, low), high), ln_cosh(start)
+    end, from_start = min(max(start, low), high), ln_cosh_and_tanh(start)[0]
     for _ in range(40):
         mean, slope = _mean_sign(start, end, from_start)
         change = (end + gain * mean - free) / (1.0 + gain * slope)
-        if abs(change) < 1e-5:
+        if abs(change) < 1e-4:
             break
         low, high = (low, end) if change > 0.0 else (end, high)
         end = end - change if low < end - change < high else 0.5 * (low + high)
@@ -70,16 +70,18 @@ def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
-    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: ln_cosh(a)."""
+    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: ln cosh(a)."""
     path = b - a
     if abs(path) < 1e-3:
         mean = math.tanh(0.5 * (a + b))
         return mean, 0.5 * (1.0 - mean * mean)
-    mean = (ln_cosh(b) - from_a) / path
-    return mean, (math.tanh(b) - mean) / path
+    from_b, at_b = ln_cosh_and_tanh(b)
+    mean = (from_b - from_a) / path
+    return mean, (at_b - mean) / path
 
 
 @njit(inline="always")
-def ln_cosh(x):  # type: ignore[no-untyped-def]
-    """Return ln cosh x + ln 2, which no large x overflows."""
-    return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))
+def ln_cosh_and_tanh(x):  # type: ignore[no-untyped-def]
+    """Return ln cosh x + ln 2, which no large x overflows, and tanh x, of one exponential."""
+    small = math.exp(-2.0 * abs(x))
+    return abs(x) + math.log1p(small), math.copysign((1.0 - small) / (1.0 + small), x)

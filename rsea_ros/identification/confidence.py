@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, central_jacobian
-from rsea_ros.identification.unknowns import CLOCK, Unknown
+from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import FIELDS
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import FloatArray, IntArray
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
@@ -115,7 +112,7 @@ def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tup
     prior's: a common factor of several values cannot be told, only their ratios, or a single value not.
     """
     theta = confidence.theta
-    asked = [i for i, u in enumerate(unknowns) if not u.name.startswith(CLOCK)]
+    asked = [i for i, u in enumerate(unknowns) if not u.is_clock]
     stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
     index = [i for i in asked if i not in stuck]
     sentences = [_bound_sentence(unknowns[i], float(theta[i])) for i in stuck]

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import FloatArray, IntArray
 
 NYQUIST_SHARE = 0.95
 """No excitation goes above this share of half the sample rate."""

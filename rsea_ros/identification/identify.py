@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -28,9 +28,9 @@ from rsea_ros.identification.unknowns import (
 )
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
-Progress = Callable[[str, float], None]
 CHANNELS = ("ft", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.identification.result import ComplexArray
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,8 @@ import numpy as np
 from scipy.fft import rfft
 
 from rsea_ros.identification.lines import Lines, detrended, widened
-from rsea_ros.identification.resample import Aligned, BoolArray
-from rsea_ros.identification.result import ComplexArray
-from rsea_ros.signals import FloatArray
+from rsea_ros.identification.resample import Aligned
+from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
 
 _UNKNOWNS = 6
 _TINY = 1e-300

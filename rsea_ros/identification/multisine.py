@@ -10,16 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import rfft
 
 from rsea_ros.identification.lines import Lines, widened
 from rsea_ros.identification.periodicity import Periods
 from rsea_ros.identification.resample import Aligned
-from rsea_ros.identification.result import ComplexArray
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 _EXCITED = 1e-2
 _SMOOTHED = 9

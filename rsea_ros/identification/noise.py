@@ -11,8 +11,7 @@ import math
 import numpy as np
 from scipy.fft import rfft
 
-from rsea_ros.identification.result import ComplexArray
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import Channel, ComplexArray, FloatArray, Record
 
 _TINY = 1e-300
 TOP_OF_BAND = (0.62, 0.98)

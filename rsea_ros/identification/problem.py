@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import noise_floor, residual_floor
@@ -18,9 +17,8 @@ from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_in
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drives
 from rsea_ros.model.step import OUTPUTS
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.signals import BoolArray, FloatArray, Record
 
-BoolArray = npt.NDArray[np.bool_]
 SETTLE = 0.3
 """s at the start of a record that no fit looks at: the bench may not have been at rest."""
 
@@ -132,6 +130,17 @@ def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
     if not any(offsets.values()):
         return drive
     return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
+
+
+def weights_of(cases: Sequence[Case], channels: Sequence[str]) -> FloatArray:
+    """Return 1 / noise of every sample that counts, case after case, channel after channel."""
+    parts = [
+        np.full(np.count_nonzero(case.mask[n]), 1.0 / case.noise[n])
+        for case in cases
+        for n in channels
+        if n in case.measured
+    ]
+    return np.concatenate(parts)
 
 
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:

@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.signals import Channel, FloatArray, Record
-
-BoolArray = npt.NDArray[np.bool_]
+from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 
 _FEWEST = 32
 _STEADY = 1e-3

@@ -6,10 +6,10 @@ import numpy as np
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.identification.frequency_response import estimate_response
-from rsea_ros.identification.result import ComplexArray, FrequencyResponse
+from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model.propagator import read_row, state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray, Record
+from rsea_ros.signals import ComplexArray, FloatArray, Record
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-import numpy.typing as npt
-
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

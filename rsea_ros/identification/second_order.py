@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.result import ComplexArray, FrequencyResponse
-from rsea_ros.signals import FloatArray
+from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.signals import ComplexArray, FloatArray
 
 _ITERATIONS = 60
 _CONVERGED = 1e-10

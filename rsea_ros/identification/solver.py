@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem, simulated
-from rsea_ros.identification.unknowns import CLOCK, Unknown, apply, start_vector
+from rsea_ros.identification.unknowns import Unknown, apply, start_vector
 from rsea_ros.signals import FloatArray
 
 _DIFFERENCE = 1e-4
@@ -24,6 +24,8 @@ _CLOCK_DIFFERENCE = 1e-6
 _SMALLEST_GAIN = 1e-6
 _SMALLEST_FALL = 0.5
 """Of the cost: less than a standard deviation of one parameter, after which next to nothing is left."""
+_AS_PROMISED = 0.5
+"""Of the fall of the cost that the derivatives promise: a step that brings so much speaks for them."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def jacobian_columns(
 ) -> FloatArray:
     """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta."""
 
-    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if _is_clock(problem.unknowns[i])}
+    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if problem.unknowns[i].is_clock}
     others = [i for i in which if i not in clocks]
 
     def column(i: int) -> FloatArray:
@@ -102,23 +104,24 @@ def _channel_of_rows(problem: Problem) -> npt.NDArray[np.int64]:
     return np.concatenate(rows)
 
 
-def _is_clock(unknown: Unknown) -> bool:
-    return unknown.name.startswith(CLOCK + ".")
-
-
 def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
     """Return d residual / d theta by central differences, which leave no trace of curvature, shape (m, n)."""
     columns = []
     for i, unknown in enumerate(problem.unknowns):
         step = np.zeros(len(theta))
-        step[i] = _CLOCK_DIFFERENCE if _is_clock(unknown) else _DIFFERENCE * unknown.scale
+        step[i] = _CLOCK_DIFFERENCE if unknown.is_clock else _DIFFERENCE * unknown.scale
         columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
     return np.column_stack(columns)
 
 
 def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int = 25, run: Map = serial,
-          gain: float = _SMALLEST_GAIN) -> Solution:  # fmt: skip
-    """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on."""
+          gain: float = _SMALLEST_GAIN, matrix: FloatArray | None = None) -> Solution:  # fmt: skip
+    """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on.
+
+    matrix: derivatives to begin with, those of a fit that ended near, shape (m, n).
+    Where a step brings what the derivatives promised, they are kept and only corrected along the step
+    (Broyden, Math. Comp. 19, 1965); they are made anew where it does not, or where no step helps.
+    """
     start = start_vector(problem.unknowns)
     theta = start.copy() if theta is None else theta.copy()
     weight = 1.0 / np.array([u.doubt for u in problem.unknowns])
@@ -129,12 +132,13 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
 
     residual = problem.residual(theta)
     cost, damping = cost_of(residual, theta), 1e-7
-    matrix = jacobian(problem, theta, residual, run)
+    is_fresh = matrix is None
+    matrix = jacobian(problem, theta, residual, run) if matrix is None else matrix
     for _ in range(iterations):
         normal = matrix.T @ matrix + np.diag(weight**2)
         slope = matrix.T @ residual + weight**2 * (theta - start)
         accepted = False
-        for _ in range(8):
+        for _ in range(8 if is_fresh else 1):
             scaled = normal + damping * np.diag(np.diag(normal) + 1e-12)
             trial = bounded_step(problem, theta, scaled, slope)
             trial_residual = problem.residual(trial)
@@ -142,16 +146,34 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
             if trial_cost < cost:
                 accepted = True
                 break
-            damping *= 30.0
-        if not accepted:
+            damping *= 30.0 if is_fresh else 1.0
+        if not accepted and is_fresh:
             break
+        if not accepted:
+            matrix, is_fresh = jacobian(problem, theta, residual, run), True
+            continue
+        step = trial - theta
+        promised = cost - cost_of(residual + matrix @ step, trial)
         enough = cost - trial_cost < max(gain * cost, _SMALLEST_FALL)
+        kept = cost - trial_cost > _AS_PROMISED * promised
+        if kept:
+            matrix = corrected(matrix, step, trial_residual - residual)
         theta, residual, cost = trial, trial_residual, trial_cost
         damping = max(damping / 10.0, 1e-10)
         if enough:  # and too small a step to change the derivatives
             break
-        matrix = jacobian(problem, theta, residual, run)
+        if not kept:
+            matrix = jacobian(problem, theta, residual, run)
+        is_fresh = not kept
     return Solution(problem, theta, residual, matrix, cost)
+
+
+def corrected(matrix: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+    """Return the derivatives nearest to `matrix`, each in its own scale, that give the change of a step."""
+    size = np.sum(matrix**2, axis=0)
+    along = size * step / max(float(size @ step**2), 1e-300)
+    result: FloatArray = matrix + np.outer(change - matrix @ step, along)
+    return result
 
 
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:

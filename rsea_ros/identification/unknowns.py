@@ -41,6 +41,11 @@ class Unknown:
     scale: float
 
     @property
+    def is_clock(self) -> bool:
+        """Whether it is the clock error of a sensor."""
+        return self.name.startswith(CLOCK + ".")
+
+    @property
     def reach(self) -> float:
         """Return how far from its start it may lie when the data say nothing: doubt, else the bounds."""
         if math.isfinite(self.doubt):
@@ -122,7 +127,7 @@ def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig
     """Return the rig with the values of theta, effects included, and the clock errors by channel, s."""
     values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
     own = {n: v for n, v in values.items() if n in FIELDS}
-    offsets = {n.split(".")[1]: v for n, v in values.items() if n.startswith(CLOCK + ".")}
+    offsets = {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock}
     effects = tuple(_moved(e, values) for e in rig.effects)
     return rig.with_values(own).with_effects(*effects), offsets
 

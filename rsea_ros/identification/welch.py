@@ -9,15 +9,11 @@ overlap by half. (Welch, IEEE Trans. Audio Electroacoust. 15, 1967; Bendat, Pier
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import next_fast_len, rfft
 
 from rsea_ros.identification.lines import Lines, detrended, widened
 from rsea_ros.identification.resample import Aligned
-from rsea_ros.identification.result import ComplexArray
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import ComplexArray, FloatArray, IntArray
 
 LONGEST_SEGMENT = 16.0
 """s. Long against what the actuator remembers, so that segments leak little."""

@@ -16,9 +16,9 @@ import numpy as np
 
 from rsea_ros.model import outputs, paper_formulas
 from rsea_ros.model.equations import rotor_inertia, train_ratio
-from rsea_ros.model.response import ComplexArray, frequency_response
+from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import END_NAMES, Rig, Train
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
 TRAINS: tuple[Train, ...] = ("planetary", "star", "lumped")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from control import TransferFunction
 from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
@@ -15,8 +15,11 @@ from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.outputs import Sees
 from rsea_ros.model.paper_formulas import eq_7_bandwidth
 from rsea_ros.model.rig import END_NAMES, Rig
-from rsea_ros.model.transfer import distal_per_proximal
+from rsea_ros.model.transfer import Fraction, distal_over_proximal, distal_per_proximal
 from rsea_ros.signals import FloatArray
+
+if TYPE_CHECKING:
+    from control import TransferFunction
 
 pure_torque_bandwidth = eq_7_bandwidth
 """Eq. (7): Hz from K_s (N m/rad) and J_sc (kg m^2)."""
@@ -33,10 +36,21 @@ def inner_inertia(rig: Rig) -> float:
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
     """Return T_d / T_p of the rig with both ends clamped, exact: what Eq. (6) approximates."""
-    return distal_per_proximal(replace(rig, clamped=frozenset(END_NAMES)), sees)
+    return distal_per_proximal(_held(rig), sees)
 
 
-def flat_band(function: TransferFunction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0) -> float:
+def end_over_end(rig: Rig) -> Fraction:
+    """Return the same as a fraction, for who cannot wait for python-control."""
+    return distal_over_proximal(_held(rig))
+
+
+def _held(rig: Rig) -> Rig:
+    return replace(rig, clamped=frozenset(END_NAMES))
+
+
+def flat_band(
+    function: TransferFunction | Fraction, tolerance_db: float = 3.0, tolerance_deg: float = 90.0
+) -> float:
     """Return the frequency, Hz, up to which a transfer function stays within tolerances of 1, or inf.
 
     Exact: |f|^2 = 10^(±dB/10) and tan(arg f) = ±tan(deg) are polynomials in the frequency. 90 degrees leave
@@ -78,8 +92,10 @@ def resonance_peak(function: TransferFunction) -> tuple[float, float]:
 _Complex = tuple[FloatArray, FloatArray]
 
 
-def _parts(function: TransferFunction) -> tuple[_Complex, _Complex]:
+def _parts(function: TransferFunction | Fraction) -> tuple[_Complex, _Complex]:
     """Return numerator and denominator at s = i w: real and imaginary polynomials in w, lowest first."""
+    if isinstance(function, Fraction):
+        return _at_imaginary(function.numerator), _at_imaginary(function.denominator)
     return _at_imaginary(function.num[0][0]), _at_imaginary(function.den[0][0])
 
 

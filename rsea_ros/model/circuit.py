@@ -30,9 +30,8 @@ import numpy as np
 
 from rsea_ros.model.equations import PORTS, rotor_inertia, train_ratio
 from rsea_ros.model.netlist import GROUND, Element, Kind, Solution, nodal_analysis
-from rsea_ros.model.response import ComplexArray
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import ComplexArray, FloatArray
 
 Part = tuple[str, Kind, float]
 

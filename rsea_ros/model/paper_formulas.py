@@ -7,8 +7,10 @@ k_s: N m/rad; j_*: kg m^2; b_*: N m s/rad, at the gear output, but for `*_rotor`
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from control import TransferFunction
+if TYPE_CHECKING:
+    from control import TransferFunction
 
 PAPER_FACTOR = 0.292
 """The factor printed in Eq. (7); 1 - 10^(-3/20) = 0.29205 rounds to it."""
@@ -17,19 +19,25 @@ EXACT_FACTOR = 1.0 - math.sqrt(0.5)
 """0.29289: where an undamped |T_d / T_p| has risen by the factor sqrt(2)."""
 
 
+def _over(numerator: list[float], denominator: list[float]) -> TransferFunction:
+    from control import TransferFunction  # takes a second, which Eqs. (7) to (10) need not wait for
+
+    return TransferFunction(numerator, denominator)
+
+
 def eq_1_lumped_distal_per_motor(k_s: float, j_eff: float, b_eff: float) -> TransferFunction:
     """Return T_d / T_m = K_s / (J_eff s^2 + b_eff s + K_s), lumped. Paper, Eq. (1)."""
-    return TransferFunction([k_s], [j_eff, b_eff, k_s])
+    return _over([k_s], [j_eff, b_eff, k_s])
 
 
 def eq_2_lumped_proximal_per_motor(k_s: float, j_eff: float, b_eff: float, b_s: float) -> TransferFunction:
     """Return T_p / T_m = (J_eff s^2 + b_s s + K_s) / (J_eff s^2 + b_eff s + K_s), lumped. Paper, Eq. (2)."""
-    return TransferFunction([j_eff, b_s, k_s], [j_eff, b_eff, k_s])
+    return _over([j_eff, b_s, k_s], [j_eff, b_eff, k_s])
 
 
 def eq_3_lumped_distal_per_proximal(k_s: float, j_eff: float, b_s: float) -> TransferFunction:
     """Return T_d / T_p = K_s / (J_eff s^2 + b_s s + K_s), lumped. Paper, Eq. (3)."""
-    return TransferFunction([k_s], [j_eff, b_s, k_s])
+    return _over([k_s], [j_eff, b_s, k_s])
 
 
 def eq_4_distal_per_motor(
@@ -43,12 +51,12 @@ def eq_5_proximal_per_motor(
     k_s: float, j_rotor: float, b_rotor: float, ratio: float, j_sc: float, b_s: float
 ) -> TransferFunction:
     """Return T_p / T_m = (J_sc s^2 + b_s s + K_s) / (denominator of Eq. (4)). Paper, Eq. (5)."""
-    return TransferFunction([j_sc, b_s, k_s], [j_rotor * ratio**2 + j_sc, b_rotor * ratio**2 + b_s, k_s])
+    return _over([j_sc, b_s, k_s], [j_rotor * ratio**2 + j_sc, b_rotor * ratio**2 + b_s, k_s])
 
 
 def eq_6_distal_per_proximal(k_s: float, j_sc: float, b_s: float) -> TransferFunction:
     """Return T_d / T_p = K_s / (J_sc s^2 + b_s s + K_s). Paper, Eq. (6)."""
-    return TransferFunction([k_s], [j_sc, b_s, k_s])
+    return _over([k_s], [j_sc, b_s, k_s])
 
 
 def eq_7_bandwidth(k_s: float, j_sc: float, factor: float = PAPER_FACTOR) -> float:

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
 from rsea_ros.errors import ParameterError, RigError
-from rsea_ros.model.bandwidth import end_to_end, flat_band
+from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import ErrorModel, Estimate
 from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_filter import (
@@ -93,12 +93,12 @@ class PureTorque:
                 f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
             )
         s = settings or Settings()
-        self._function = end_to_end(structured(rig))
+        self._function = end_over_end(structured(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
         odds = (1.0 - s.limit) / s.limit
         corner = self.edge * odds**0.25
         on, off = ((1.0 + sign * s.hysteresis) ** 4 / odds for sign in (-1.0, 1.0))
-        surprise, faint = (float(chi2.isf(p, 1)) for p in (FALSE_ALARM, STILL_THERE))
+        surprise, faint = (float(chdtri(1, p)) for p in (FALSE_ALARM, STILL_THERE))
         values = max(1.0, 2.0 * corner * s.window)  # independent ones of the noise in a window
         deaf = (math.inf, math.inf, 1.0)  # until it is calibrated
         self._limits = np.array(
@@ -140,5 +140,5 @@ class PureTorque:
 
     def error_at(self, hz: float) -> tuple[float, float]:
         """Return |T_d / T_p|, dB, and its phase, degrees: the error of who takes them for the same."""
-        response = complex(self._function(2j * math.pi * hz))
+        response = self._function(2j * math.pi * hz)
         return 20.0 * math.log10(abs(response)), math.degrees(np.angle(response))

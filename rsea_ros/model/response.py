@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.model.equations import PORTS, mechanics
 from rsea_ros.model.outputs import Output
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 def frequency_response(rig: Rig, output: Output, hz: FloatArray, port: str = "gear") -> ComplexArray:

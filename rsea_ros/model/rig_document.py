@@ -83,7 +83,7 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
-    for end in rig.clamped:
+    for end in sorted(rig.clamped):
         document.setdefault(end, {})["clamped"] = True
     document.setdefault("gear", {})["train"] = rig.train
     if rig.rigid_spring:

@@ -15,14 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.call import call
-from rsea_ros.signals import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from rsea_ros.signals import FloatArray, IntArray
 
 OUTPUTS = ("position", "velocity", "motor_torque", "ft")
 

@@ -8,9 +8,10 @@ The rig's effects are left out; a pendulum counts as its small-angle stiffness.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from control import StateSpace, TransferFunction
 from numpy.polynomial import polynomial
 
 from rsea_ros.model import outputs, propagator
@@ -19,8 +20,23 @@ from rsea_ros.model.outputs import Output, Sees
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
+if TYPE_CHECKING:  # python-control takes a second to import, which a node that starts need not wait for
+    from control import StateSpace, TransferFunction
+
 _ROUNDING = 1e-12
 """A sum that is smaller than this part of its terms is zero."""
+
+
+@dataclass(frozen=True)
+class Fraction:
+    """A transfer function as two polynomials in s, highest power first, without common powers of s."""
+
+    numerator: FloatArray
+    denominator: FloatArray
+
+    def __call__(self, s: complex) -> complex:
+        """Return the value at s, rad/s."""
+        return complex(np.polyval(self.numerator, s) / np.polyval(self.denominator, s))
 
 
 def distal_per_motor(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
@@ -35,9 +51,14 @@ def proximal_per_motor(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFu
 
 def distal_per_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
     """Return T_d / T_p while the motor drives. Both ends clamped: Eq. (6) with J_sc + n J_r for J_sc."""
-    distal, _ = _fraction(rig, outputs.distal(rig, sees), "gear")
-    proximal, _ = _fraction(rig, outputs.proximal(rig), "gear")
-    return _transfer_function(distal, proximal)
+    return _transfer_function(distal_over_proximal(rig, sees))
+
+
+def distal_over_proximal(rig: Rig, sees: Sees = "spring_and_damper") -> Fraction:
+    """Return the same as a fraction."""
+    distal, _ = _expanded(rig, outputs.distal(rig, sees), "gear")
+    proximal, _ = _expanded(rig, outputs.proximal(rig), "gear")
+    return _reduced(distal, proximal)
 
 
 def position_per_motor(rig: Rig) -> TransferFunction:
@@ -47,19 +68,27 @@ def position_per_motor(rig: Rig) -> TransferFunction:
 
 def transfer(rig: Rig, output: Output, port: str = "gear") -> TransferFunction:
     """Return any output over the torque at any of equations.PORTS."""
-    return _transfer_function(*_fraction(rig, output, port))
+    return _transfer_function(_reduced(*_expanded(rig, output, port)))
 
 
 def state_space(rig: Rig, output: Output, port: str = "gear") -> StateSpace:
     """Return the same in states (q, q'): q'' of the output comes from the equations of motion."""
-    system, p = propagator.state_space(rig), PORTS.index(port)
+    from control import StateSpace
+
+    system = propagator.state_space(rig)
+    c, d = read(system, output, port)
+    return StateSpace(system.a, system.b[:, [PORTS.index(port)]], c[None, :], [[d]])
+
+
+def read(system: propagator.StateSpace, output: Output, port: str = "gear") -> tuple[FloatArray, float]:
+    """Return C and D of an output: what it takes of the states (q, q'), and of the torque at a port."""
+    p = PORTS.index(port)
     placed, n = output.c @ system.mechanics.placement, system.mechanics.order
     c = np.concatenate([placed[0], placed[1]]) + placed[2] @ system.a[n:]
-    d = output.d[p] + placed[2] @ system.b[n:, p]
-    return StateSpace(system.a, system.b[:, [p]], c[None, :], [[d]])
+    return c, float(output.d[p] + placed[2] @ system.b[n:, p])
 
 
-def _fraction(rig: Rig, output: Output, port: str) -> tuple[FloatArray, FloatArray]:
+def _expanded(rig: Rig, output: Output, port: str) -> tuple[FloatArray, FloatArray]:
     """Return numerator and denominator, lowest power first."""
     m, p = mechanics(rig), PORTS.index(port)
     z = [
@@ -96,7 +125,13 @@ def _sum(terms: Iterable[FloatArray]) -> FloatArray:
     return total
 
 
-def _transfer_function(numerator: FloatArray, denominator: FloatArray) -> TransferFunction:
-    """Return the transfer function without common powers of s (a rig free to turn as a whole has them)."""
+def _reduced(numerator: FloatArray, denominator: FloatArray) -> Fraction:
+    """Return the fraction without common powers of s (a rig free to turn as a whole has them)."""
     common = min(int(np.argmax(p != 0.0)) for p in (numerator, denominator) if p.any())
-    return TransferFunction(numerator[common:][::-1], denominator[common:][::-1])
+    return Fraction(numerator[common:][::-1], denominator[common:][::-1])
+
+
+def _transfer_function(fraction: Fraction) -> TransferFunction:
+    from control import TransferFunction
+
+    return TransferFunction(fraction.numerator, fraction.denominator)

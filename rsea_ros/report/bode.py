@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.result import ComplexArray, FrequencyResponse
+from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.report import words
 from rsea_ros.report.bode_words import caption, finding
 from rsea_ros.report.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.palette import AFTER, MEASURED, QUIET, faint
 from rsea_ros.report.thinned import thinned
-from rsea_ros.signals import UNITS, FloatArray
+from rsea_ros.signals import UNITS, ComplexArray, FloatArray
 
 _SIDE = 1.96 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""

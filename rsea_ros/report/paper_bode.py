@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.report.figure import Figure, Json, axis, frequency_axis, label, layout, line
 from rsea_ros.report.palette import QUIET
-from rsea_ros.signals import FloatArray
-
-ComplexArray = npt.NDArray[np.complex128]
+from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)

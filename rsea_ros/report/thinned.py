@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.result import ComplexArray, FrequencyResponse
-from rsea_ros.signals import FloatArray
+from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.signals import ComplexArray, FloatArray
 
 _PER_DECADE = 50
 

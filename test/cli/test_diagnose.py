@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import rsea_ros.diagnosis.diagnose as engine
-from msg_adapters import read_record, write_record
+from msg_adapters import write_record
 from rsea_ros.cli.main import main
+from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -43,12 +48,32 @@ def bag(record, tmp_path):
     return write
 
 
+class Played(NamedTuple):
+    """A call of the verb, and what the engine told it."""
+
+    status: int
+    printed: str
+    errors: str
+    out: Path
+    diagnosis: Diagnosis
+
+
 @pytest.fixture(scope="module")
-def known(record, tmp_path_factory):
+def played(record, tmp_path_factory):
+    """The verb with the engine as it is, once."""
+    place, told = tmp_path_factory.mktemp("played"), []
+    write_record(record, place / "run.mcap")
+    printed, errors, diagnose = StringIO(), StringIO(), engine.diagnose
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed), redirect_stderr(errors):
+        patch.setattr(engine, "diagnose", lambda *a: told.append(diagnose(*a)) or told[0])
+        status = main(["diagnose", str(place / "run.mcap"), "--out", str(place / "out")])
+    return Played(status, printed.getvalue(), errors.getvalue(), place / "out", told[0])
+
+
+@pytest.fixture
+def known(played):
     """What the engine says of the run."""
-    path = tmp_path_factory.mktemp("bag") / "run.mcap"
-    write_record(record, path)
-    return engine.diagnose([read_record(path, strict=False)], load_rig("paper_high_impedance"))
+    return played.diagnosis
 
 
 @pytest.fixture
@@ -56,8 +81,8 @@ def quick(known, monkeypatch):
     """The verb with an engine that has its answer ready; returns what it was asked."""
     asked = []
 
-    def answer(records, rig, holdout, tell):
-        asked.append((records, rig, holdout))
+    def answer(records, rig, holdout, tell, without):
+        asked.append((records, rig, holdout, without))
         tell("round 1: backlash", 0.5)
         return known
 
@@ -65,15 +90,13 @@ def quick(known, monkeypatch):
     return asked
 
 
-def test_the_verb_finds_the_friction_and_leaves_four_files(bag, tmp_path, capsys):
-    assert main(["diagnose", bag(), "--out", str(tmp_path / "out")]) == 0
-    printed, errors = capsys.readouterr()
-    lines = printed.splitlines()
-    assert errors == ""
+def test_the_verb_finds_the_friction_and_leaves_four_files(played):
+    assert (played.status, played.errors) == (0, "")
+    lines = played.printed.splitlines()
     assert lines[0].startswith("Coulomb friction (3.00 N·m) is what the simulation lacks")
-    assert lines[-1] == f"report      {tmp_path / 'out' / 'report.html'}"
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == NAMES
-    model = load_rig(tmp_path / "out" / "model.yaml")
+    assert lines[-1] == f"report      {played.out / 'report.html'}"
+    assert sorted(p.name for p in played.out.iterdir()) == NAMES
+    model = load_rig(played.out / "model.yaml")
     assert model.effects[0].name == "coulomb_friction"
     assert model.effects[0].parameters["torque"] == pytest.approx(FRICTION, rel=0.02)
 
@@ -103,8 +126,10 @@ def test_bags_rig_and_holdout_reach_the_engine(quick, bag, record, tmp_path):
     run = bag()
     write_record(record, tmp_path / "other.mcap")
     other = str(tmp_path / "other.mcap")
-    main(["diagnose", run, other, "--holdout", other, "--rig", "pendulum", "--out", str(tmp_path / "out")])
-    ((records, rig, holdout),) = quick
+    options = ["--holdout", other, "--rig", "pendulum", "--without", "backlash", "ft_bias"]
+    main(["diagnose", run, other, *options, "--out", str(tmp_path / "out")])
+    ((records, rig, holdout, without),) = quick
+    assert without == ["backlash", "ft_bias"]
     assert [r.source for r in records] == [run, other] and holdout.source == other
     assert rig.name == "pendulum"
 
@@ -172,6 +197,11 @@ def test_a_file_in_place_of_the_directory_is_refused_before_any_work(quick, bag,
         == f"rsea diagnose: --out {path}: is a file, expected a directory or a new name\n"
     )
     assert quick == []
+
+
+def test_an_unknown_effect_is_refused_in_one_line(quick, bag, tmp_path, capsys):
+    assert main(["diagnose", bag(), "--out", str(tmp_path / "out"), "--without", "gremlins"]) == 2
+    assert "effect 'gremlins': not in the catalogue" in capsys.readouterr().err.strip().splitlines()[-1]
 
 
 def test_an_unknown_verdict_is_refused(capsys):

@@ -6,6 +6,7 @@ both. `conceal` is the only place that knows.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from independent.hidden import MAIN_PARAMETER, hide
 from independent.severities import SIZES, drawn_parameters
 
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
@@ -32,6 +34,7 @@ class Concealed:
     size: float
 
 
+@functools.cache
 def conceal(seed: int) -> Concealed:
     """Draw a bench, an effect, its severity and the excitation."""
     rng = np.random.default_rng(seed)
@@ -62,3 +65,13 @@ def test_the_hidden_effect_is_found_with_its_size_and_its_gain(seed):
 
 def test_the_seeds_hide_different_effects():
     assert len({conceal(seed).effect for seed in range(34, 40)}) == 6
+
+
+def test_what_the_catalogue_lacks_gets_no_name():
+    """The hidden effect and all that look like it are not tried: then nothing is named."""
+    concealed = conceal(36)
+    claims = effect_named(concealed.effect).claims
+    alike = {n for n, e in catalogue().items() if concealed.effect in e.claims.confusable_with}
+    without = {concealed.effect, *alike, *claims.confusable_with}
+    diagnosis = diagnose([concealed.record], load_rig("paper_high_impedance"), without=without)
+    assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())

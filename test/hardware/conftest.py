@@ -62,7 +62,7 @@ class Loop:
         self.device.close()
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def benches(tmp_path_factory):
     """A function that gives the running bench of a model, made on first use."""
     made = {}

@@ -165,7 +165,7 @@ def move_signals(dx, x, u, spring, p):
 @njit(cache=True)
 def right_hand_side(dx, t, x, u, knock, p):
     """Put dx/dt into dx: state x, held command u (N m), knock on the gear output (N m)."""
-    dx[:] = 0.0
+    dx.fill(0.0)
     spring = spring_torque(t, x, p)
     to_chassis = gear_torque(x, p) if p.gap > 0.0 or p.gear_k > 0.0 else spring
     gain = p.torque_gain * (1.0 + p.torque_fade * t / p.duration)

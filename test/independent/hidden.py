@@ -62,7 +62,6 @@ OFF_CATALOGUE = MappingProxyType(
         "torque_constant_fade": ({"torque_fade": -0.2}, ("torque_constant_error", "ft_gain_error")),
         "quadratic_ft": ({"ft_quadratic": 0.004}, ()),
         "coarse_ft": ({"ft_quantum": 1.0}, ()),
-        "output_cogging": ({"cogging": 1.2, "cogging_period": 0.011}, ("torque_ripple",)),
         "impacts": ({"impact_torque": 25.0, "impact_rate": 1.5}, ()),
         "ft_random_walk": ({"ft_walk": 0.12}, ("ft_drift", "ft_bias")),
         "lugre_friction": (

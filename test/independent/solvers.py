@@ -45,7 +45,8 @@ def _march(command, knock, period, whole, part, steps, p, states, held):
             _rk4(x, k * period, part * period, first, late, knock[k], p, k1, k2, k3, k4)
         rest = (1.0 - part) * period
         _rk4(x, k * period + part * period, rest, max(steps - first, 1), now, knock[k], p, k1, k2, k3, k4)
-        states[k] = x
+        for i in range(SIZE):
+            states[k, i] = x[i]
         held[k] = now
 
 

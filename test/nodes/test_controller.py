@@ -39,8 +39,9 @@ class Loop:
         self._desired = listener.node.create_publisher(JointState, "/rsea/desired_torque", COMMAND)
 
     def ready(self):
-        """Wait until the controller commands."""
+        """Wait until the controller commands and all is heard: each topic is discovered at its own time."""
         self.listener.until(lambda: self._desired.get_subscription_count() and len(self.commands) > 100)
+        self.listener.until(lambda: self.states and self.wrenches)
 
     def sine(self, seconds):
         """Publish a sine on the grid of the measurements, ahead of time; return the error, by period."""

@@ -38,6 +38,10 @@ inner: Any = partial(njit, cache=True, nogil=True, error_model="numpy",
 """For functions that only compiled ones call: what Python would need to call them takes long to compile."""
 
 
+once: Any = partial(njit, cache=True, nogil=True, error_model="numpy", inline="always")()
+"""For functions that one place calls."""
+
+
 class Model(NamedTuple):
     """What does not change, but for `held`: steps for which linear.phi, f and q hold, s.
 
@@ -88,7 +92,7 @@ def disturbance(s, p, x):  # type: ignore[no-untyped-def]
     s[st.GEAR_TORQUE] += p[0]
 
 
-@inner
+@once
 def predict(model, state, t):  # type: ignore[no-untyped-def]
     """Go to an instant; a command older than `hold` ends on the way, as the bench ends it."""
     end, reached = state.clock[SINCE] + model.hold, False
@@ -99,7 +103,7 @@ def predict(model, state, t):  # type: ignore[no-untyped-def]
             state.clock[FORCED] = 0.0
 
 
-@inner
+@once
 def _propagate(model, state, t):  # type: ignore[no-untyped-def]
     dt = t - state.clock[NOW]
     if dt < SHORTEST:

@@ -20,6 +20,7 @@ from rsea_ros.model.observer.filter import (
     WRENCH,
     doubt,
     inner,
+    once,
     predict,
     update,
     weigh_torque,
@@ -96,7 +97,7 @@ def _insert(log, t, kind, a, b):  # type: ignore[no-untyped-def]
     return at
 
 
-@inner
+@once
 def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
     if state.clock[STARTED] == 0.0:
         state.clock[STARTED], state.clock[NOW] = 1.0, t
@@ -110,7 +111,7 @@ def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
     doubt(model, state)
 
 
-@inner
+@once
 def take_in(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
     """Take in an event, work off all up to the newest measurement, and return its row, or NONE."""
     at = _insert(log, t, kind, a, b)

@@ -1,0 +1,8 @@
+"""Progress: how long work says what it is at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[str, float], None]
+"""Hears what is being done and which share of the work is over, 0 … 1."""
