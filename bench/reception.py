@@ -12,8 +12,8 @@ import rclpy
 from rclpy.qos import QoSProfile
 
 from msg_adapters.cdr import STAMP
-from rsea_ros.nodes._bench import Polled
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._mailbox import Polled
 from rsea_ros.nodes._waiter import Waiter
 from rsea_ros.signals import FloatArray
 
@@ -43,7 +43,7 @@ class Reception:
                 seconds, nanoseconds = struct.unpack_from("<iI", raw, STAMP)
                 delays.append(info["received_timestamp"] - seconds * SECOND - nanoseconds)
 
-        waiter = Waiter(self._node, subscription, take, TICK)
+        waiter = Waiter(self._node, [subscription], take, TICK)
         waiter.start()
         return waiter
 

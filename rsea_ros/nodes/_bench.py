@@ -4,34 +4,18 @@ from __future__ import annotations
 
 import time
 
-from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
-from msg_adapters.raw import RawReader, RawWriter
+from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, WrenchStamped, joint_state_message, wrench_message
-from msg_adapters.topics import TYPES
-from rsea_ros.errors import ParameterError
+from msg_adapters.topics import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.nodes._mailbox import Mailbox
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-
-
-class Polled(CallbackGroup):
-    """Subscriptions that no executor serves: the cycle takes what has arrived when it needs it."""
-
-    def can_execute(self, entity: object) -> bool:
-        """Return False: never by an executor."""
-        return False
-
-    def beginning_execution(self, entity: object) -> bool:
-        """Return False: never by an executor."""
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        """Do nothing."""
 
 
 class Bench:
@@ -53,18 +37,14 @@ class Bench:
         )  # fmt: skip
         wrench = serialize_message(wrench_message(0, (0.0,) * 6))
         self._ft_writer = RawWriter(wrench, TYPES["ft"], "wrench")
-        self._reader = RawReader(TYPES["torque_command"], [("effort", 0)])
-        self._subscription = node.create_subscription(
-            JointState, "torque_command", lambda message: None, COMMAND, callback_group=Polled(), raw=True
+        self._wanted = Mailbox(
+            node, JOINT_STATE, "torque_command", COMMAND, self.commands.refuse, ("effort", 0)
         )
 
     def poll(self) -> None:
         """Put all commands that have arrived into the queue."""
-        handle = self._subscription.handle
-        with handle:
-            while (waiting := handle.take_message(JointState, True)) is not None:
-                raw, info = waiting
-                self._command(raw, info["received_timestamp"])
+        for stamp, (torque,), received in self._wanted.take():
+            self.commands.add(stamp, torque, received)
 
     def publish(self, state: State) -> None:
         """Publish one reading under its stamps."""
@@ -91,13 +71,4 @@ class Bench:
         """Take the topics away."""
         for publisher in (self._states, self._ft):
             self._node.destroy_publisher(publisher)
-        self._node.destroy_subscription(self._subscription)
-
-    def _command(self, raw: bytes, received: int) -> None:
-        try:
-            stamp, (torque,) = self._reader.read(raw)
-        except ParameterError as error:
-            self.commands.refused += 1
-            self._node.get_logger().error(f"torque_command: {error}", throttle_duration_sec=1.0)
-            return
-        self.commands.add(stamp, torque, received)
+        self._node.destroy_subscription(self._wanted.subscription)

@@ -12,6 +12,7 @@ from rsea_ros.control.synthesis import Demand, Design, check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._parameters import AXIS, Parameter
+from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
 
@@ -36,6 +37,7 @@ TABLE = (
     Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
     Parameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     Parameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
+    REALTIME,
 )
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, TransitionCallbackReturn
 
 from msg_adapters.ros import Trigger
-from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.errors import RseaError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
 from rsea_ros.nodes._bench import Bench
@@ -24,7 +24,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._parameters import Parameter
-from rsea_ros.nodes._realtime import HIGHEST, let_in_at_once, raise_priority, usual_priority
+from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once, usual_priority
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -33,7 +33,7 @@ TABLE = (
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     Parameter("autostart", False, "whether to configure and activate at once"),
-    Parameter("realtime_priority", 0, "of the loop, SCHED_FIFO; 0: as any process", "", 0, HIGHEST),
+    REALTIME,
     *MOTOR,
     *SENSOR,
     *LIMITS,
@@ -72,7 +72,7 @@ class Driver(ManagedEntity):
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
         let_in_at_once()
         self._cycle.start()
-        self._hurry(self._cycle)
+        hurry(self._node, self._cycle.thread, self._values["realtime_priority"])
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -133,14 +133,6 @@ class Driver(ManagedEntity):
         if self._cycle is not None:
             self._node.get_logger().info("torque zero, device closed")
         self._cycle = self._bench = None
-
-    def _hurry(self, cycle: Cycle) -> None:
-        """Give the cycle the priority that was asked for; without it where it is not permitted."""
-        if priority := self._values["realtime_priority"]:
-            try:
-                raise_priority(cycle.thread, priority)
-            except ParameterError as error:
-                self._node.get_logger().warning(f"{error}; runs without")
 
     def _step(self, stamp: int) -> None:
         """Write the command that is in force from this cycle on (its stamp rounded), read, publish."""

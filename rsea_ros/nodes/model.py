@@ -23,7 +23,7 @@ from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED
-from rsea_ros.nodes._realtime import let_in_at_once
+from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
 
@@ -48,6 +48,7 @@ TABLE = (
     Parameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
     Parameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
     Parameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
+    REALTIME,
 )
 NAMES = ("distal", "proximal", "disturbance")
 TICK = 0.02
@@ -72,9 +73,10 @@ class Model:
         self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report)
-        self._waiter = Waiter(node, self._inputs.ft, self._work, TICK)
+        self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
         let_in_at_once()
         self._waiter.start()
+        hurry(node, self._waiter.thread, values["realtime_priority"])
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
 
     def _work(self) -> None:

@@ -22,8 +22,6 @@ from rsea_ros.hardware.dynamixel.receiver import Receiver
 
 EMPTY = 11
 """Bytes of a status packet without parameters."""
-DOUBT = 16
-"""Transactions after a failed one before which the port is emptied, in case that its reply still comes."""
 
 
 class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
@@ -36,7 +34,6 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     def __init__(self) -> None:
         self.receiver = Receiver()
         self.stale = 0
-        self._doubt = DOUBT
         self.expected: int | None = None
         self._frames: list[bytes] = []
 
@@ -59,17 +56,11 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
         return _with_payload(packet, plain)
 
     def txPacket(self, port: Port, txpacket: Sequence[int]) -> int:
-        """Stuff, sign and send a packet; what has come in before is thrown away. Raises PortLost.
-
-        Not after replies that were in order: to look into an empty port waits for the kernel's thread that
-        fills it, on a busy machine for a cycle.
-        """
+        """Stuff, sign and send a packet; what has come in before is thrown away. Raises PortLost."""
         data = frame(txpacket[4], _payload(txpacket))
         if len(data) > LONGEST:
             return int(COMM_TX_ERROR)
-        if self._doubt:
-            port.clearPort()
-            self._doubt -= 1
+        port.clearPort()
         self.receiver.reset()
         self._frames.clear()
         sent = port.writePort(data)
@@ -84,11 +75,9 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
                 if self._answers(packet):
                     return packet, int(COMM_SUCCESS)
                 self.stale += 1
-                self._doubt = DOUBT
             data = port.receive()
             self._frames += self.receiver.feed(data, raw=fast_option)
             if not data and port.isPacketTimeout():
-                self._doubt = DOUBT
                 damaged = self.receiver.waiting or self.receiver.rejected.total() > rejected
                 return b"", int(COMM_RX_CORRUPT if damaged else COMM_RX_TIMEOUT)
 
