@@ -36,6 +36,8 @@ def main() -> None:
     parser = parser_of(__doc__)
     parser.add_argument("--hours", type=float, default=10.0, help="of simulated noise")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each run of the node")
+    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
+    parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
     args, sections = chosen(parser, SECTIONS)
     for name, section in sections:
         print(f"== {name}")

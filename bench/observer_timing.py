@@ -1,6 +1,7 @@
 """The model node in its place: plant, excite and model in processes of their own, this one receives.
 
-Beside it, in the same run: how long ft itself takes to here, and a bare loop with absolute deadlines.
+Each rate as any process, then at SCHED_FIFO where that is permitted: the model node, and one above it the
+plant, which stands for hardware. Beside it, in the same run: how long ft itself takes to here, and a bare loop with absolute deadlines.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from bench.bare_loop import BareLoop
+from bench.bare_loop import BareLoop, permitted
 from bench.observer_node import MARK
 from bench.reception import Reception
 from msg_adapters.ros import JointState, WrenchStamped
@@ -30,30 +32,32 @@ SETTLE = 3.0
 
 
 def timing(args: argparse.Namespace) -> Iterator[str]:
-    """Measure at 280 Hz and 1 kHz."""
+    """Measure each rate with each priority."""
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     yield f"{'what':58} {'asked':18} p50, p99"
-    for rate in (280.0, 1000.0):
+    for rate, priority in product(args.rate, filter(permitted, args.priority)):
         with tempfile.TemporaryDirectory() as folder:
-            yield from _at(rate, args.seconds, Path(folder))
+            yield from _at(rate, priority, args.seconds, Path(folder))
 
 
-def _at(rate: float, seconds: float, folder: Path) -> Iterator[str]:
+def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[str]:
     times = folder / "times.npy"
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(folder), MARK: str(times)}
     nodes = [_start(words, folder, environment) for words in (
         ["-m", "rsea_ros.nodes.plant", "--ros-args", "-p", f"rate:={rate}"],
-        [str(ROOT / "bench/observer_node.py")],
+        [str(ROOT / "bench/observer_node.py"), "--ros-args", "-p", f"realtime_priority:={priority}"],
         ["-m", "rsea_ros.nodes.excite", "--ros-args", "-p", f"rate:={rate}", "-p", "kind:=multisine",
          "-p", "amplitude:=8.0", "-p", "high:=40.0", "-p", f"duration:={seconds + 60.0}"],
     )]  # fmt: skip
+    if priority:
+        os.sched_setscheduler(nodes[0].pid, os.SCHED_FIFO, os.sched_param(priority + 1))
     try:
         reception = Reception({"torque_estimate": (JointState, COMMAND), "ft": (WrenchStamped, MEASUREMENT)})
         reception.wait("torque_estimate")
         time.sleep(SETTLE)
         reception.forget()
-        bare = BareLoop(rate, seconds, folder)
+        bare = BareLoop(rate, seconds, folder, priority)
         begin, cpu = time.monotonic_ns(), _cpu(nodes[1])
         time.sleep(seconds)
         end, cpu = time.monotonic_ns(), _cpu(nodes[1]) - cpu
@@ -67,14 +71,14 @@ def _at(rate: float, seconds: float, folder: Path) -> Iterator[str]:
             node.wait()
     rows = np.load(times)
     rows = rows[(rows[:, 0] > begin) & (rows[:, 0] < end)]
-    yield from _told(rate, rows, estimates, wrenches, lateness, cpu / seconds)
+    here = f"{rate:g} Hz" + (f", FIFO {priority}: " if priority else ": ")
+    yield from _told(here, rows, estimates, wrenches, lateness, cpu / seconds)
 
 
 def _told(
-    rate: float, rows: FloatArray, estimates: FloatArray, wrenches: FloatArray, lateness: FloatArray,
+    here: str, rows: FloatArray, estimates: FloatArray, wrenches: FloatArray, lateness: FloatArray,
     cpu: float,
 ) -> Iterator[str]:  # fmt: skip
-    here = f"{rate:g} Hz: "
     yield _line(here + "observer and flag, µs", "p99 < 60", rows[:, 3] / 1e3)
     yield _line(here + "the same, CPU time of the thread, µs", "", rows[:, 4] / 1e3)
     yield _line(here + "ft callback to torque_estimate published, ms", "p99 < 0.3", rows[:, 1] / 1e6)

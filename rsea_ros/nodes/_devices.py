@@ -29,7 +29,10 @@ MOTOR = (
     Parameter("id", 1, "of the motor on its bus", "", 0, 252),
     Parameter("model", 0, f"number that the motor must have: {KNOWN}; 0: any of them", "", 0, 65535),
     Parameter("torque_constant", 6.826, "torque at the gear output for a current", "N m/A", 0.1, 100.0),
-    Parameter("latency", 0.0, "what adapter and host may add to a reply; 0: 0.4 of a cycle less 0.1 ms", "s", 0.0, 0.1),
+    Parameter(
+        "latency", 0.0, "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md", "s",
+        0.0, 0.1,
+    ),
     Parameter("watchdog", 0.1, "time without the driver after which the motor is stopped", "s", 0.02, 2.5),
 )
 SENSOR = (
