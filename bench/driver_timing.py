@@ -3,7 +3,8 @@
 Each rate as any process, then at SCHED_FIFO where that is permitted: driver and bare loop at the same
 priority, the bench on a wire one above, since hardware does not wait for our processor. After each, for half
 as long and beside another bare loop: a loop of nothing but the two requests to the motor. What that one is
-late, pseudo-terminal and bench are; no driver in Python can be later less often.
+late, pseudo-terminal and bench are: the kernel hands its bytes on in a worker of usual priority. A driver is
+less often late than that only where it does not wait for a reply.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The torque controller through real nodes: plant and controller processes, a sender of desired torques here.
 
-Run: python bench/torque_control_nodes.py [--rate 280 1000] [--priority 0 80]. The error is that of a sine of 5 Hz, the median
-over its periods, so a stall of the machine shows in `worst` and in the late commands, not in it.
+Run: python bench/torque_control_nodes.py [--rate 280 1000] [--priority 0 80]. The error is that of a sine of
+5 Hz, the median over its periods, so a stall of the machine shows in `worst` and in the late commands, not in
+it. With a priority controller and, one above it, plant run at SCHED_FIFO.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Case:
 
 
 class Outside:
-    """A node that sends desired torques and hears the bench: wrenches and commands as (stamp, torque, heard)."""
+    """Sends desired torques and hears the bench: wrenches and commands as (stamp, torque, heard)."""
 
     def __init__(self) -> None:
         self.node = rclpy.create_node("bench", namespace="rsea")
