@@ -11,8 +11,8 @@ from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.motor import Motor, Plant
 
-TICK = 1_000_000
-"""ns; the plant is advanced at least so often."""
+TICK = 5_000_000
+"""ns; the plant's steps until now are worked off whenever somebody looks, and at least so often."""
 
 
 class Requests(Protocol):
