@@ -50,11 +50,11 @@ class DynamixelNetft:
         self._motor.enable()
 
     def read(self) -> State:
-        """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError."""
-        try:
-            sample = self._motor.read()
-        finally:
-            self._take_wrenches()
+        """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError.
+
+        The sensor's socket is emptied while the motor answers.
+        """
+        sample = self._motor.read(self._take_wrenches)
         wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
         stamp, wrench = wrenches[-1] if wrenches else (0, None)
         self._last = State(

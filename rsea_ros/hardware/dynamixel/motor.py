@@ -115,8 +115,10 @@ class Motor:
             if self._supervisor is not None:
                 self._supervisor.beat(False)
 
-    def read(self) -> Sample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
         """Read everything that is measured, once. Raises NoReply, PortLost, Refused.
+
+        meanwhile: done while the reply is on its way.
 
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
         size and cannot be taken for the new one.
@@ -128,7 +130,7 @@ class Motor:
         begin, usual = time.monotonic_ns(), self._port.latency
         self._port.latency = usual + self._spared
         try:
-            data = self.bus.read(start, size + self._longer)
+            data = self.bus.read(start, size + self._longer, meanwhile)
         except NoReply:
             self._longer ^= 1
             raise
