@@ -37,8 +37,8 @@ class Found:
 
     @property
     def error(self) -> float:
-        """Error relative to the truth."""
-        return abs(self.value - self.truth) / abs(self.truth)
+        """Error relative to the truth; as it is where that is zero."""
+        return abs(self.value - self.truth) / (abs(self.truth) or 1.0)
 
     @property
     def main(self) -> bool:

@@ -14,6 +14,7 @@ from rsea_ros.diagnosis.stages import judged
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.solver import in_pool
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -46,7 +47,7 @@ def diagnose(
         tell("looking for a simpler model", 0.9)
         found = pruned(found, effects, pool)
         tell("judging", 0.95)
-        stages = list(pool.map(lambda m: judged(found, m, judging, rig), found.models))
+        stages = [judged(found, m, judging, rig, in_pool(pool)) for m in found.models]
         return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, pool)
 
 

@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem, weights_of
-from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
@@ -20,9 +20,9 @@ AT_FLOOR = 1.04
 DELAY = "command_delay.delay"
 _ITERATIONS = 12
 SEARCH_GAIN = 2e-4
-"""Relative fall of the cost below which a fit of the search is done; what is accepted is fitted further."""
+"""Relative fall of the cost below which a fit of the search is done; what is judged is fitted further."""
 _FARTHEST = 20.0
-"""RMS of the residual over the noise up to which that gain grows with it: there small falls mean nothing."""
+"""RMS of the residual over the noise up to which a gain grows with it: there small falls mean nothing."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,18 @@ def fitted(
     places: tuple[int, ...] = FIT,
     iterations: int = _ITERATIONS,
     weights: Score | None = None,
-    gain: float | None = None,
+    gain: float = SEARCH_GAIN,
     near: Solution | None = None,
+    run: Map = serial,
 ) -> Model:
     """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise.
 
+    gain: relative fall of the cost below which the fit is done, at the noise; farther off it grows.
     near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
+    run: how derivatives are made, one after another or in a pool.
     """
     masked = on_places(problem, cases, places, weights)
-    fit = partial(solve, masked, iterations=iterations, gain=gain or SEARCH_GAIN * _distance(weights))
+    fit = partial(solve, masked, iterations=iterations, gain=gain * _distance(weights), run=run)
     solution = fit(theta, matrix=None if near is None else _reweighted(near, masked))
     moved = with_common_clock_in_delay(solution)
     if moved is not None:

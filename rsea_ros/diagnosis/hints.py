@@ -18,10 +18,12 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-STIFFNESS = "spring.stiffness"
+STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _PEAKS = 2
 _GAPS = (0.1, 0.3, 0.6)
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
+_STIFFER = (4.0, 9.0, 20.0)
+"""Than the rig's spring what gives beside it may be: softer is told at once, stiffer hardly shows."""
 _FEWEST_PERIODS = 1.5
 """As often a ripple must have repeated over the rotor's travel to be one."""
 _MOST_WAVES = 1e7
@@ -46,6 +48,8 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         return [{**effect.typical, "limit": limit} for limit in _limit_hints(case)] or starts
     if {"stiffness", "inertia"} <= set(names):
         return _mode_hints(effect, case, rig, outputs) or starts
+    if "stiffness" in names:
+        return [{**effect.typical, **_beside_a_train(s["stiffness"], rig)} for s in starts]
     if "Hz" in names.values():
         frequency = next(n for n, unit in names.items() if unit == "Hz")
         channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
@@ -75,20 +79,44 @@ def _mode_hints(
     effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]
 ) -> list[dict[str, float]]:
     """Return starts of a part on a spring of its own, its mode at a peak of the residual."""
-    if rig.rigid_spring:
-        return []
-    channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
-    stiffness = next(p for p in effect.parameters if p.name == "stiffness")
+    channel = max(outputs.keys() & case.measured.keys(), key=lambda n: _left_of(case, n, outputs[n]))
     peaks = _line_hints(case, channel, outputs[channel], {}, "frequency", effect)
     return [
         {
             **effect.typical,
-            "stiffness": k,
-            "inertia": (k + rig[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
+            **hint,
+            "inertia": (hint["stiffness"] + hint[STIFFNESS]) / (2.0 * math.pi * peak["frequency"]) ** 2,
         }
-        for k in (*stiffness.starts[:1], stiffness.typical)
-        for peak in peaks
+        for hint in _series_hints(rig)
+        for peak in peaks[:1]
     ]
+
+
+def _series_hints(rig: Rig) -> list[dict[str, float]]:
+    """Return starts of a spring that gives beside the rig's own, N m/rad.
+
+    The rig's is stiffer then: both in series are what the fit without the effect knows.
+    """
+    if rig.rigid_spring:
+        return []
+    own = rig[STIFFNESS]
+    return [{"stiffness": k * own, STIFFNESS: own / (1.0 - 1.0 / k)} for k in _STIFFER]
+
+
+def _beside_a_train(stiffness: float, rig: Rig) -> dict[str, float]:
+    """Return a start of a gear train that gives between rotor and spring, N m/rad.
+
+    The rotor moves 1 + K_s / stiffness as far as the spring: the fit without it takes that for more inertia
+    and damping.
+    """
+    farther = 1.0 if rig.rigid_spring else 1.0 + rig[STIFFNESS] / stiffness
+    return {"stiffness": stiffness, **{name: rig[name] / farther for name in (INERTIA, DAMPING)}}
+
+
+def _left_of(case: Case, channel: str, simulated: FloatArray) -> float:
+    """Return the RMS of a channel's residual over its noise."""
+    left = (case.measured[channel] - simulated)[case.mask[channel]]
+    return float(np.sqrt(np.mean(left**2))) / case.noise[channel]
 
 
 def _line_hints(

@@ -36,6 +36,8 @@ _HOPE = {1: 0.98, 2: 0.9}
 _MOVED = 0.02
 """Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
 _PAIRED = 3
+_BESIDE_A_PAIR = 1
+"""As many causes may be there when two at once are tried: beside more, pairs bend to whatever is left."""
 _PRESENT_ITERATIONS = 5
 _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
@@ -58,7 +60,7 @@ class Round:
         finalists = self._finalists(screened)
         models = list(self.pool.map(self._fit_all, finalists))
         better = [m for m in models if is_progress(m, self.present)]
-        if not better and is_far(self.present):
+        if not better and len(self.present.causes) <= _BESIDE_A_PAIR and is_far(self.present):
             better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
         chosen, equals = choose(better, self.present.choose)
         final = {h.name for h in finalists}

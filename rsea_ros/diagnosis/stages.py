@@ -11,14 +11,14 @@ from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, score, score_on
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
-from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.solver import Map, Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 _GAIN = 1e-6
-"""Relative fall of the cost below which a fit is done."""
+"""Relative fall of the cost, at the noise, below which a fit is done."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,13 @@ class Stage:
         return confidence_of(self.solution)
 
 
-def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig) -> Stage:
+def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig, run: Map) -> Stage:
     """Re-fit a model on all that does not judge, and judge it."""
     start, weights = chosen.solution, rescored(found.cases, chosen).choose
-    model = fitted(
-        found.cases, start.problem, start.theta, places=(*FIT, *CHOOSE), weights=weights, gain=_GAIN
-    )
+    places = (*FIT, *CHOOSE)
+    model = fitted(found.cases, start.problem, start.theta, places, weights=weights, gain=_GAIN, run=run)
     problem = model.solution.problem
-    train = score_on(problem, found.cases, (*FIT, *CHOOSE), model.outputs)
+    train = score_on(problem, found.cases, places, model.outputs)
     if judging is None:
         on_judge = score_on(problem, found.cases, JUDGE, model.outputs)
         return Stage(model.solution, model.outputs, train, on_judge)

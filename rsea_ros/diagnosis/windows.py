@@ -54,6 +54,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
     """Return the part of a case between two times since its start, s."""
     first, last = int(begin / drive.step), int(end / drive.step)
     start = drive.start + first * drive.step
+    compared = start + _RUN_UP
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
         drive,
@@ -72,7 +73,7 @@ def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
         drive=cut,
         t={n: t[inside[n]] for n, t in case.t.items()},
         measured={n: y[inside[n]] for n, y in case.measured.items()},
-        mask={n: m[inside[n]] for n, m in case.mask.items()},
+        mask={n: (m & (case.t[n] >= compared))[inside[n]] for n, m in case.mask.items()},
     )
 
 
