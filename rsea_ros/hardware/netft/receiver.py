@@ -76,7 +76,7 @@ class Receiver:
 
     def take(self) -> list[Arrival]:
         """Return the records that have come since the last call, oldest first."""
-        self._drain()
+        self.drain()
         taken = []
         while self._waiting:
             taken.append(self._waiting.popleft())
@@ -96,12 +96,12 @@ class Receiver:
         """Drain what nobody takes, and ask again where nothing comes: also of a box that was switched off."""
         asked = time.monotonic()
         while not self._stop.wait(PAUSE):
-            self._drain()
+            self.drain()
             if time.monotonic() - max(asked, self._heard) > ASK_AGAIN:
                 self.send(STREAM)
                 asked = time.monotonic()
 
-    def _drain(self) -> None:
+    def drain(self) -> None:
         """Keep all that has come, unless the other thread is at it."""
         if self._thread is None or not self._draining.acquire(blocking=False):
             return
