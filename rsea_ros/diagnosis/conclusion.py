@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +20,7 @@ from rsea_ros.diagnosis.split import JUDGE, Score, score_on
 from rsea_ros.diagnosis.stages import Stage
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.verdict import reached, verdict_of
+from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import what_is_not_told
@@ -43,7 +43,7 @@ def conclusion(
     checked: Sequence[Checked],
     records: Sequence[Record],
     rig: Rig,
-    pool: Executor,
+    at_work: Workers,
 ) -> Diagnosis:
     """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
     channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
@@ -58,7 +58,7 @@ def conclusion(
     causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
     named = {c.name for c in causes}
     others = [t for t in _latest(found.trials) if t.name not in named]
-    rejected = pool.map(lambda t: _rejected(t, found.cases, channel), others)
+    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel), others)
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 from rsea_ros.diagnosis.conclusion import conclusion
 from rsea_ros.diagnosis.faults import check
@@ -11,11 +10,10 @@ from rsea_ros.diagnosis.pruning import pruned
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.search import search
 from rsea_ros.diagnosis.stages import judged
+from rsea_ros.diagnosis.workers import workers
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
-from rsea_ros.identification.solver import in_pool
-from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
@@ -42,13 +40,13 @@ def diagnose(
     judging = check(holdout, rig) if holdout is not None else None
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
     effects = [e for name, e in catalogue().items() if name not in without]
-    with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        found = search(cases, nominal, effects, pool, tell)
+    with workers() as at_work:
+        found = search(cases, nominal, effects, at_work, tell)
         tell("looking for a simpler model", 0.9)
-        found = pruned(found, effects, pool)
+        found = pruned(found, effects, at_work)
         tell("judging", 0.95)
-        stages = [judged(found, m, judging, rig, in_pool(pool)) for m in found.models]
-        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, pool)
+        stages = [judged(found, m, judging, rig, at_work.run) for m in found.models]
+        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, at_work)
 
 
 def nominal_rig(rig: Rig) -> Rig:

@@ -131,10 +131,11 @@ def as_model(cases: Sequence[Case], solution: Solution) -> Model:
     return Model(solution, outputs, score_on(solution.problem, cases, CHOOSE, outputs))
 
 
-def refitted(cases: Sequence[Case], model: Model) -> Model:
+def refitted(cases: Sequence[Case], model: Model, run: Map) -> Model:
     """Fit a model again with each channel in units of what the model leaves of it."""
     there = model.solution
-    return fitted(cases, there.problem, there.theta, weights=rescored(cases, model).choose, near=there)
+    weights = rescored(cases, model).choose
+    return fitted(cases, there.problem, there.theta, weights=weights, near=there, run=run)
 
 
 def rescored(cases: Sequence[Case], model: Model) -> Model:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -14,15 +13,16 @@ from rsea_ros.diagnosis.hypothesise import extended_problem
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
+from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import start_vector
 
 
-def pruned(found: Search, effects: Sequence[Effect], pool: Executor) -> Search:
+def pruned(found: Search, effects: Sequence[Effect], at_work: Workers) -> Search:
     """Return the search with no cause more than the data need, and its models as they nest."""
-    smaller = Smaller(found.cases, effects, pool)
+    smaller = Smaller(found.cases, effects, at_work)
     return sequenced(with_simpler(without_needless(found, smaller), smaller), smaller)
 
 
@@ -32,13 +32,13 @@ class Smaller:
 
     cases: tuple[Case, ...]
     effects: Sequence[Effect]
-    pool: Executor
+    at_work: Workers
     known: dict[tuple[str, ...], dict[str, Model]] = field(default_factory=dict)
 
     def without(self, model: Model) -> dict[str, Model]:
         """Return by cause the model without it."""
         if model.causes not in self.known:
-            found = self.pool.map(partial(_changed, self.cases, model), model.causes)
+            found = self.at_work.fits.map(partial(self._changed, model), model.causes)
             self.known[model.causes] = dict(zip(model.causes, found, strict=True))
         return self.known[model.causes]
 
@@ -50,13 +50,32 @@ class Smaller:
             for rival in self._taken_for(name)
             if rival not in model.causes and effect_size(rival) < effect_size(name)
         ]
-        found = self.pool.map(lambda pair: _changed(self.cases, model, *pair), pairs)
+        found = self.at_work.fits.map(lambda pair: self._changed(model, *pair), pairs)
         return [(*pair, simpler) for pair, simpler in zip(pairs, found, strict=True)]
 
     def _taken_for(self, name: str) -> list[str]:
         """Return the effects that are said to be confused with one, from either side."""
         own = effect_named(name).claims.confusable_with
         return [e.name for e in self.effects if e.name in own or name in e.claims.confusable_with]
+
+    def _changed(self, model: Model, name: str, rival: str | None = None) -> Model:
+        """Fit a model again without one of its causes, or with a rival of the same size in its place."""
+        problem = model.solution.problem
+        keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
+        rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
+        smaller, theta = (
+            replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)),
+            model.solution.theta[keep],
+        )
+        if rival is None:
+            return fitted(self.cases, smaller, theta, weights=model.choose, run=self.at_work.run)
+        old, new = effect_named(name).main, effect_named(rival)
+        start = new.typical | (
+            {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
+        )
+        larger = extended_problem(smaller, new, start)
+        beginning = np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]])
+        return fitted(self.cases, larger, beginning, weights=model.choose, run=self.at_work.run)
 
 
 def without_needless(found: Search, smaller: Smaller) -> Search:
@@ -106,23 +125,3 @@ def _sorted(model: Model, order: Sequence[str]) -> Model:
 
 def _replaced(found: Search, last: Model, trial: Trial) -> Search:
     return replace(found, models=(found.models[0], last), trials=(*found.trials, trial))
-
-
-def _changed(cases: Sequence[Case], model: Model, name: str, rival: str | None = None) -> Model:
-    """Fit a model again without one of its causes, or with a rival of the same size in its place."""
-    problem = model.solution.problem
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-    smaller, theta = (
-        replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)),
-        model.solution.theta[keep],
-    )
-    if rival is None:
-        return fitted(cases, smaller, theta, weights=model.choose)
-    old, new = effect_named(name).main, effect_named(rival)
-    start = new.typical | (
-        {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
-    )
-    larger = extended_problem(smaller, new, start)
-    beginning = np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]])
-    return fitted(cases, larger, beginning, weights=model.choose)

@@ -7,7 +7,6 @@ that may be fitted to.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,6 +19,7 @@ from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
 from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
+from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, jacobian, solve
@@ -29,8 +29,8 @@ from rsea_ros.signals import FloatArray
 
 _FITS_ON_PIECES = 9
 _FULL_FITS = 3
-_CLOSE = 1.1
-"""Of the best cost on pieces: so close an effect is fitted to everything too."""
+_BEHIND = (4.0, 1.1)
+"""Of the best cost on pieces: so close the first effects must be to be fitted to everything, and the next."""
 _HOPE = {1: 0.98, 2: 0.9}
 """Of the present cost on pieces, far from the floor: above it, one or two effects cannot be progress."""
 _MOVED = 0.02
@@ -51,14 +51,14 @@ class Round:
     effects: Sequence[Effect]
     present: Model
     number: int
-    pool: Executor
+    at_work: Workers
     tell: Progress
 
     def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
         """Return the model to accept, all other trials, and the models that do as well as it."""
         screened = self._screened(self.on_pieces)
         finalists = self._finalists(screened)
-        models = list(self.pool.map(self._fit_all, finalists))
+        models = list(self.at_work.fits.map(self._fit_all, finalists))
         better = [m for m in models if is_progress(m, self.present)]
         if not better and len(self.present.causes) <= _BESIDE_A_PAIR and is_far(self.present):
             better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
@@ -73,9 +73,9 @@ class Round:
         close = []
         for first in firsts[:_PAIRED]:
             seconds = self._screened(self._unfitted(first.effect))[:_PAIRED]
-            close += list(self.pool.map(self._fit_pieces, seconds))
+            close += list(self.at_work.fits.map(self._fit_pieces, seconds))
         best = sorted((h for h in close if h.cost < _HOPE[2] * self.on_pieces.cost), key=lambda h: h.cost)
-        return list(self.pool.map(self._fit_all, best[:2]))
+        return list(self.at_work.fits.map(self._fit_all, best[:2]))
 
     def _unfitted(self, effect: Effect) -> Solution:
         """Return the present model on the pieces with an effect of typical size, as it stands."""
@@ -104,7 +104,7 @@ class Round:
             self._say(effects[i].name, 0.4 * i / len(effects))
             return screen(there, effects[i], self._starts(effects[i]))
 
-        found = [h for h in self.pool.map(screen_one, range(len(effects))) if h is not None]
+        found = [h for h in self.at_work.fits.map(screen_one, range(len(effects))) if h is not None]
         return sorted(found, key=lambda h: h.cost)
 
     def _starts(self, effect: Effect) -> list[dict[str, float]]:
@@ -115,19 +115,19 @@ class Round:
     def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return the best on pieces, and what is said to be confused with the very best."""
         worth = [h for h in screened if h.cost < self.on_pieces.cost][:_FITS_ON_PIECES]
-        close = sorted(self.pool.map(self._fit_pieces, worth), key=lambda h: h.cost)
+        close = sorted(self.at_work.fits.map(self._fit_pieces, worth), key=lambda h: h.cost)
         if not close:
             return []
         best, rivals = close[0].cost, close[0].effect.claims.confusable_with
         if is_far(self.present):
             close = [h for h in close if h.cost < _HOPE[1] * self.on_pieces.cost] or close[:1]
-        near = close[:_FULL_FITS] + [h for h in close[_FULL_FITS : 2 * _FULL_FITS] if h.cost < _CLOSE * best]
+        near = [h for i, h in enumerate(close[: 2 * _FULL_FITS]) if h.cost < _BEHIND[i // _FULL_FITS] * best]
         heard = {h.name for h in near}
         fitted_on_pieces = {h.name for h in close}
         unheard = [h for h in (*close, *screened) if h.name in rivals and h.name not in heard]
         once = {h.name: h for h in reversed(unheard)}.values()
         late = [h if h.name in fitted_on_pieces else self._fit_pieces(h) for h in once]
-        return [*near, *late]
+        return [*near, *(h for h in late if h.cost < _BEHIND[0] * best)]
 
     def _fit_pieces(self, h: Hypothesis) -> Hypothesis:
         self._say(f"fitting {h.name}", 0.5)
@@ -140,8 +140,9 @@ class Round:
         problem, theta = self._with_clocks(h)
         masked = on_places(problem, self.cases, FIT, weights)
         start = min(self._starts_of_all(theta), key=lambda t: float(np.sum(masked.residual(t) ** 2)))
-        first = fitted(self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights)
-        return refitted(self.cases, first) if self._has_moved(first) else first
+        run = self.at_work.run
+        first = fitted(self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run)
+        return refitted(self.cases, first, run) if self._has_moved(first) else first
 
     def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:
         """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.

@@ -6,12 +6,12 @@ A model is fitted on FIT blocks and chosen on CHOOSE blocks; JUDGE blocks are no
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, refitted, requieted, rescored
 from rsea_ros.diagnosis.rounds import Round
 from rsea_ros.diagnosis.trial import Trial
+from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.progress import Progress
@@ -39,24 +39,24 @@ class Search:
 
 
 def search(
-    cases: tuple[Case, ...], nominal: Problem, effects: Sequence[Effect], pool: Executor, tell: Progress
+    cases: tuple[Case, ...], nominal: Problem, effects: Sequence[Effect], at_work: Workers, tell: Progress
 ) -> Search:
     """Find the causes among some effects, most telling first."""
-    models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS)]
+    models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS, run=at_work.run)]
     cases = requieted(cases, models[0])
-    models = [refitted(cases, models[0])]
+    models = [refitted(cases, models[0], at_work.run)]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
     for number in range(_MOST_CAUSES):
         if at_floor(models[-1], cases):
             break
-        accepted, tried, rivals = Round(cases, effects, models[-1], number, pool, tell).play()
+        accepted, tried, rivals = Round(cases, effects, models[-1], number, at_work, tell).play()
         trials += tried
         if accepted is None:
             break
         equals[accepted.causes[-1]] = rivals
         quieter = requieted(cases, accepted)
-        accepted = refitted(quieter, accepted)
+        accepted = refitted(quieter, accepted, at_work.run)
         models = [*(rescored(quieter, m) for m in models), accepted]
         cases = quieter
     return Search(cases, tuple(models), tuple(trials), equals)
