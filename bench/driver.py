@@ -1,8 +1,8 @@
 """What the driver reaches on the bench on a wire, beside a bare loop with absolute deadlines in the same run.
 
-Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000]
-The sections: timing, loss, faults, stream, fuzz; all of them without a name. `timing --seconds 600` is the
-long soak. A machine that is busy or virtual stalls both loops: look at the ratios.
+Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
+The sections: timing, loss, faults, stream, fuzz; all of them without a name. `timing --rate 280
+--seconds 600` is the long soak. A machine that is busy or virtual stalls both loops: look at the ratios.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from bench.driver_fuzz import fuzz
 from bench.driver_loss import loss
 from bench.driver_stream import stream
 from bench.driver_timing import timing
+from bench.sections import chosen, parser_of
 
 SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, str]]]] = {
     "timing": timing,
@@ -32,19 +33,16 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, st
 
 def main() -> None:
     """Measure and print asked | measured."""
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser = parser_of(__doc__)
     parser.add_argument("--seconds", type=float, default=30.0, help="of each run of the loop")
+    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
+    parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
     parser.add_argument("--strings", type=int, default=1_000_000, help="damaged byte strings")
-    args = parser.parse_args()
-    unknown = set(args.sections) - set(SECTIONS)
-    if unknown:
-        parser.error(f"section {', '.join(unknown)}, expected some of {', '.join(SECTIONS)}")
+    args, sections = chosen(parser, SECTIONS)
     print(f"{'what':58} {'asked':22} measured")
-    for name in args.sections or SECTIONS:
+    for _, section in sections:
         with tempfile.TemporaryDirectory() as folder:
-            for row in SECTIONS[name](args, Path(folder)):
+            for row in section(args, Path(folder)):
                 print(f"{row[0]:58} {row[1]:22} {row[2]}", flush=True)
 
 

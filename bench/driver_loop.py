@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.motor import usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits
@@ -23,7 +24,7 @@ class Loop:
                  latency: float = 0.0) -> None:  # fmt: skip
         limits = Limits(68.0, lost_cycles=lost_cycles)
         self.device = DynamixelNetft(
-            MotorSettings(bench.port, 4_000_000, latency=latency or 0.4 / rate),
+            MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate)),
             SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
         )  # fmt: skip
         self.device.open()

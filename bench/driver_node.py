@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ MARK = "RSEA_BENCH_TIMES"
 
 
 class Node:
-    """A driver in a process; `times` after its end: monotonic ns of every cycle's start and publication."""
+    """A driver in a process."""
 
     def __init__(self, folder: Path, **parameters: object) -> None:
         self._file = folder / "times.npy"
@@ -35,7 +36,10 @@ class Node:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def stop(self) -> np.ndarray:
-        """End it and return the times, one cycle a row: begun, sample (middle of the read), published."""
+        """End it and return the times, one cycle a row: due, begun, sample (middle of the read), published.
+
+        The last two are 0 where no reply came in time.
+        """
         self.process.send_signal(signal.SIGINT)
         self.process.wait(20)
         return np.load(self._file)
@@ -47,24 +51,24 @@ def _text(value: object) -> str:
 
 def main() -> int:
     """Run the node with a note of its times."""
+    from rsea_ros.hardware.device import State
     from rsea_ros.nodes import driver
     from rsea_ros.nodes._bench import Bench
 
-    times: list[tuple[int, int, int]] = []
-    begun = [0]
+    times = array("q")  # not objects, which the garbage collector would look at
     step, publish = driver.Driver._step, Bench.publish
 
     def noted_step(self: driver.Driver, stamp: int) -> None:
-        begun[0] = time.monotonic_ns()
+        times.extend((stamp, time.monotonic_ns(), 0, 0))
         step(self, stamp)
 
-    def noted_publish(self: Bench, state: driver.Guarded) -> None:
+    def noted_publish(self: Bench, state: State) -> None:
         publish(self, state)
         now = time.monotonic_ns()
-        times.append((begun[0], state.stamp - time.time_ns() + now, now))
+        times[-2], times[-1] = state.stamp - time.time_ns() + now, now
 
     driver.Driver._step, Bench.publish = noted_step, noted_publish
-    atexit.register(lambda: np.save(os.environ[MARK], np.array(times, dtype=np.int64)))
+    atexit.register(lambda: np.save(os.environ[MARK], np.array(times).reshape(-1, 4)))
     return driver.main()
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import time
 from pathlib import Path
 
@@ -22,7 +21,7 @@ def stream(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]
             before = bench.log(time.monotonic_ns())["ft_gone"]
             lost = int(loop.device.health().get("ft_lost", 0))
             bench.ask("misbehave", ft_drop=0.001)
-            ages = _ages(loop, rate, args.seconds)
+            ages, ready = _ages(loop, rate, args.seconds)
             bench.ask("misbehave", ft_drop=0.0)
             time.sleep(0.1)
             gone = bench.log(time.monotonic_ns())["ft_gone"] - before
@@ -33,18 +32,24 @@ def stream(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]
         rows += [
             (f"{rate:g} Hz: age of the newest record", "≤ 2 cycles",
              f"p99 {np.quantile(cycles, 0.99):.2f}, most {cycles.max():.2f} cycles;"
-             f" {(cycles > 2).sum()} of {len(cycles)} older"),
+             f" {(cycles > 2).sum()} of {len(cycles)} older, {(cycles[ready] > 2).sum()} beside a newer one"),
             (f"{rate:g} Hz: records lost", "counted exactly", f"{counted} counted, {gone} left out"),
         ]  # fmt: skip
     return rows
 
 
-def _ages(loop: Loop, rate: float, seconds: float) -> np.ndarray:
-    """Return the age (ns) of the newest record at the end of each cycle."""
-    ages, newest = [], math.inf
+def _ages(loop: Loop, rate: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the age (ns) of the newest record at the end of each cycle, and whether there was a newer one.
+
+    That is one that had arrived by then, as its stamp shows when it is taken: else the bench sent none.
+    """
+    ends, newest, stamps = [], [], [0]
     for _ in range(round(rate * seconds)):
         state = loop.cycle(0.0)
         if state is not None:
-            newest = state.ft_stamp or newest
-            ages.append(state.stamp - newest)
-    return np.array([a for a in ages if math.isfinite(a)])
+            stamps += [stamp for stamp, _ in state.wrenches]
+            ends.append(state.stamp)
+            newest.append(stamps[-1])
+    taken, arrived, begun = np.array(newest), np.array(stamps), newest.count(0)
+    there = np.searchsorted(arrived, ends) > np.searchsorted(arrived, newest) + 1
+    return (np.array(ends) - taken)[begun:], there[begun:]

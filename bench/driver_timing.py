@@ -1,115 +1,129 @@
-"""Cycles, latency and CPU at 280 Hz and 1 kHz, beside a bare loop with absolute deadlines meanwhile."""
+"""Cycles, latency and CPU of the driver node, beside a bare loop with absolute deadlines meanwhile.
+
+Each rate as any process, then at SCHED_FIFO where that is permitted: driver and bare loop at the same
+priority, the bench on a wire one above, since hardware does not wait for our processor. After each, for half
+as long, a minute at most, and beside another bare loop: a loop of nothing but the two requests to the motor.
+What that one is late, pseudo-terminal and bench are: the kernel hands its bytes on in a worker of usual
+priority. A driver is less often late than that only where it does not wait for a reply.
+"""
 
 from __future__ import annotations
 
 import argparse
 import os
 import random
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
+from bench.bare_loop import BareLoop, permitted
 from bench.driver_node import Node
+from bench.reception import Reception
+from msg_adapters.ros import JointState
 from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._qos import MEASUREMENT
+from rsea_ros.signals import FloatArray
 
 Row = tuple[str, str, str]
-BARE = """
-import sys, time
-rate, seconds = float(sys.argv[1]), float(sys.argv[2])
-first, began = time.monotonic_ns() + 1000000, []
-for k in range(int(rate * seconds)):
-    wait = first + round(k * 1e9 / rate) - time.monotonic_ns()
-    if wait > 0:
-        time.sleep(wait / 1e9)
-    began.append(time.monotonic_ns())
-import numpy
-numpy.save(sys.argv[3], numpy.array(began))
-"""
-SETTLE = 4.0
+SETTLE, LATE = 4.0, 0.3
+"""s; ms more than a period are a late cycle."""
 
 
 def timing(args: argparse.Namespace, folder: Path) -> list[Row]:
-    """Measure both rates."""
+    """Measure each rate with each priority."""
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     rows: list[Row] = []
-    for rate in (280.0, 1000.0):
-        place = folder / f"{rate:g}"
-        place.mkdir()
-        rows += _at(rate, args.seconds, place)
+    for rate in args.rate:
+        for priority in filter(permitted, args.priority):
+            place = folder / f"{rate:g}_{priority}"
+            place.mkdir()
+            rows += _at(rate, args.seconds, priority, place)
     return rows
 
 
-def _at(rate: float, seconds: float, folder: Path) -> list[Row]:
+def _at(rate: float, seconds: float, priority: int, folder: Path) -> list[Row]:
     patient = {"autostart": True, "lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 10.0}
     with RemoteBench(folder / "tty") as bench:
-        node = Node(folder, rate=rate, baud=4_000_000, **bench.parameters(), **patient)
-        received = _Receiver()
-        received.spin(SETTLE)
-        received.delays.clear()
-        words = (str(rate), str(seconds), str(folder / "bare.npy"))
-        bare = subprocess.Popen([sys.executable, "-c", BARE, *words])
-        cpu, begin = node.cpu(), time.monotonic_ns()
-        received.spin(seconds)
-        cpu, end = node.cpu() - cpu, time.monotonic_ns()
-        bare.wait()
-        times = node.stop()
-    times = times[(times[:, 0] > begin) & (times[:, 0] < end)]
-    alone = np.load(folder / "bare.npy")
-    return _rows(rate, seconds, times, np.diff(alone) / 1e6, cpu, np.array(received.delays) * 1e3)
-
-
-def _rows(
-    rate: float, seconds: float, times: np.ndarray, bare: np.ndarray, cpu: float, delays: np.ndarray
-) -> list[Row]:
-    """Return asked beside measured; bare and delays in ms."""
-    period, late = 1e3 / rate, 1e3 / rate + 0.3
-    began = np.diff(times[:, 0]) / 1e6
-    whole = began.sum() / np.round(began / period).sum()
-    published = (times[:, 2] - times[:, 1]) / 1e6
-    here = f"{rate:g} Hz, {seconds:g} s"
-    beyond, beyond_bare = int((began > late).sum()), int((bare > late).sum())
+        if priority:
+            bench.hurry(priority + 1)
+        node = Node(
+            folder, rate=rate, baud=4_000_000, realtime_priority=priority, **bench.parameters(), **patient
+        )
+        reception = Reception({"joint_states": (JointState, MEASUREMENT)})
+        reception.wait("joint_states")
+        time.sleep(SETTLE)
+        reception.forget()
+        bare = BareLoop(rate, seconds, folder, priority)
+        cpu = node.cpu()
+        time.sleep(seconds)
+        cpu = node.cpu() - cpu
+        delays = reception.delays("joint_states")
+        alone, times = bare.cycles(), node.stop()
+        reception.close()
+        alone_for = min(0.5 * seconds, 60.0)
+        floor = _wire_alone(rate, alone_for, priority, folder, bench)
+    times = times[(times[:, 1] > alone[0, 1]) & (times[:, 1] < alone[-1, 1])]
+    here = f"{rate:g} Hz, {seconds:g} s" + (f", FIFO {priority}" if priority else "")
     return [
-        (f"{here}: cycles later than {late:.1f} ms", "≤ 1.5 × bare loop",
-         f"{beyond} of {len(began)}, bare {beyond_bare}, ratio {beyond / max(1, beyond_bare):.2f}"),
-        (f"{here}: mean period", "exact to 0.1 %", f"off by {100 * abs(whole / period - 1):.4f} %"),
-        (f"{here}: period p99, max", "", f"{np.quantile(began, 0.99):.3f}, {began.max():.2f} ms;"
-         f" bare {np.quantile(bare, 0.99):.3f}, {bare.max():.2f} ms"),
-        (f"{here}: bus read to published, p50, p99", "p99 < 0.5 ms",
-         f"{np.median(published):.3f}, {np.quantile(published, 0.99):.3f} ms"),
-        (f"{here}: stamp to reception elsewhere, p50, p99", "p99 < 1 ms",
-         f"{np.median(delays):.3f}, {np.quantile(delays, 0.99):.3f} ms of {len(delays)}"),
+        *_cycles(here, rate, times[:, :2], alone),
+        *_latencies(here, times[:, 2:], delays),
+        (f"{here}: late cycles of the two requests alone, {alone_for:g} s", "", floor),
         (f"{here}: CPU of the driver", "< 20 % at 280 Hz", f"{100 * cpu / seconds:.1f} %"),
+    ]
+
+
+def _wire_alone(rate: float, seconds: float, priority: int, folder: Path, bench: RemoteBench) -> str:
+    """Return how many cycles are late that only ask the motor, and those of the bare loop beside it."""
+    wire = BareLoop(rate, seconds, folder, priority, bench.port)
+    bare = BareLoop(rate, seconds, folder, priority)
+    late, late_alone = (_late(loop.cycles()[:, 1], rate) for loop in (wire, bare))
+    return f"{late} of {int(rate * seconds)}, bare {late_alone}, ratio {late / max(1, late_alone):.2f}"
+
+
+def _late(begun: np.ndarray, rate: float) -> int:
+    """Count the cycles that begin more than LATE after a period; begun: ns."""
+    return int((np.diff(begun) / 1e6 > 1e3 / rate + LATE).sum())
+
+
+def _cycles(here: str, rate: float, node: np.ndarray, bare: np.ndarray) -> list[Row]:
+    """Return how late cycles begin. node, bare: due and begun of each, ns."""
+    period = 1e3 / rate
+    between, alone = np.diff(node[:, 1]) / 1e6, np.diff(bare[:, 1]) / 1e6
+    late, late_alone = _late(node[:, 1], rate), _late(bare[:, 1], rate)
+    numbers = np.round((node[:, 0] - node[0, 0]) * rate / 1e9)
+    on_grid = (node[-1, 1] - node[0, 1]) / 1e6 / numbers[-1]
+    left_out, bare_out = int(numbers[-1]) + 1 - len(node), _left_out(bare, 1e9 / rate)
+    return [
+        (f"{here}: cycles later than {period + LATE:.1f} ms", "≤ 1.5 × bare loop",
+         f"{late} of {len(between)}, bare {late_alone}, ratio {late / max(1, late_alone):.2f}"),
+        (f"{here}: mean period on the grid", "exact to 0.1 %",
+         f"off by {100 * abs(on_grid / period - 1):.4f} %"),
+        (f"{here}: cycles left out, due before the one before began", "",
+         f"{left_out}, {100 * left_out / numbers[-1]:.3f} %; a bare loop that leaves them out: {bare_out}"),
+        (f"{here}: period p99, max", "", f"{np.quantile(between, 0.99):.3f}, {between.max():.2f} ms;"
+         f" bare {np.quantile(alone, 0.99):.3f}, {alone.max():.2f} ms"),
     ]  # fmt: skip
 
 
-class _Receiver:
-    """A subscriber in this process; delays: from stamp to reception by the middleware, s."""
+def _left_out(cycles: np.ndarray, period: float) -> int:
+    """Count the cycles that a loop would not begin because the next one is due already."""
+    k = count = 0
+    while k < len(cycles):
+        late = int((cycles[k, 1] - cycles[k, 0]) / period)
+        count, k = count + late, k + 1 + late
+    return count
 
-    def __init__(self) -> None:
-        import rclpy
-        from rclpy.executors import SingleThreadedExecutor
 
-        from msg_adapters.ros import JointState, stamp_of
-        from rsea_ros.nodes._qos import MEASUREMENT
-
-        if not rclpy.ok():
-            rclpy.init()
-        self.delays: list[float] = []
-        self._node = rclpy.create_node(f"reception{time.monotonic_ns()}")
-
-        def heard(message: object, info: dict[str, int]) -> None:
-            self.delays.append((info["received_timestamp"] - stamp_of(message.header.stamp)) / 1e9)
-
-        self._node.create_subscription(JointState, "/rsea/joint_states", heard, MEASUREMENT)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-
-    def spin(self, seconds: float) -> None:
-        """Receive for a while."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.1)
+def _latencies(here: str, node: np.ndarray, delays: FloatArray) -> list[Row]:
+    """Return those of publication and reception. node: sample and publication, ns, 0 without; delays: ms."""
+    replied = node[:, 0] > 0
+    published = (node[replied, 1] - node[replied, 0]) / 1e6
+    (p50, p99), (r50, r99) = np.quantile(published, [0.5, 0.99]), np.quantile(delays, [0.5, 0.99])
+    return [
+        (f"{here}: cycles without a reply in time", "", f"{(~replied).sum()} of {len(node)}"),
+        (f"{here}: bus read to published, p50, p99", "p99 < 0.5 ms", f"{p50:.3f}, {p99:.3f} ms"),
+        (f"{here}: stamp to reception elsewhere, p50, p99", "p99 < 1 ms",
+         f"{r50:.3f}, {r99:.3f} ms of {len(delays)}"),
+    ]  # fmt: skip

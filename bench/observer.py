@@ -23,6 +23,7 @@ from bench.observer_errors import effects, rigs, walk
 from bench.observer_flag import noise, sines
 from bench.observer_tight import tight
 from bench.observer_timing import timing
+from bench.sections import chosen, parser_of
 
 SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
     "rigs": rigs, "effects": effects, "walk": walk, "sines": sines, "noise": noise, "tight": tight,
@@ -32,18 +33,15 @@ SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
 
 def main() -> None:
     """Measure and print."""
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser = parser_of(__doc__)
     parser.add_argument("--hours", type=float, default=10.0, help="of simulated noise")
     parser.add_argument("--seconds", type=float, default=20.0, help="of each run of the node")
-    args = parser.parse_args()
-    unknown = set(args.sections) - set(SECTIONS)
-    if unknown:
-        parser.error(f"section {', '.join(unknown)}, expected some of {', '.join(SECTIONS)}")
-    for name in args.sections or SECTIONS:
+    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
+    parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
+    args, sections = chosen(parser, SECTIONS)
+    for name, section in sections:
         print(f"== {name}")
-        for line in SECTIONS[name](args):
+        for line in section(args):
             print(line, flush=True)
 
 

@@ -1,6 +1,8 @@
 """The model node in its place: plant, excite and model in processes of their own, this one receives.
 
-Beside it, in the same run: how long ft itself takes to here, and a bare loop with absolute deadlines.
+Each rate as any process, then at SCHED_FIFO where that is permitted: the model node, and one above it the
+plant, which stands for hardware. Beside it, in the same run: how long ft itself takes to here, and a bare
+loop with absolute deadlines.
 """
 
 from __future__ import annotations
@@ -14,47 +16,55 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from bench.driver_timing import BARE
+from bench.bare_loop import BareLoop, permitted
 from bench.observer_node import MARK
+from bench.reception import Reception
+from msg_adapters.ros import JointState, WrenchStamped
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from rsea_ros.signals import FloatArray
 
 ROOT = Path(__file__).resolve().parents[1]
-SETTLE, PATIENCE = 3.0, 120.0
+SETTLE = 3.0
 
 
 def timing(args: argparse.Namespace) -> Iterator[str]:
-    """Measure at 280 Hz and 1 kHz."""
+    """Measure each rate with each priority."""
     os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     yield f"{'what':58} {'asked':18} p50, p99"
-    for rate in (280.0, 1000.0):
+    for rate, priority in product(args.rate, filter(permitted, args.priority)):
         with tempfile.TemporaryDirectory() as folder:
-            yield from _at(rate, args.seconds, Path(folder))
+            yield from _at(rate, priority, args.seconds, Path(folder))
 
 
-def _at(rate: float, seconds: float, folder: Path) -> Iterator[str]:
+def _at(rate: float, priority: int, seconds: float, folder: Path) -> Iterator[str]:
     times = folder / "times.npy"
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(folder), MARK: str(times)}
     nodes = [_start(words, folder, environment) for words in (
         ["-m", "rsea_ros.nodes.plant", "--ros-args", "-p", f"rate:={rate}"],
-        [str(ROOT / "bench/observer_node.py")],
+        [str(ROOT / "bench/observer_node.py"), "--ros-args", "-p", f"realtime_priority:={priority}"],
         ["-m", "rsea_ros.nodes.excite", "--ros-args", "-p", f"rate:={rate}", "-p", "kind:=multisine",
          "-p", "amplitude:=8.0", "-p", "high:=40.0", "-p", f"duration:={seconds + 60.0}"],
     )]  # fmt: skip
+    if priority:
+        os.sched_setscheduler(nodes[0].pid, os.SCHED_FIFO, os.sched_param(priority + 1))
     try:
-        received = _Received()
-        received.wait()
-        received.spin(SETTLE)
-        received.forget()
-        bare = _start(["-c", BARE, str(rate), str(seconds), str(folder / "bare.npy")], folder, environment)
+        reception = Reception({"torque_estimate": (JointState, COMMAND), "ft": (WrenchStamped, MEASUREMENT)})
+        reception.wait("torque_estimate")
+        time.sleep(SETTLE)
+        reception.forget()
+        bare = BareLoop(rate, seconds, folder, priority)
         begin, cpu = time.monotonic_ns(), _cpu(nodes[1])
-        received.spin(seconds)
+        time.sleep(seconds)
         end, cpu = time.monotonic_ns(), _cpu(nodes[1]) - cpu
-        bare.wait()
+        estimates, wrenches = reception.delays("torque_estimate"), reception.delays("ft")
+        lateness = np.abs(np.diff(bare.cycles()[:, 1]) / 1e6 - 1e3 / rate)
+        reception.close()
     finally:
         for node in nodes:
             node.send_signal(signal.SIGINT)
@@ -62,20 +72,20 @@ def _at(rate: float, seconds: float, folder: Path) -> Iterator[str]:
             node.wait()
     rows = np.load(times)
     rows = rows[(rows[:, 0] > begin) & (rows[:, 0] < end)]
-    lateness = np.abs(np.diff(np.load(folder / "bare.npy")) / 1e6 - 1e3 / rate)
-    yield from _told(rate, rows, received, lateness, cpu / seconds)
+    here = f"{rate:g} Hz" + (f", FIFO {priority}: " if priority else ": ")
+    yield from _told(here, rows, estimates, wrenches, lateness, cpu / seconds)
 
 
 def _told(
-    rate: float, rows: FloatArray, received: _Received, lateness: FloatArray, cpu: float
-) -> Iterator[str]:
-    here = f"{rate:g} Hz: "
+    here: str, rows: FloatArray, estimates: FloatArray, wrenches: FloatArray, lateness: FloatArray,
+    cpu: float,
+) -> Iterator[str]:  # fmt: skip
     yield _line(here + "observer and flag, µs", "p99 < 60", rows[:, 3] / 1e3)
     yield _line(here + "the same, CPU time of the thread, µs", "", rows[:, 4] / 1e3)
     yield _line(here + "ft callback to torque_estimate published, ms", "p99 < 0.3", rows[:, 1] / 1e6)
     yield _line(here + "the same, CPU time of the thread, ms", "", rows[:, 2] / 1e6)
-    yield _line(here + "ft stamp to torque_estimate received, ms", "p99 < 1.2 at 1 kHz", received.estimates())
-    yield _line(here + "ft stamp to ft itself received, ms", "", received.wrenches())
+    yield _line(here + "ft stamp to torque_estimate received, ms", "p99 < 1.2 at 1 kHz", estimates)
+    yield _line(here + "ft stamp to ft itself received, ms", "", wrenches)
     yield _line(here + "bare loop, off its period, ms", "", lateness)
     yield f"{here + 'CPU of the model node':58} {'< 15 % at 280 Hz':18} {100.0 * cpu:.1f} % of a core"
 
@@ -95,56 +105,3 @@ def _cpu(process: subprocess.Popen[bytes]) -> float:
     """Return the CPU time of a process so far, s."""
     fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-class _Received:
-    """Delays from stamp to reception by the middleware of this process, ms."""
-
-    def __init__(self) -> None:
-        import rclpy
-        from rclpy.executors import SingleThreadedExecutor
-
-        from msg_adapters.ros import JointState, WrenchStamped, stamp_of
-        from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-
-        if not rclpy.ok():
-            rclpy.init()
-        self._delays: dict[str, list[float]] = {"torque_estimate": [], "ft": []}
-        self._node = rclpy.create_node(f"reception{time.monotonic_ns()}")
-
-        def listen(kind: type, topic: str, qos: object) -> None:
-            def heard(message: object, info: dict[str, int]) -> None:
-                delay = info["received_timestamp"] - stamp_of(message.header.stamp)  # type: ignore[attr-defined]
-                self._delays[topic].append(delay / 1e6)
-
-            self._node.create_subscription(kind, f"/rsea/{topic}", heard, qos)
-
-        listen(JointState, "torque_estimate", COMMAND)
-        listen(WrenchStamped, "ft", MEASUREMENT)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-
-    def spin(self, seconds: float) -> None:
-        """Receive for a while."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.1)
-
-    def wait(self) -> None:
-        """Receive until estimates come."""
-        deadline = time.monotonic() + PATIENCE
-        while len(self._delays["torque_estimate"]) < 100 and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.1)
-
-    def forget(self) -> None:
-        """Count from now on."""
-        for delays in self._delays.values():
-            delays.clear()
-
-    def estimates(self) -> FloatArray:
-        """Return the delays of torque_estimate."""
-        return np.array(self._delays["torque_estimate"])
-
-    def wrenches(self) -> FloatArray:
-        """Return the delays of ft."""
-        return np.array(self._delays["ft"])

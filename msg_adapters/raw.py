@@ -54,19 +54,21 @@ class RawReader:
 
 
 class RawWriter:
-    """Writes stamp and numbers of a field into copies of a serialised message."""
+    """Writes stamp and numbers of some fields into copies of a serialised message."""
 
-    def __init__(self, template: bytes, msgtype: str, field: str) -> None:
+    def __init__(self, template: bytes, msgtype: str, *fields: str) -> None:
         layout = layout_of(template, msgtype)
-        self._at, self._count = layout.fields[field]
         self._bytes = bytearray(template)
-        self._stamp = struct.Struct(layout.order + "iI")
-        self._values = struct.Struct(f"{layout.order}{self._count}d")
+        self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
+        places = (layout.fields[field] for field in fields)
+        self._at = [first + 8 * index for first, count in places for index in range(count)]
 
     def write(self, stamp: int, values: Sequence[float]) -> bytes:
-        """Return the message of a stamp (ns) and as many values as the template has."""
+        """Return the message of a stamp (ns) and values in the order of the fields; more are left out."""
         self._stamp.pack_into(self._bytes, STAMP, stamp // SECOND, stamp % SECOND)
-        self._values.pack_into(self._bytes, self._at, *values[: self._count])
+        pack = self._double.pack_into
+        for at, value in zip(self._at, values, strict=False):
+            pack(self._bytes, at, value)
         return bytes(self._bytes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import signal
@@ -54,6 +55,8 @@ def run(args: argparse.Namespace) -> int:
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motor, bus, sensor, wrong, inlet, sys.stdout.fileno())
     ports = {"ft_port": sensor.port, "page_port": sensor.page}
+    gc.freeze()
+    gc.disable()  # a motor does not pause to tidy up
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.default_int_handler)

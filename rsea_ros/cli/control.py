@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from rsea_ros.model.rig import Rig
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
-FREE = "paper_moving_output"
-DRIVER_LIMIT = 68.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--free",
         metavar="RIG",
-        help=f"rig whose ends are the lightest load (default: the rig, {FREE} where both ends are clamped)",
+        help="rig whose ends are the lightest load (default: the rig, the paper's pendulum if it is clamped)",
     )
     parser.add_argument(
         "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="(default 280 1000)"
@@ -42,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Design, try, write the results."""
+    from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
-    from rsea_ros.model.rig import END_NAMES
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.control_json import control_json
     from rsea_ros.report.control_page import control_report
@@ -51,9 +49,8 @@ def run(args: argparse.Namespace) -> int:
 
     _check_rates(args.rate)
     rig = load_rig(args.rig)
-    free = load_rig(args.free or (FREE if rig.clamped == set(END_NAMES) else args.rig))
     with progress("control") as told:
-        found = study(rig, free, args.rate, motors(rig), progress=told)
+        found = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=told)
     args.out.mkdir(parents=True, exist_ok=True)
     path = write_json(args.out / "control.json", control_json(found))
     report = write_text(args.out / "report.html", control_report(found))
@@ -67,10 +64,12 @@ def run(args: argparse.Namespace) -> int:
 
 def motors(rig: Rig) -> list[Motor]:
     """Return the driver's limit, and those of the catalogue's unit that has the rig's gear ratio."""
+    from rsea_ros.control.controller import Limits
     from rsea_ros.control.study import Motor
     from rsea_ros.design.catalogue import catalogue
 
-    found = [Motor("driver's limit", DRIVER_LIMIT, float("inf"), "torque_limit of config/nodes/driver.yaml")]
+    limit, where = Limits().torque, "torque_limit of config/nodes/driver.yaml"
+    found = [Motor("driver's limit", limit, float("inf"), where)]
     for unit in catalogue().values():
         if unit["ratio"] == rig["gear.ratio"]:
             speed = unit.values.get("no_load_speed", float("inf"))

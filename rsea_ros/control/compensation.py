@@ -19,15 +19,19 @@ Sensor Nonlinearities, 1996, ch. 3, where it jumps):
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from rsea_ros.effects._friction import ln_cosh_and_tanh
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 
 SMOOTHING = 0.3
 """Of K_s gap. A sharper crossing takes more torque than helps: of 0.15 to 1 the best for 3 to 30 N m."""
+
+_ln_cosh_and_tanh: Callable[[float], tuple[float, float]] = ln_cosh_and_tanh.py_func
+"""Without its compiler: a controller that compiles in its first cycles is late."""
 
 COMPENSATED = ("coulomb_friction", "stribeck_friction", "torque_ripple", "backlash")
 
@@ -48,7 +52,8 @@ class Friction:
         change = (end - start) / self.creep
         if abs(change) < 1e-3:
             return size * math.tanh(middle / self.creep)
-        return size * (_ln_cosh(end / self.creep) - _ln_cosh(start / self.creep)) / change
+        over, under = (_ln_cosh_and_tanh(speed / self.creep)[0] for speed in (end, start))
+        return size * (over - under) / change
 
 
 @dataclass(frozen=True)
@@ -105,8 +110,3 @@ def compensation(rig: Rig, names: Iterable[str] = COMPENSATED) -> Compensation:
 
 def _friction(name: str, p: tuple[float, ...]) -> Friction:
     return Friction(p[0], 0.0, 1.0, p[1]) if name == "coulomb_friction" else Friction(*p)
-
-
-def _ln_cosh(x: float) -> float:
-    """Return ln cosh x + ln 2, which no large x overflows."""
-    return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))

@@ -8,7 +8,9 @@ from dataclasses import replace
 from rsea_ros.control.sampled import check_controllable
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig_file import load_rig
 
+LIGHTEST = "paper_moving_output"
 LOCKED = "locked"
 MULTIPLES = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
 """Of the free ends' inertia. At 100 times the paper's load hardly moves at the frequencies of control."""
@@ -22,16 +24,23 @@ def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
     """
     check_controllable(rig)
     loads = {LOCKED: locked(rig)}
-    lightest = with_ends(rig, free or rig)
-    ends = [end for end in END_NAMES if lightest.end_is_free(end)]
+    light = with_ends(rig, free or rig)
+    ends = [end for end in END_NAMES if light.end_is_free(end)]
     if free is not None and not ends:
         raise ParameterError(
             f"rig {free.name}: both ends are clamped, expected a free one: it is the lightest load"
         )
     for multiple in MULTIPLES if ends else ():
-        inertias = {f"{end}.inertia": multiple * lightest[f"{end}.inertia"] for end in ends}
-        loads[f"free x {multiple:g}"] = lightest.with_values(inertias)
+        inertias = {f"{end}.inertia": multiple * light[f"{end}.inertia"] for end in ends}
+        loads[f"free x {multiple:g}"] = light.with_values(inertias)
     return loads
+
+
+def lightest(rig: Rig, name: str = "") -> Rig:
+    """Return the rig whose ends are the lightest load: that of a name, else the rig, LIGHTEST if clamped."""
+    if name:
+        return load_rig(name)
+    return load_rig(LIGHTEST) if rig.clamped == set(END_NAMES) else rig
 
 
 def locked(rig: Rig) -> Rig:

@@ -57,7 +57,7 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the path from start to end = free - gain * mean."""
     low, high = free - abs(gain), free + abs(gain)
-    end, from_start = min(max(start, low), high), _ln_cosh_and_tanh(start)[0]
+    end, from_start = min(max(start, low), high), ln_cosh_and_tanh(start)[0]
     for _ in range(40):
         mean, slope = _mean_sign(start, end, from_start)
         change = (end + gain * mean - free) / (1.0 + gain * slope)
@@ -75,13 +75,13 @@ def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
     if abs(path) < 1e-3:
         mean = math.tanh(0.5 * (a + b))
         return mean, 0.5 * (1.0 - mean * mean)
-    from_b, at_b = _ln_cosh_and_tanh(b)
+    from_b, at_b = ln_cosh_and_tanh(b)
     mean = (from_b - from_a) / path
     return mean, (at_b - mean) / path
 
 
 @njit(inline="always")
-def _ln_cosh_and_tanh(x):  # type: ignore[no-untyped-def]
+def ln_cosh_and_tanh(x):  # type: ignore[no-untyped-def]
     """Return ln cosh x + ln 2, which no large x overflows, and tanh x, of one exponential."""
     small = math.exp(-2.0 * abs(x))
     return abs(x) + math.log1p(small), math.copysign((1.0 - small) / (1.0 + small), x)

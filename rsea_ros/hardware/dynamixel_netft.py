@@ -50,9 +50,14 @@ class DynamixelNetft:
         self._motor.enable()
 
     def read(self) -> State:
-        """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError."""
-        self._take_wrenches()
-        sample = self._motor.read()
+        """Return one synchronous sample of the motor with the newest wrench. Raises DeviceError.
+
+        The sensor's socket is emptied while the motor answers, and of the rest after that.
+        """
+        try:
+            sample = self._motor.read(self._sensor.gather if self._sensor is not None else None)
+        finally:
+            self._take_wrenches()
         wrenches, trouble, self._waiting, self._trouble = self._waiting, self._trouble, [], ""
         stamp, wrench = wrenches[-1] if wrenches else (0, None)
         self._last = State(

@@ -13,6 +13,8 @@ from rsea_ros.errors import DeviceError
 
 SURE = 0.8
 """Share of the time-out from which on the supervisor may have acted."""
+BEATS = 20
+"""A time-out; a beat each cycle would wake the supervisor a thousand times a second."""
 SCRIPT = Path(__file__).with_name("supervisor.py")
 
 
@@ -28,7 +30,7 @@ class Supervisor:
     """Sends `frames` on `descriptor` when this process ends, or does not beat for `timeout` s."""
 
     def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes]) -> None:
-        self._timeout, self._last, self._armed = timeout, 0.0, False
+        self._timeout, self._last, self._told, self._armed = timeout, 0.0, 0.0, False
         words = [str(descriptor), f"{timeout:g}", *(frame.hex() for frame in frames)]
         self._process = subprocess.Popen(
             [sys.executable, "-I", "-S", str(SCRIPT), *words], stdin=subprocess.PIPE,
@@ -38,21 +40,27 @@ class Supervisor:
         assert self._process.stdin is not None
         self._beats = self._process.stdin.fileno()
 
-    def beat(self, armed: bool) -> None:
-        """Say that this process lives, and whether torque is commanded.
+    def beat(self, armed: bool | None = None) -> None:
+        """Say that this process lives, and whether torque is commanded (None: as before).
 
+        A change of that is told at once, else what was told last counts for a 20th of the time-out.
         Raises SupervisorLost, and HeldUp when the last beat is so old that the supervisor may have acted.
         """
         now = time.monotonic()
         gap, armed_before = now - self._last, self._armed
-        self._last, self._armed = now, armed
-        try:
-            os.write(self._beats, b"a" if armed else b"d")
-        except OSError as error:
-            raise SupervisorLost(f"supervisor process: {error.strerror}, expected it to run") from None
+        self._last, self._armed = now, armed_before if armed is None else armed
+        if self._armed != armed_before or now - self._told > self._timeout / BEATS:
+            self._told = now
+            self._tell()
         if armed_before and gap > SURE * self._timeout:
             limit = f"{1e3 * SURE * self._timeout:.0f} ms"
             raise HeldUp(f"no cycle for {1e3 * gap:.0f} ms, limit {limit}: the motor may have been stopped")
+
+    def _tell(self) -> None:
+        try:
+            os.write(self._beats, b"a" if self._armed else b"d")
+        except OSError as error:
+            raise SupervisorLost(f"supervisor process: {error.strerror}, expected it to run") from None
 
     def close(self, *, safe: bool = True) -> None:
         """End it. safe: the motor has acknowledged zero torque; else the supervisor sends its frames."""

@@ -34,7 +34,7 @@ class CommandQueue:
         with self._lock:
             strange = self._strict and stamp != 0 and abs(stamp - now) > HORIZON
             if not math.isfinite(torque) or strange:
-                self.refused += 1
+                self.refuse()
                 return
             if abs(stamp - now) > HORIZON:
                 self.unstamped += 1
@@ -43,6 +43,10 @@ class CommandQueue:
                 self.late += 1
             self._waiting.append((max(stamp, self._taken_until), torque))
             self._waiting.sort(key=lambda waiting: waiting[0])  # of one instant, the last that came counts
+
+    def refuse(self) -> None:
+        """Count a command that is none."""
+        self.refused += 1
 
     def take(self, until: int) -> list[tuple[int, float]]:
         """Return the changes of torque up to an instant (ns), in order: (when, N m)."""

@@ -7,22 +7,21 @@ from typing import Any
 
 from rsea_ros.control.controller import CORNER, Limits, TorqueController
 from rsea_ros.control.law import Gains
-from rsea_ros.control.loads import load_range
+from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.synthesis import Demand, Design, check, design
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import AXIS, Parameter
+from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
 
-LIGHTEST = "paper_moving_output"
 GAINS = ("k_p", "k_d", "q_frequency")
 TABLE = (
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     Parameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
     Parameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
-    Parameter("axis", "torque.z", "actuator axis of the wrench on ft"),
+    AXIS,
     Parameter("k_p", -1.0, "gain on the torque error; -1: all three gains by synthesis", "", -1.0, 1e4),
     Parameter("k_d", -1.0, "gain on the rate of the torque error; -1: see k_p", "s", -1.0, 1e3),
     Parameter("q_frequency", -1.0, "of the disturbance observer's filter; -1: see k_p", "Hz", -1.0, 500.0),
@@ -38,6 +37,7 @@ TABLE = (
     Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
     Parameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     Parameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
+    REALTIME,
 )
 
 
@@ -53,13 +53,6 @@ def design_of(values: Values) -> Design:
         raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all three, or -1 for all")
     names = ("phase_locked", "phase_free", "gain_margin", "delay_margin")
     return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
-
-
-def lightest(rig: Rig, name: str = "") -> Rig:
-    """Return the rig whose ends are the lightest load."""
-    if name:
-        return load_rig(name)
-    return load_rig(LIGHTEST) if rig.clamped == set(END_NAMES) else rig
 
 
 def controller_of(values: Values, found: Design) -> TorqueController:

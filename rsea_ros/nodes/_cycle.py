@@ -6,8 +6,10 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import fmean
 
-import numpy as np
+from rsea_ros.nodes._realtime import exact_timers
 
 SECOND = 1_000_000_000
 LONGEST_CATCH_UP = SECOND
@@ -43,8 +45,8 @@ class Cycle:
 
     def __init__(self, rate: float, work: Callable[[int], None], *, catch_up: bool) -> None:
         self._rate, self._work, self._catch_up = rate, work, catch_up
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._stop, self._over = threading.Event(), threading.Event()
+        self.thread = threading.Thread(target=self._run, daemon=True)
         self._began: list[int] = []
         self._missed = self.left_out = 0
         self.error: Exception | None = None
@@ -53,33 +55,38 @@ class Cycle:
         """Begin with the cycle of stamp `first`, by default one period from now."""
         self._offset = time.time_ns() - time.monotonic_ns()
         self._first = time.time_ns() + self._instant(1) if first is None else first
-        self._thread.start()
+        self.thread.start()
 
     def stop(self) -> None:
         """End after the cycle that runs now."""
         self._stop.set()
-        if self._thread.is_alive() and threading.current_thread() is not self._thread:
-            self._thread.join()
+        if self.thread.is_alive() and threading.current_thread() is not self.thread:
+            self.thread.join()
+
+    def rest(self) -> None:
+        """Return when the work of a cycle is over: what another thread does then holds up none."""
+        self._over.clear()
+        self._over.wait(2.0 / self._rate)
 
     def running(self) -> bool:
         """Tell whether it is still at it. Raises what `work` has raised."""
         if self.error is not None:
             raise self.error
-        return self._thread.is_alive()
+        return self.thread.is_alive()
 
     def timing(self) -> Timing:
         """Return the statistics since the last call."""
         began, self._began = self._began, self._began[-1:]
-        periods = np.diff(began) / SECOND if len(began) > 1 else np.array([0.0])
-        return Timing(
-            float(periods.mean()), float(np.quantile(periods, 0.99)), float(periods.max()), self._missed
-        )
+        periods = sorted(b - a for a, b in pairwise(began)) or [0]
+        p99 = periods[round(0.99 * (len(periods) - 1))]
+        return Timing(fmean(periods) / SECOND, p99 / SECOND, periods[-1] / SECOND, self._missed)
 
     def _instant(self, k: int) -> int:
         return round(k * SECOND / self._rate)
 
     def _run(self) -> None:
         k = 0
+        exact_timers()
         try:
             while not self._stop.is_set():
                 due = self._first + self._instant(k) - self._offset
@@ -89,6 +96,7 @@ class Cycle:
                 late = int((now - due) * self._rate / SECOND)
                 self._missed += late > 0
                 self._work(due + self._offset)
+                self._over.set()
                 allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
                 skipped = late if late > allowed else 0
                 self.left_out += skipped

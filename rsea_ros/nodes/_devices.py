@@ -9,6 +9,7 @@ from typing import Any
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import Device
 from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.motor import usual_latency
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel.tables import TABLES
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
@@ -28,7 +29,10 @@ MOTOR = (
     Parameter("id", 1, "of the motor on its bus", "", 0, 252),
     Parameter("model", 0, f"number that the motor must have: {KNOWN}; 0: any of them", "", 0, 65535),
     Parameter("torque_constant", 6.826, "torque at the gear output for a current", "N m/A", 0.1, 100.0),
-    Parameter("latency", 0.0, "what adapter and host may add to a reply; 0: 0.4 of a cycle", "s", 0.0, 0.1),
+    Parameter(
+        "latency", 0.0, "what adapter and host may add to a reply; 0: by the rate, docs/hardware.md", "s",
+        0.0, 0.1,
+    ),
     Parameter("watchdog", 0.1, "time without the driver after which the motor is stopped", "s", 0.02, 2.5),
 )
 SENSOR = (
@@ -83,7 +87,7 @@ def _dynamixel_netft(values: Values) -> Device:
         identity=values["id"],
         model=values["model"],
         torque_constant=values["torque_constant"],
-        latency=values["latency"] or 0.4 / values["rate"],
+        latency=values["latency"] or usual_latency(values["rate"]),
         watchdog=values["watchdog"],
     )
     sensor = SensorSettings(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))

@@ -7,19 +7,14 @@ from collections import deque
 from collections.abc import Iterator
 from operator import itemgetter
 from statistics import median
-from typing import Any
 
 from rclpy.node import Node
-from rclpy.subscription import Subscription
 
-from msg_adapters.raw import RawReader
-from msg_adapters.ros import JointState, WrenchStamped
-from msg_adapters.topics import AXES, TYPES
-from rsea_ros.errors import ParameterError
+from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
 from rsea_ros.model.observer import Estimate, Observer
-from rsea_ros.nodes._bench import Polled
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._mailbox import Mailbox
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
@@ -27,44 +22,33 @@ PERIODS = 64
 _STATE, _FT = range(2)
 
 
-def _unused(message: object) -> None:
-    """Stand for the callback that rclpy wants: messages are taken."""
-
-
 class Inputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool) -> None:
-        self._node, self._observer = node, observer
+        self._observer = observer
         self._sign = -1.0 if axis.startswith("-") else 1.0
-        self._readers = {
-            "torque_command": RawReader(TYPES["torque_command"], [("effort", 0)]),
-            "joint_states": RawReader(TYPES["joint_states"], [("position", 0), ("effort", 0)]),
-            "ft": RawReader(TYPES["ft"], [("wrench", AXES.index(axis.removeprefix("-")))]),
-        }
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
         self._state_stamp = self._ft_stamp = self._told = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
-        group, deep = Polled(), RECORD_RELIABLE if reliable else None
+        deep = RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
-            node.create_subscription(
-                kind, topic, lambda _: None, deep or usual, callback_group=group, raw=True
-            )
-            for kind, topic, usual in (
-                (JointState, "torque_command", COMMAND),
-                (JointState, "joint_states", MEASUREMENT),
-                (WrenchStamped, "ft", MEASUREMENT),
+            Mailbox(node, kind, topic, deep or usual, self._refuse, *fields)
+            for kind, topic, usual, *fields in (
+                (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),
+                (JOINT_STATE, "joint_states", MEASUREMENT, ("position", 0), ("effort", 0)),
+                (WRENCH, "ft", MEASUREMENT, ("wrench", AXES.index(axis.removeprefix("-")))),
             )
         )
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
         """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
-        for stamp, (torque,) in self._new("torque_command", self._commands):
+        for stamp, (torque,), _ in self._commands.take():
             self._command(stamp, torque)
-        samples = [(t, q, u, _STATE) for t, (q, u) in self._new("joint_states", self._states)]
-        samples += [(t, self._sign * y, math.nan, _FT) for t, (y,) in self._new("ft", self.ft)]
+        samples = [(t, q, u, _STATE) for t, (q, u), _ in self._states.take()]
+        samples += [(t, self._sign * y, math.nan, _FT) for t, (y,), _ in self.ft.take()]
         samples.sort(key=itemgetter(0, 3))
         for stamp, a, b, kind in samples:
             estimate = self._measured(stamp, a, b, kind)
@@ -113,17 +97,9 @@ class Inputs:
             self.unstamped += 1
             stamp = newest
         if not math.isfinite(torque):
-            self.refused += 1
+            self._refuse()
         elif stamp:
             self._observer.command(self.seconds(stamp), torque)
 
-    def _new(self, topic: str, subscription: Subscription[Any]) -> Iterator[tuple[int, list[float]]]:
-        """Yield stamp and numbers of the messages that wait in a subscription."""
-        reader, handle, kind = self._readers[topic], subscription.handle, subscription.msg_type
-        with handle:
-            while (message := handle.take_message(kind, True)) is not None:
-                try:
-                    yield reader.read(message[0])
-                except ParameterError as error:
-                    self.refused += 1
-                    self._node.get_logger().error(f"{topic}: {error}", throttle_duration_sec=1.0)
+    def _refuse(self) -> None:
+        self.refused += 1

@@ -10,6 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from msg_adapters.ros import parameter_descriptor
+from msg_adapters.topics import AXES
 from rsea_ros.errors import ParameterError
 
 Value = bool | int | float | str
@@ -57,6 +58,12 @@ class Parameter:
         return math.isfinite(value) and (
             self.low is None or self.high is None or self.low <= value <= self.high
         )
+
+
+AXIS = Parameter(
+    "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
+)
+"""Of every node that listens to ft."""
 
 
 def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:

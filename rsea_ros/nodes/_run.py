@@ -16,10 +16,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import Parameter, declare, usage
 
 NAMESPACE = "rsea"
 SUCCESS, BAD_INPUT, INTERRUPTED = 0, 2, 130
+TICK = 0.1
+"""s between looks at whether to stop, and whether the program has finished."""
 
 
 class Program(Protocol):
@@ -101,8 +104,10 @@ def _work(node: Node, program: Program, stop: _Stop) -> bool:
     try:
         done = False
         while not (stop.asked or done):
-            executor.spin_once(timeout_sec=0.1)
+            ready = anything_to_do(node, executor, TICK)
             done = program.finished()
+            if ready and not done:
+                executor.spin_once(timeout_sec=0.0)
         stop.interrupt()
         program.conclude()
         return done

@@ -1,9 +1,10 @@
-"""A thread that works when a subscription has something: rclpy's executor costs more than the work."""
+"""A thread that works when subscriptions have something: rclpy's executor costs more than the work."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from typing import Any
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -11,48 +12,53 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._realtime import exact_timers
 
 
 class Waiter:
-    """Call `work()` when a subscription (that no executor serves) has messages, and after every pause (s).
+    """Call `work()` when subscriptions (that no executor serves) have messages, and after every pause (s).
 
     The wait set is rclpy's own, as rclpy.wait_for_message uses it.
     """
 
     def __init__(
-        self, node: Node, subscription: Subscription[Any], work: Callable[[], None], pause: float
+        self, node: Node, subscriptions: Sequence[Subscription[Any]], work: Callable[[], None], pause: float
     ) -> None:
-        self._context, self._subscription, self._work = node.context, subscription, work
+        self._context, self._subscriptions, self._work = node.context, subscriptions, work
         self._pause = round(pause * SECOND)
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        self.thread = threading.Thread(target=self._run, daemon=True)
         self.error: Exception | None = None
 
     def start(self) -> None:
         """Begin."""
-        self._thread.start()
+        self.thread.start()
 
     def stop(self) -> None:
         """End within a pause."""
         self._stop.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        if self.thread.is_alive():
+            self.thread.join()
 
     def running(self) -> bool:
         """Tell whether it is still at it. Raises what `work` has raised."""
         if self.error is not None:
             raise self.error
-        return self._thread.is_alive()
+        return self.thread.is_alive()
 
     def _run(self) -> None:
+        exact_timers()
         try:
-            context, subscription = self._context.handle, self._subscription.handle
+            context, handles = self._context.handle, [s.handle for s in self._subscriptions]
             assert context is not None
-            with context, subscription:
-                waits = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, context)
+            with ExitStack() as kept:
+                for handle in (context, *handles):
+                    kept.enter_context(handle)
+                waits = rclpy_implementation.WaitSet(len(handles), 0, 0, 0, 0, 0, context)
                 while not self._stop.is_set():
                     waits.clear_entities()
-                    waits.add_subscription(subscription)
+                    for handle in handles:
+                        waits.add_subscription(handle)
                     waits.wait(self._pause)
                     self._work()
         except Exception as error:  # handed to the main thread by `running`

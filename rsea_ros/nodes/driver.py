@@ -24,6 +24,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once, usual_priority
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -32,19 +33,17 @@ TABLE = (
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     Parameter("autostart", False, "whether to configure and activate at once"),
+    REALTIME,
     *MOTOR,
     *SENSOR,
     *LIMITS,
 )
-SWITCH_INTERVAL = 2e-4
-"""s after which a thread of Python must let the cycle in; the default of 5 ms is longer than a cycle."""
 
 
 class Driver(ManagedEntity):
     """One device behind its limits, its cycle and its topics, from configure to cleanup."""
 
     def __init__(self, node: LifecycleNode, values: dict[str, Any]) -> None:
-        sys.setswitchinterval(SWITCH_INTERVAL)
         self._node, self._values = node, values
         self._guarded = Guarded(DEVICES[values["device"]](values), limits_of(values), values["rate"])
         self._cycle: Cycle | None = None
@@ -71,7 +70,9 @@ class Driver(ManagedEntity):
         self._guarded.guard.clear()
         self._bench = Bench(self._node, strict=True, every_record=self._values["ft_all"])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
+        let_in_at_once()
         self._cycle.start()
+        hurry(self._node, self._cycle.thread, self._values["realtime_priority"])
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -99,8 +100,13 @@ class Driver(ManagedEntity):
     on_shutdown = on_error = on_cleanup
 
     def finished(self) -> bool:
-        """Tell of faults; go back to unconfigured when the cycle has ended with an exception."""
+        """Tell of faults; go back to unconfigured when the cycle has ended with an exception.
+
+        What the executor does next begins between two cycles.
+        """
         self._tell()
+        if self._cycle is not None:
+            self._cycle.rest()
         error = self._cycle.error if self._cycle is not None else None
         if error is not None:
             self._fail(error)
@@ -120,6 +126,8 @@ class Driver(ManagedEntity):
                 self._cycle.stop()
         finally:
             self._guarded.device.close()
+        if self._cycle is not None and self._values["realtime_priority"]:
+            usual_priority()
         if self._bench is not None:
             self._bench.close()
         if self._cycle is not None:
@@ -184,6 +192,7 @@ class Driver(ManagedEntity):
     def _report(self) -> Report:
         if self._cycle is None or self._bench is None:
             return Report(ERROR if self._ended else OK, self._ended or "not configured", {})
+        self._cycle.rest()
         fault: Fault | None = self._guarded.fault
         report = self._bench.report(self._cycle)
         values = {

@@ -16,12 +16,12 @@ from rclpy.node import Node
 from msg_adapters.contents import Contents
 from msg_adapters.reading import record_from
 from msg_adapters.ros import Trigger, message_type
-from msg_adapters.topics import AXES, ROLES, TYPES, TopicMap
+from msg_adapters.topics import ROLES, TYPES, TopicMap
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, Report
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
@@ -30,9 +30,7 @@ from rsea_ros.signals import Record
 TABLE = (
     Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
     Parameter("out", "out/identify", "directory of the results"),
-    Parameter(
-        "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
-    ),
+    AXIS,
     Parameter(
         "quiet", 1.0, "finish so long after the last command, once nobody publishes any", "s", 0.1, 1e3
     ),

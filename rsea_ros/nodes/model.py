@@ -11,7 +11,7 @@ from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
 from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
-from msg_adapters.topics import AXES, TYPES
+from msg_adapters.topics import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
 from rsea_ros.model.rig_file import load_rig
@@ -21,8 +21,9 @@ from rsea_ros.nodes._health import Health, Report
 from rsea_ros.nodes._model_health import ModelHealth
 from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED
+from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
 
@@ -33,9 +34,7 @@ TABLE = (
     Parameter(
         "identification", "", "identification.json whose measured noise counts; empty: that of the rig"
     ),
-    Parameter(
-        "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
-    ),
+    AXIS,
     Parameter("duration", 60.0, "time over which drifts of the model come to their full size", "s", 1.0, 1e6),
     Parameter(
         "ft_timeout", 0.02, "time without ft after which joint_states make the estimates", "s", 1e-3, 1.0
@@ -49,6 +48,7 @@ TABLE = (
     Parameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
     Parameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
     Parameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
+    REALTIME,
 )
 NAMES = ("distal", "proximal", "disturbance")
 TICK = 0.02
@@ -73,8 +73,10 @@ class Model:
         self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report)
-        self._waiter = Waiter(node, self._inputs.ft, self._work, TICK)
+        self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
+        let_in_at_once()
         self._waiter.start()
+        hurry(node, self._waiter.thread, values["realtime_priority"])
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
 
     def _work(self) -> None:

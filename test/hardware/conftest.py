@@ -16,13 +16,13 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 
 PERIOD = 1.0 / 280.0
 STIFFNESS = 1530.456
-LATENCY, FT_TIMEOUT = 0.03, 0.2
+LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 """s; a machine that is busy with other tests must not look like a fault."""
 
 
 def device_on(bench, limits=None, **motor):
     """The driver's device on a bench."""
-    settings = MotorSettings(bench.port, 4_000_000, latency=motor.pop("latency", LATENCY), **motor)
+    settings = MotorSettings(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
     sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
     return DynamixelNetft(settings, sensor, limits or Limits(68.0), STIFFNESS)
 

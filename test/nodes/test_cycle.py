@@ -64,6 +64,6 @@ def test_the_first_stamp_is_the_one_asked_for():
 def test_what_the_work_raises_is_raised_to_whoever_asks():
     cycle = Cycle(RATE, lambda stamp: 1 / 0, catch_up=True)
     cycle.start()
-    cycle._thread.join(30.0)
+    cycle.thread.join(30.0)
     with pytest.raises(ZeroDivisionError):
         cycle.running()

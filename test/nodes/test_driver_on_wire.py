@@ -186,7 +186,21 @@ def test_sigint_leaves_torque_zero_and_off(wire):
     assert wire.goal() == (0, False)
 
 
-def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener, tmp_path):
+@pytest.fixture
+def script():
+    """A function that starts a driver made of a script; it is killed however the test ends."""
+    started = []
+
+    def begin(program, remaps, parameters):
+        started.append(Script(program, remaps, parameters))
+        return started[-1]
+
+    yield begin
+    for process in started:
+        process.kill()
+
+
+def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener, tmp_path, script):
     """The real driver, whose code for limits breaks after a while."""
     code = (
         "import sys\nfrom rsea_ros.hardware import limits\nfrom rsea_ros.nodes import driver\n"
@@ -197,10 +211,9 @@ def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener,
     )
     program = tmp_path / "broken.py"
     program.write_text(code)
-    wire = Driven(bench(54024), listener, "broken", lambda name, remaps, **p: Script(program, remaps, p))
+    wire = Driven(bench(54024), listener, "broken", lambda name, remaps, **p: script(program, remaps, p))
     wire.drive()
     wire.push(lambda: wire.goal() == (0, False))
-    wire.process.kill()
 
 
 def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, listener):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
@@ -39,9 +40,12 @@ class Bus:
         self._check("ping", result, error)
         return int(model)
 
-    def read(self, address: int, size: int) -> bytes:
-        """Return bytes of the control table. Raises NoReply, Refused, PortLost."""
-        self.handler.expected = size
+    def read(self, address: int, size: int, meanwhile: Callable[[], None] | None = None) -> bytes:
+        """Return bytes of the control table. Raises NoReply, Refused, PortLost.
+
+        meanwhile: done while the reply is on its way.
+        """
+        self.handler.expected, self.handler.meanwhile = size, meanwhile
         data, result, error = self.handler.readTxRx(self.port, self._id, address, size)
         self._check(f"read of {size} bytes at {address}", result, error)
         return bytes(data)

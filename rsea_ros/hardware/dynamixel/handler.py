@@ -5,7 +5,7 @@ txPacket of dynamixel-sdk 4.1.0 sends FF FF FD unstuffed, removeStuffing loses b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from dynamixel_sdk import (
     COMM_RX_CORRUPT,
@@ -29,12 +29,14 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
 
     expected: parameters of the reply that is waited for; one of another size answers an older request, is
     left out and counted (`stale`). None: any. A refusal has no parameters and is let through.
+    meanwhile: done once while the next reply is on its way.
     """
 
     def __init__(self) -> None:
         self.receiver = Receiver()
         self.stale = 0
         self.expected: int | None = None
+        self.meanwhile: Callable[[], None] | None = None
         self._frames: list[bytes] = []
 
     def updateCRC(self, crc_accum: int, data_blk_ptr: Sequence[int], data_blk_size: int) -> int:
@@ -69,6 +71,9 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     def rxPacket(self, port: Port, fast_option: bool) -> tuple[bytes, int]:
         """Wait for the next status packet until the port's time is over. Raises PortLost."""
         rejected = self.receiver.rejected.total()
+        meanwhile, self.meanwhile = self.meanwhile, None
+        if meanwhile is not None:
+            meanwhile()
         while True:
             while self._frames:
                 packet = self._frames.pop(0)

@@ -17,6 +17,8 @@ from rsea_ros.hardware.dynamixel.tables import TABLES, ControlTable, Item, error
 from rsea_ros.hardware.supervised import Supervisor
 
 T = TypeVar("T")
+SHARE, REST = 0.4, 1e-4
+"""What a reply may be late: part of a cycle, less so many s, half of what the rest of a cycle takes."""
 ATTEMPTS, PATIENCE = 5, 0.02
 """Of a transaction outside the cycle: how often it is tried, and how late a reply may be each time, s."""
 TORQUE_MODE, ACKNOWLEDGE_ALL = 0, 2
@@ -31,8 +33,9 @@ class Settings:
     """Where the motor is and what it is.
 
     baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
-    per A. latency: what adapter and scheduler may add to the time on the wire, s. watchdog: s without the
-    host after which the motor's own watchdog, or the supervisor, takes the torque away.
+    per A. latency: what adapter and scheduler may add to the time on the wire, s; a reading gets in addition
+    what the write before it has left of it. watchdog: s without the host after which the motor's own
+    watchdog, or the supervisor, takes the torque away.
     """
 
     path: str
@@ -42,6 +45,11 @@ class Settings:
     torque_constant: float = 6.826
     latency: float = 1e-3
     watchdog: float = 0.1
+
+
+def usual_latency(rate: float) -> float:
+    """Return the latency (s) with which a cycle that loses both replies still ends in time. rate: Hz."""
+    return max(SHARE / rate - REST, REST)
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,7 @@ class Motor:
         self._port = Port(settings.path, settings.baud, settings.latency)
         self.bus = Bus(self._port, settings.identity)
         self._supervisor: Supervisor | None = None
-        self._longer = 0
+        self._longer, self._spared = 0, 0.0
         self.table: ControlTable | None = None
         self.torque_limit = math.nan
 
@@ -107,20 +115,27 @@ class Motor:
             if self._supervisor is not None:
                 self._supervisor.beat(False)
 
-    def read(self) -> Sample:
+    def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
         """Read everything that is measured, once. Raises NoReply, PortLost, Refused.
+
+        meanwhile: done while the reply is on its way.
 
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
         size and cannot be taken for the new one.
         """
+        if self._supervisor is not None:
+            self._supervisor.beat()  # to wait for a reply that is lost is not to hang
         table = self._known
         start, size = table.sample
-        begin = time.monotonic_ns()
+        begin, usual = time.monotonic_ns(), self._port.latency
+        self._port.latency = usual + self._spared
         try:
-            data = self.bus.read(start, size + self._longer)
+            data = self.bus.read(start, size + self._longer, meanwhile)
         except NoReply:
             self._longer ^= 1
             raise
+        finally:
+            self._port.latency, self._spared = usual, 0.0
         instant = (begin + time.monotonic_ns()) // 2
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
         counts = table.position.value(data, start)
@@ -141,6 +156,7 @@ class Motor:
             self._supervisor.beat(torque != 0.0)
         table = self._known
         self.bus.put(table.goal_torque, round(torque / self._settings.torque_constant / table.ampere))
+        self._spared = self._port.left
 
     def torque_of(self, current: float) -> float:
         """Return the torque (N m) of a current (A)."""

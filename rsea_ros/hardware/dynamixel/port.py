@@ -30,6 +30,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.baudrate = baud
         self.latency, self.return_delay = latency, 500e-6
         self._deadline = 0.0
+        self._arrivals: select.epoll | None = None
         self.descriptor = -1
 
     def open(self) -> None:
@@ -41,10 +42,14 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.is_open, self.is_using = True, False
         self.descriptor = self.ser.fileno()
         self.ser.reset_input_buffer()
+        self._arrivals = select.epoll()
+        self._arrivals.register(self.descriptor, select.EPOLLIN | select.EPOLLET)
 
     def close(self) -> None:
         """Let the port go."""
         self.is_open, self.descriptor = False, -1
+        if self._arrivals is not None:
+            self._arrivals.close()
         if self.ser is not None:
             self.ser.close()
 
@@ -72,8 +77,8 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     def clearPort(self) -> None:
         """Throw away what has come in."""
-        while self._take():
-            pass
+        while self._arrived(0.0):
+            self._take()
 
     def setPacketTimeout(self, packet_length: int) -> None:
         """Begin to wait for a reply of so many bytes, after a request of at most 16."""
@@ -84,18 +89,32 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Begin to wait."""
         self._deadline = time.monotonic() + 1e-3 * msec
 
+    @property
+    def left(self) -> float:
+        """What is left of the wait, s."""
+        return max(0.0, self._deadline - time.monotonic())
+
     def isPacketTimeout(self) -> bool:
         """Tell whether the wait is over."""
         return time.monotonic() > self._deadline
 
     def receive(self) -> bytes:
         """Return what comes before the deadline, empty after it. Raises PortLost."""
-        wait = max(0.0, self._deadline - time.monotonic())
+        return self._take() if self._arrived(self.left) else b""
+
+    def _arrived(self, wait: float) -> bool:
+        """Tell whether something has come in since it was last looked at, within a time (s).
+
+        Edges, not levels: to look into an empty terminal, as select and read do, is to wait for the kernel's
+        thread that fills it, whatever the time-out, on a busy machine for a cycle.
+        """
+        if self._arrivals is None:
+            return False
         try:
-            ready, _, _ = select.select((self.descriptor,), (), (), wait)
+            select.select((self._arrivals,), (), (), wait)  # epoll itself counts in ms
+            return bool(self._arrivals.poll(0.0))
         except (OSError, ValueError) as error:
             raise PortLost(f"port {self.port_name}: {error} while waiting for a reply") from None
-        return self._take() if ready else b""
 
     def _take(self) -> bytes:
         try:

@@ -1,4 +1,4 @@
-"""A thread that drains the socket: the newest record is at hand, and every record has its own stamp."""
+"""Drains the socket whenever somebody asks, and by a thread: every record has the stamp of its arrival."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ SO_TIMESTAMPNS = 35
 """Linux: the kernel stamps a datagram on arrival, however late the thread comes to fetch it."""
 _STAMP = struct.Struct("@qq")
 ANCILLARY = socket.CMSG_SPACE(_STAMP.size)
-PAUSE = 1e-3
-"""s between two drainings; the kernel keeps 7 records meanwhile at 7 kHz, and holds 256."""
+PAUSE = 0.01
+"""s between two looks of the thread; the kernel keeps 70 records meanwhile at 7 kHz, and holds 256."""
 ASK_AGAIN = 0.2
 """s of silence after which the stream is asked for again."""
 KEPT = 4096
+STAMPING = 100
+"""Tries, of 1 ms each."""
 
 
 class Arrival(NamedTuple):
@@ -43,6 +45,8 @@ class Receiver:
         self.refused: Counter[str] = Counter()
         self._waiting: deque[Arrival] = deque(maxlen=KEPT)
         self.newest: Arrival | None = None
+        self._heard = 0.0
+        self._draining = threading.Lock()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -53,7 +57,7 @@ class Receiver:
             self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
             self._socket.connect(self._address)  # from nobody else
-            self._socket.settimeout(ASK_AGAIN)
+            _until_stamped()
             self._socket.send(request(STREAM))
         except OSError as error:
             raise DeviceError(f"F/T sensor {self._address[0]}:{self._address[1]}: {error}") from None
@@ -72,6 +76,7 @@ class Receiver:
 
     def take(self) -> list[Arrival]:
         """Return the records that have come since the last call, oldest first."""
+        self.drain()
         taken = []
         while self._waiting:
             taken.append(self._waiting.popleft())
@@ -88,33 +93,53 @@ class Receiver:
             self._thread = None
 
     def _run(self) -> None:
-        while not self._stop.is_set():
-            try:
-                self._keep(*self._socket.recvmsg(SIZE_AND_MORE, ANCILLARY))
-                self._drain()
-            except TimeoutError:
+        """Drain what nobody takes, and ask again where nothing comes: also of a box that was switched off."""
+        asked = time.monotonic()
+        while not self._stop.wait(PAUSE):
+            self.drain()
+            if time.monotonic() - max(asked, self._heard) > ASK_AGAIN:
                 self.send(STREAM)
-            except OSError:  # the box is switched off: its port is closed until it is back
-                self._stop.wait(ASK_AGAIN)
-                self.send(STREAM)
-            self._stop.wait(PAUSE)
+                asked = time.monotonic()
 
-    def _drain(self) -> None:
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                self._keep(*self._socket.recvmsg(SIZE_AND_MORE, ANCILLARY, socket.MSG_DONTWAIT))
+    def drain(self) -> None:
+        """Keep all that has come, unless the other thread is at it."""
+        if self._thread is None or not self._draining.acquire(blocking=False):
+            return
+        try:
+            with contextlib.suppress(OSError):  # nothing more is there, or the box is switched off
+                while True:
+                    self._keep(*self._socket.recvmsg(SIZE_AND_MORE, ANCILLARY, socket.MSG_DONTWAIT))
+        finally:
+            self._draining.release()
 
     def _keep(self, data: bytes, ancillary: list[tuple[int, int, bytes]], flags: int, sender: object) -> None:
+        self._heard = time.monotonic()
         record = decode(data)
         if record is None:
             self.refused["length"] += 1
         elif self.sequence.accept(record):
-            self.newest = Arrival(_arrived(ancillary), record)
-            self._waiting.append(self.newest)
+            arrival = Arrival(_arrived(ancillary), record)
+            self._waiting.append(arrival)
+            self.newest = arrival
 
 
 SIZE_AND_MORE = 64
 """Bytes asked of the socket: more than a record, so that one which is too long is seen to be."""
+
+
+def _until_stamped() -> None:
+    """Wait until the kernel stamps what arrives: it begins some ms after it was asked to, and gives the time
+    of fetching until then. A datagram that is fetched a while after it was sent shows it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        probe.bind(("127.0.0.1", 0))
+        probe.connect(probe.getsockname())
+        for _ in range(STAMPING):
+            probe.send(b"")
+            sent = time.time_ns()
+            time.sleep(1e-3)
+            if _arrived(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
+                return
 
 
 def _arrived(ancillary: list[tuple[int, int, bytes]]) -> int:

@@ -61,6 +61,10 @@ class Sensor:
         self.noise = _six(values.std(axis=0))
         self._restart_watch()
 
+    def gather(self) -> None:
+        """Fetch what has come, so that the next `take` has little to do."""
+        self._receiver.drain()
+
     def take(self) -> tuple[list[tuple[int, Wrench]], str]:
         """Return the records since the last call as (stamp, wrench), and what is wrong: '' for nothing."""
         arrivals = self._receiver.take()

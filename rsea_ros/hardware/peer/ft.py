@@ -68,8 +68,9 @@ class ForceSensor:
         elif command == RESET_LATCH:
             self.status = 0 if self.status == 0x8001_0000 else self.status
 
-    def tick(self, now: int) -> None:
-        """Send all records that are due."""
+    def tick(self, now: int) -> bool:
+        """Send all records that are due; tell whether there were any, the plant then being up to date."""
+        due = self._client is not None and self._due <= now
         while self._client and self._due <= now:
             self._due += self._period
             self._counts = _counts(self._plant)
@@ -81,6 +82,7 @@ class ForceSensor:
                 self.gone += 1
                 continue
             self._send(now)
+        return due
 
     def gap(self, records: int) -> None:
         """Leave out so many records at once."""

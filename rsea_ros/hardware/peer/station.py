@@ -11,8 +11,8 @@ from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.motor import Motor, Plant
 
-TICK = 1_000_000
-"""ns; the plant is advanced at least so often."""
+TICK = 5_000_000
+"""ns; the plant's steps until now are worked off whenever somebody looks, and at least so often."""
 
 
 class Requests(Protocol):
@@ -41,11 +41,13 @@ class Station:
                 self._bus.serve(now)
             if self._sensor.descriptor in ready:
                 self._sensor.serve(now)
-            self._sensor.tick(now)
+            advanced = self._sensor.tick(now)
             self._bus.flush(now)
             self._motor.serve(now)
-            if now >= self._tick:
+            if now >= self._tick and not advanced:
                 self._plant.read()
+                advanced = True
+            if advanced:
                 self._tick = now + TICK
             if self._requests.descriptor in ready and not self._requests.serve(now):
                 return

@@ -1,0 +1,69 @@
+"""What a process that subscribes gets: the delays from stamp to reception by the middleware."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.qos import QoSProfile
+
+from msg_adapters.cdr import STAMP
+from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._mailbox import Polled
+from rsea_ros.nodes._waiter import Waiter
+from rsea_ros.signals import FloatArray
+
+PATIENCE = 120.0
+TICK = 0.1
+
+
+class Reception:
+    """Listens to topics of /rsea, each with its message class and quality of service, in threads."""
+
+    def __init__(self, topics: Mapping[str, tuple[Any, QoSProfile]]) -> None:
+        if not rclpy.ok():
+            rclpy.init()
+        self._node = rclpy.create_node(f"reception{time.monotonic_ns()}")
+        self._delays: dict[str, list[int]] = {topic: [] for topic in topics}
+        self._waiters = [self._listen(topic, *how) for topic, how in topics.items()]
+
+    def _listen(self, topic: str, kind: Any, qos: QoSProfile) -> Waiter:
+        subscription = self._node.create_subscription(
+            kind, f"/rsea/{topic}", lambda message: None, qos, callback_group=Polled(), raw=True
+        )
+        delays = self._delays[topic]
+
+        def take() -> None:
+            while (waiting := subscription.handle.take_message(kind, True)) is not None:
+                raw, info = waiting
+                seconds, nanoseconds = struct.unpack_from("<iI", raw, STAMP)
+                delays.append(info["received_timestamp"] - seconds * SECOND - nanoseconds)
+
+        waiter = Waiter(self._node, [subscription], take, TICK)
+        waiter.start()
+        return waiter
+
+    def wait(self, topic: str, messages: int = 100) -> None:
+        """Return once so many have come."""
+        deadline = time.monotonic() + PATIENCE
+        while len(self._delays[topic]) < messages and time.monotonic() < deadline:
+            time.sleep(TICK)
+
+    def forget(self) -> None:
+        """Count from now on."""
+        for delays in self._delays.values():
+            delays.clear()
+
+    def delays(self, topic: str) -> FloatArray:
+        """Return those of a topic so far, ms."""
+        return np.array(self._delays[topic]) / 1e6
+
+    def close(self) -> None:
+        """Listen no more."""
+        for waiter in self._waiters:
+            waiter.stop()
+        self._node.destroy_node()

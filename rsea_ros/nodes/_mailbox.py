@@ -1,0 +1,57 @@
+"""A topic whose messages wait until somebody takes them: their numbers, read out of the serialised ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from msg_adapters.raw import RawReader
+from msg_adapters.ros import message_type
+from rsea_ros.errors import ParameterError
+
+
+class Polled(CallbackGroup):
+    """Subscriptions that no executor serves: a cycle takes what has arrived when it needs it."""
+
+    def can_execute(self, entity: object) -> bool:
+        """Return False: never by an executor."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Return False: never by an executor."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """Do nothing."""
+
+
+class Mailbox:
+    """A subscription that is asked. refuse: hears of each message that cannot be read."""
+
+    def __init__(
+        self, node: Node, msgtype: str, topic: str, qos: QoSProfile, refuse: Callable[[], None],
+        *fields: tuple[str, int],
+    ) -> None:  # fmt: skip
+        """fields: name and index of each number; one that a message does not have is nan."""
+        self._node, self._topic, self._refuse = node, topic, refuse
+        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields)
+        self.subscription: Any = node.create_subscription(
+            self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True
+        )
+
+    def take(self) -> Iterator[tuple[int, Sequence[float], int]]:
+        """Yield stamp (ns), numbers and instant of arrival (ns) of each message that waits."""
+        handle = self.subscription.handle
+        with handle:
+            while (message := handle.take_message(self._kind, True)) is not None:
+                try:
+                    stamp, numbers = self._reader.read(message[0])
+                except ParameterError as error:
+                    self._refuse()
+                    self._node.get_logger().error(f"{self._topic}: {error}", throttle_duration_sec=1.0)
+                else:
+                    yield stamp, numbers, message[1]["received_timestamp"]

@@ -1,0 +1,69 @@
+"""What the controller node hears: each state with the torque that belongs to it, and desired torques."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator, Sequence
+
+from rclpy.node import Node
+
+from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
+from rsea_ros.control.controller import Reading
+from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+WAITING = 500
+"""Measurements that wait for their other half."""
+
+
+class Measurements:
+    """Pairs of joint_states and ft. period: ns. desired: what came on desired_torque.
+
+    unusable: readings that were not finite, and messages of several joints.
+    """
+
+    def __init__(self, node: Node, axis: str, period: float) -> None:
+        self._period = period
+        self._sign = -1.0 if axis.startswith("-") else 1.0
+        self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
+        self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self.desired = CommandQueue()
+        self.unusable = 0
+        along = ("wrench", AXES.index(axis.removeprefix("-")))
+        state = (("position", 0), ("velocity", 0), ("effort", 0))
+        self._states = Mailbox(node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state)
+        self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, along)
+        self._desired = Mailbox(
+            node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0)
+        )
+        self.subscriptions = [self._states.subscription, self._fts.subscription]
+
+    def take(self) -> Iterator[tuple[int, Reading]]:
+        """Yield stamp (ns) and reading of each state that has a torque of its instant, or of a later one.
+
+        Of its instant: to half a period. All that has arrived is taken first, so that a process that was held
+        up has the newest at once.
+        """
+        self._waiting_fts += ((stamp, self._sign * torque) for stamp, (torque,), _ in self._fts.take())
+        self._waiting_states += ((stamp, numbers) for stamp, numbers, _ in self._states.take())
+        while self._waiting_states and self._waiting_fts:
+            stamp, (position, velocity, effort) = self._waiting_states[0]
+            at, torque = self._waiting_fts[0]
+            if at < stamp - 0.5 * self._period:
+                self._waiting_fts.popleft()
+                continue
+            self._waiting_states.popleft()
+            if math.isfinite(torque + velocity + position):
+                yield stamp, Reading(torque, velocity, position, effort)
+            else:
+                self._refuse()
+
+    def hear_desired(self) -> None:
+        """Put all desired torques that have arrived into their queue."""
+        for stamp, (torque,), received in self._desired.take():
+            self.desired.add(stamp, torque, received)
+
+    def _refuse(self) -> None:
+        self.unusable += 1

@@ -1,0 +1,72 @@
+"""The serial port on a pseudo-terminal: what comes is read whole, once, and not after it was thrown away."""
+
+import os
+import time
+import tty
+from contextlib import suppress
+
+import pytest
+
+from rsea_ros.hardware.device import PortLost
+from rsea_ros.hardware.dynamixel.port import Port
+
+
+@pytest.fixture
+def wire():
+    """An open port and the descriptor of its other end."""
+    near, far = os.openpty()
+    tty.setraw(far)
+    port = Port(os.ttyname(far), 1_000_000, 1e-3)
+    port.open()
+    os.close(far)
+    yield port, near
+    port.close()
+    with suppress(OSError):  # the test may have closed it
+        os.close(near)
+
+
+def received(port, size):
+    """Everything until so many bytes have come."""
+    data, deadline = b"", time.monotonic() + 10.0
+    while len(data) < size and time.monotonic() < deadline:
+        port.setPacketTimeoutMillis(100.0)
+        data += port.receive()
+    return data
+
+
+@pytest.mark.parametrize("size", [1, 26, 64, 65, 300, 1033, 4000])
+def test_a_reply_is_read_whole(wire, size):
+    port, near = wire
+    for fill in range(3):
+        reply = bytes((k + fill) % 251 for k in range(size))
+        os.write(near, reply)
+        assert received(port, size) == reply
+
+
+def test_a_reply_in_pieces_is_read_whole(wire):
+    port, near = wire
+    for piece in (b"ab", b"cde", b"f"):
+        os.write(near, piece)
+        assert received(port, len(piece)) == piece
+
+
+def test_without_a_reply_there_is_none_when_the_time_is_over(wire):
+    port, _ = wire
+    port.setPacketTimeoutMillis(2.0)
+    assert port.receive() == b"" and port.isPacketTimeout() and port.left == 0.0
+
+
+def test_what_came_before_is_thrown_away(wire):
+    port, near = wire
+    os.write(near, b"older")
+    time.sleep(0.05)
+    port.clearPort()
+    os.write(near, b"new")
+    assert received(port, 3) == b"new"
+
+
+def test_a_port_that_hangs_up_is_lost(wire):
+    port, near = wire
+    os.close(near)
+    with pytest.raises(PortLost):
+        port.writePort(b"x")
