@@ -30,6 +30,7 @@ import rclpy
 from bench.bare_loop import permitted
 from msg_adapters.ros import DiagnosticArray, JointState, torque_command_message
 from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
+from rsea_ros.control.controller import Limits
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._cycle import SECOND
@@ -42,13 +43,17 @@ HZ, SECONDS, SETTLE, LEAD = 5.0, 6.0, 1.0, 0.2
 
 @dataclass(frozen=True)
 class Case:
-    """What the plant is, what the controller believes, amplitude (N m) of the sine, error asked for (%)."""
+    """What the plant is, what the controller believes, amplitude (N m) of the sine, error asked for (%).
+
+    limit: of the motor's torque, N m.
+    """
 
     name: str
     true: Rig
     model: Rig
     amplitude: float
     asked: float
+    limit: float = Limits().torque
 
 
 class Outside:
@@ -114,8 +119,11 @@ def measure(case: Case, rate: float, priority: int, folder: Path) -> tuple[float
     outside = Outside()
     with (
         running("plant", priority and priority + 1, rig=f"'{paths[0]}'", rate=rate),
-        running("controller", 0, rig=f"'{paths[1]}'", rate=rate, stale=1.0, realtime_priority=priority),
-    ):
+        running(
+            "controller", 0, rig=f"'{paths[1]}'", rate=rate, stale=1.0, realtime_priority=priority,
+            torque_limit=case.limit,
+        ),
+    ):  # fmt: skip
         outside.until(lambda: outside.desired.get_subscription_count() and outside.wrenches)
         outside.until(lambda: len(outside.commands) > rate)
         errors = sine(outside, case.amplitude, rate)
@@ -151,6 +159,7 @@ def cases() -> Sequence[Case]:
     return (
         Case("locked, 10 N m", clamped, clamped, 10.0, 2.0),
         Case("free, 4.7 N m", free, free, 4.7, 4.0),
+        Case("free, 10 N m, motor of 150 N m", free, free, 10.0, 4.0, 150.0),
         Case("3 N m friction, not in the model", rough, clamped, 10.0, 6.0),
         Case("3 N m friction, in the model", rough, rough, 10.0, 2.5),
         Case("5 arcmin backlash, in the model", worn, worn, 10.0, 100.0),
