@@ -23,7 +23,12 @@ ENOUGH = {1: 0.1, 2: 0.3}
 
 
 def is_progress(model: Model, present: Model) -> bool:
-    """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it."""
+    """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it.
+
+    One whose newest effect has run to its bound is none: that bends to something else.
+    """
+    if at_bound(model.solution):
+        return False
     if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
         return False
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
@@ -34,8 +39,8 @@ def is_progress(model: Model, present: Model) -> bool:
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
-    Of all that are not surely and materially worse than the best, one that does not end at a bound of its
-    effect, the simplest; of equals, the one that needs the least of what is known beforehand.
+    Of all that are not surely and materially worse than the best the simplest; of equals, the one that needs
+    the least of what is known beforehand.
     """
     if not models:
         return None, ()
@@ -44,14 +49,11 @@ def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple
         m for m in models if m is best or not compare(best.choose, m.choose).better or is_near(m, best)
     ]
 
-    def order(m: Model) -> tuple[bool, int, float]:
-        return at_bound(m.solution), m.size, prior_cost(m.solution) + loss_excess(m, best)
+    def order(m: Model) -> tuple[int, float]:
+        return m.size, prior_cost(m.solution) + loss_excess(m, best)
 
     simplest = min(contenders, key=order)
-    rivals = tuple(
-        m for m in contenders if m is not simplest and m.size <= simplest.size and not at_bound(m.solution)
-    )
-    return simplest, rivals
+    return simplest, tuple(m for m in contenders if m is not simplest and m.size <= simplest.size)
 
 
 def is_near(model: Model, best: Model) -> bool:

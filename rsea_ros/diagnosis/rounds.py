@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
 from rsea_ros.diagnosis.hints import starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
@@ -180,6 +180,8 @@ class Round:
 
 
 def _why_not(model: Model, better: Sequence[Model], chosen: Model | None) -> str:
+    if at_bound(model.solution):
+        return "its size ran to the bound of what such an effect has"
     if chosen is None or not any(model is m for m in better):
         return "does not lower the residual of data that it was not fitted to"
     near = loss_excess(model, chosen) < 0.02 * chosen.choose.loss(chosen.choose).sum()

@@ -25,7 +25,7 @@ def verdict_sentence(
 ) -> str:
     """Return the verdict as one sentence. before, after: held-out residual over noise."""
     name, data = _CHANNELS[channel], _data(faults)
-    named = " and ".join(c.name.replace("_", " ") for c in causes)
+    named = _listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
     if verdict == "nothing_wrong":
@@ -56,6 +56,10 @@ def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
         f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
         "most of it is noise there, and what these data say of those frequencies is said by chance.",
     )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def _data(faults: Sequence[Fault]) -> str:
