@@ -12,11 +12,13 @@ import pytest
 from msg_adapters import read_record
 from msg_adapters.tables import import_record, load_map
 from rsea_ros.cli.main import main
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.statics import Statics, statics_of
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.statics_words import statics_sentences
+from rsea_ros.signals import Record
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 REAL = Path(__file__).resolve().parents[2] / "shared" / "realdata"
@@ -36,6 +38,11 @@ DESIGNS = {
     "07-19__14-00-00__torqueramp__conic_onyx_2pre6": (0.66, False),
 }
 """Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
+
+
+def imported(file: str, mapping: str) -> Record:
+    """Return a file of measurements as a record."""
+    return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
 
 
 def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
@@ -96,8 +103,7 @@ def test_cycloidal_statics_of_every_design(design):
 
 
 def ramps(design: str, which: str) -> Statics:
-    mapping = load_map(CONFIG / f"imports/cycloidal_{which}_ramps.yaml")
-    record = import_record(REAL / f"cycloidal/2024-{design}.csv.gz", mapping)
+    record = imported(f"cycloidal/2024-{design}.csv.gz", f"cycloidal_{which}_ramps")
     statics = statics_of(record, load_rig("cycloidal"))
     assert statics is not None
     return statics
@@ -118,11 +124,37 @@ def test_cycloidal_identified(design, tmp_path, capsys):
 
 def test_cycloidal_saturation_is_seen_and_fitted():
     """One of the three long ramps."""
-    mapping = load_map(CONFIG / "imports/cycloidal_long_ramps.yaml")
-    record = import_record(REAL / f"cycloidal/2024-{next(iter(DESIGNS))}.csv.gz", mapping)
+    record = imported(f"cycloidal/2024-{next(iter(DESIGNS))}.csv.gz", "cycloidal_long_ramps")
     result = identify([record.between(record.start, record.start + 20.0)], load_rig("cycloidal"))
     assert result.statics is not None and result.statics.limit is not None
     assert "stops at 24.9 N·m where 40.0 N·m are commanded" in statics_sentences(result.statics)[-1]
     found = {p.name: p.value for p in result.parameters}
     assert found["torque_saturation.limit"] == pytest.approx(result.statics.limit, rel=0.1)
     assert found["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
+
+
+def test_emps_diagnosed():
+    """Coulomb friction first, then its difference between directions; no Stribeck; judged by another run."""
+    run = imported("emps/DATA_EMPS.mat", "emps_identification")
+    pulses = imported("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
+    found = diagnose([run], load_rig("emps"), holdout=pulses)
+    assert [c.name for c in found.causes] == ["coulomb_friction", "asymmetric_friction"]
+    assert found.causes[0].parameters["torque"].value == pytest.approx(20.394, rel=0.03)
+    assert "stribeck_friction" in {r.name for r in found.rejected}
+    rms = float(np.sqrt(np.mean(pulses["motor_torque"].y ** 2)))
+    assert found.extended_residual_rms["motor_torque"] < 0.047 * rms
+
+
+def test_pendulum_is_not_given_a_friction_that_gains_nothing():
+    found = diagnose([imported("pendulum/ddp.measured.csv.gz", "pendulum")], load_rig("pendulum"))
+    assert found.verdict == "unexplained" and not found.causes
+    assert all(r.gain_holdout < 0.1 for r in found.rejected)
+
+
+def test_cycloidal_backlash_is_named_in_run_in_gears():
+    """Its travel is twice that of any preloaded gear; friction and its asymmetry are there as well."""
+    file = "cycloidal/2024-07-18__10-58-26__torqueramp__base_onyx_runin1.csv.gz"
+    found = diagnose([imported(file, "cycloidal_short_ramps")], load_rig("cycloidal"))
+    causes = {c.name: c for c in found.causes}
+    assert {"coulomb_friction", "backlash"} <= set(causes)
+    assert 0.5 * np.radians(1.95) < causes["backlash"].parameters["gap"].value < np.radians(1.95)
