@@ -12,6 +12,7 @@ import numpy as np
 from scipy import signal
 
 from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
@@ -50,6 +51,8 @@ def starts_of(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArra
         return _mode_hints(effect, case, rig, outputs) or starts
     if "stiffness" in names:
         return [{**effect.typical, **_beside_a_train(s["stiffness"], rig)} for s in starts]
+    if effect.port is Port.MOTOR and "gain" in names:
+        return [_gain_hint(effect, case, rig, outputs)] if "ft" in case.measured else starts
     if "Hz" in names.values():
         frequency = next(n for n, unit in names.items() if unit == "Hz")
         channel = effect.claims.channel if effect.claims.channel in outputs else next(iter(outputs))
@@ -111,6 +114,18 @@ def _beside_a_train(stiffness: float, rig: Rig) -> dict[str, float]:
     """
     farther = 1.0 if rig.rigid_spring else 1.0 + rig[STIFFNESS] / stiffness
     return {"stiffness": stiffness, **{name: rig[name] / farther for name in (INERTIA, DAMPING)}}
+
+
+def _gain_hint(effect: Effect, case: Case, rig: Rig, outputs: dict[str, FloatArray]) -> dict[str, float]:
+    """Return the torque constant, relative to the believed one, that the measured torque tells.
+
+    The motion is the same when all that the motor works against is as much larger.
+    """
+    mask = case.mask["ft"]
+    measured, simulated = case.measured["ft"][mask], outputs["ft"][mask]
+    gain = float(simulated @ measured / (simulated @ simulated))
+    gain = min(max(gain, effect.main.low), effect.main.high)
+    return {effect.main.name: gain, **{name: gain * rig[name] for name in rig.free()}}
 
 
 def _left_of(case: Case, channel: str, simulated: FloatArray) -> float:

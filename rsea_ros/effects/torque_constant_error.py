@@ -19,7 +19,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="torque_constant_error",
     port=Port.MOTOR,
-    parameters=(Parameter("gain", "1", null=1.0, low=0.2, high=3.0, typical=0.9),),
+    parameters=(Parameter("gain", "1", null=1.0, low=0.2, high=3.0, typical=0.9, logarithmic=True),),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("ft_gain_error",)),
     function=apply,
     about="the motor makes more or less torque than its current says",
