@@ -6,7 +6,7 @@ Each takes a channel and returns which samples are bad, shape (n,). A sample tha
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class Checked:
 
 
 def check(record: Record, rig: Rig) -> Checked:
-    """Find and mask the faults of a record."""
+    """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
     faults = [Fault("missing_topic", name, 1.0) for name in missing(record, rig)]
     repaired, clock_faults = repair_clock(record)
     faults += clock_faults
@@ -54,7 +54,9 @@ def check(record: Record, rig: Rig) -> Checked:
                 bad |= found
         masked[name] = bad
     faults += [fault for n in repaired.channels if n in rig.sensors for fault in coarse(repaired[n], n, rig)]
-    return Checked(_filled(repaired, masked), masked, tuple(faults))
+    dead = {n for n, bad in masked.items() if bad.all() and n != "command"}
+    alive = replace(repaired, channels={n: c for n, c in repaired.channels.items() if n not in dead})
+    return Checked(_filled(alive, masked), masked, tuple(faults))
 
 
 def missing(record: Record, rig: Rig) -> tuple[str, ...]:
@@ -88,7 +90,7 @@ def outliers(channel: Channel, name: str) -> BoolArray:
 
     How far those ten lie from it is told by the third largest, so that two outliers may be neighbours.
     """
-    if name == "command" or len(channel) < 2 * _AROUND:
+    if name == "command" or len(channel) < 2 * _AROUND or not np.isfinite(channel.y).any():
         return np.zeros(len(channel), bool)
     padded = np.pad(
         np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect"
@@ -105,7 +107,7 @@ def outliers(channel: Channel, name: str) -> BoolArray:
 def clipping(channel: Channel, name: str) -> BoolArray:
     """Return which samples lie at exactly the largest or smallest value, where many do in a row."""
     bad = np.zeros(len(channel), bool)
-    if name in ("command", "reference", "motor_torque"):
+    if name in ("command", "reference", "motor_torque") or not np.isfinite(channel.y).any():
         return bad
     for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):
         at = channel.y == extreme

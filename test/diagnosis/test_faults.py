@@ -7,7 +7,7 @@ import pytest
 from independent.bench import drawn_bench, record_run
 from independent.faults import FAULTS
 
-from rsea_ros.diagnosis.diagnose import nominal_rig
+from rsea_ros.diagnosis.diagnose import diagnose, nominal_rig
 from rsea_ros.diagnosis.faults import check
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel
@@ -36,3 +36,12 @@ def test_coarse_steps_are_told_and_nothing_is_masked(good):
     checked = check(stepped, load_rig("paper_high_impedance"))
     assert [(f.kind, f.channel) for f in checked.faults] == [("coarse_steps", "ft")]
     assert not checked.masked["ft"].any()
+
+
+@pytest.mark.parametrize("name", ["ft", "position", "velocity"])
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_a_dead_sensor_is_told_and_the_others_carry_on(good, name, value):
+    dead = good.with_channels(**{name: Channel(good[name].t, np.full(len(good[name]), value))})
+    diagnosis = diagnose([dead], load_rig("paper_high_impedance"))
+    assert {f.channel for f in diagnosis.faults} == {name}
+    assert diagnosis.verdict == "nothing_wrong"
