@@ -10,7 +10,7 @@ from msg_adapters.bags import BagPath, read_contents
 from msg_adapters.cdr import Block, blocks
 from msg_adapters.checks import Series, checked
 from msg_adapters.contents import Contents, Messages
-from msg_adapters.topics import AXES, FIELDS, ROLES, TYPES, TopicMap
+from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 
@@ -127,8 +127,8 @@ def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
 def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
     """Return the field's value of each message, None where these messages do not hold it."""
     if field == "wrench":
-        sign = -1.0 if topics.axis.startswith("-") else 1.0
-        return sign * block.field(field)[:, AXES.index(topics.axis.removeprefix("-"))]
+        sign, index = sign_and_index(topics.axis)
+        return sign * block.field(field)[:, index]
     names = block.layout.names
     if topics.joint is not None and names and topics.joint not in names:
         return None

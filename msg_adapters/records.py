@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import encoding
-from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap
+from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.signals import FloatArray, IntArray, Record
 
@@ -61,6 +61,6 @@ def _encoded(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMa
     if "wrench" not in values:
         return encoding.joint_states(stamps, topics.joint or JOINT, **values)
     wrench = np.zeros((len(stamps), len(AXES)))
-    sign = -1.0 if topics.axis.startswith("-") else 1.0
-    wrench[:, AXES.index(topics.axis.removeprefix("-"))] = sign * values["wrench"]
+    sign, index = sign_and_index(topics.axis)
+    wrench[:, index] = sign * values["wrench"]
     return encoding.wrenches(stamps, wrench)

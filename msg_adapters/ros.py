@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from msg_adapters.topics import AXES
+from msg_adapters.topics import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
 __all__ = ["Bool", "Clock", "DiagnosticArray", "JointState", "Time", "Trigger", "WrenchStamped"]
@@ -68,7 +68,7 @@ def wrench_message(
     if isinstance(values, Sequence):
         wrench = [float(value) for value in values]
     else:
-        sign, index = _axis(axis)
+        sign, index = sign_and_index(axis)
         wrench = [0.0] * len(AXES)
         wrench[index] = sign * float(values)
     message = WrenchStamped()
@@ -129,7 +129,7 @@ def joint_state_of(message: JointState, joint: str | None = None) -> tuple[int, 
 
 def wrench_of(message: WrenchStamped, axis: str = "torque.z") -> tuple[int, float]:
     """Return the stamp (ns) and the component of the wrench about the actuator axis (N m)."""
-    sign, index = _axis(axis)
+    sign, index = sign_and_index(axis)
     force, torque = message.wrench.force, message.wrench.torque
     values = (force.x, force.y, force.z, torque.x, torque.y, torque.z)
     return stamp_of(message.header.stamp), sign * float(values[index])
@@ -147,10 +147,6 @@ def message_type(name: str) -> Any:
         raise ParameterError(
             f"message type {name!r} is not installed, expected a package {package!r}"
         ) from None
-
-
-def _axis(axis: str) -> tuple[float, int]:
-    return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
 
 
 def _index(message: JointState, joint: str | None) -> int:

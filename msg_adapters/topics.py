@@ -24,6 +24,11 @@ FIELDS: Mapping[str, Mapping[str, str]] = {
 TYPES: Mapping[str, str] = {role: WRENCH if role == "ft" else JOINT_STATE for role in ROLES}
 
 
+def sign_and_index(axis: str) -> tuple[float, int]:
+    """Return sign and place in AXES of an actuator axis such as `-torque.z`."""
+    return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
+
+
 @dataclass(frozen=True)
 class TopicMap:
     """Names of the topics of one bench; the defaults are the contract's.

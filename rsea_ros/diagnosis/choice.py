@@ -18,7 +18,7 @@ _FAR = 5.0
 """RMS of the residual over the noise, in the worst channel, above which a model is far from the floor."""
 _ROOM = 0.1
 """How much larger the residual of a simpler model may be there, for each parameter that it saves."""
-ENOUGH = {1: 0.1, 2: 0.3}
+_ENOUGH = {1: 0.1, 2: 0.3}
 """Relative fall of a channel's residual that makes one effect, or two at once, causes above the floor."""
 
 
@@ -33,7 +33,7 @@ def is_progress(model: Model, present: Model) -> bool:
         return False
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
     added = len(model.causes) - len(present.causes)
-    return fall > ENOUGH[added] or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
+    return fall > _ENOUGH[added] or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
 
 
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:

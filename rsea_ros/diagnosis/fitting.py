@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
-from rsea_ros.identification.problem import Case, Problem, weights_of
+from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.signals import FloatArray
 
@@ -19,7 +19,7 @@ AT_FLOOR = 1.04
 """RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
 DELAY = "command_delay.delay"
 _ITERATIONS = 12
-SEARCH_GAIN = 2e-4
+_SEARCH_GAIN = 2e-4
 """Relative fall of the cost below which a fit of the search is done; what is judged is fitted further."""
 _FARTHEST = 20.0
 """RMS of the residual over the noise up to which a gain grows with it: there small falls mean nothing."""
@@ -61,7 +61,7 @@ def fitted(
     places: tuple[int, ...] = FIT,
     iterations: int = _ITERATIONS,
     weights: Score | None = None,
-    gain: float = SEARCH_GAIN,
+    gain: float = _SEARCH_GAIN,
     near: Solution | None = None,
     run: Map = serial,
 ) -> Model:
@@ -95,8 +95,8 @@ def on_places(
 
 def _reweighted(solution: Solution, problem: Problem) -> FloatArray:
     """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
-    new, old = (weights_of(p.cases, p.channels) for p in (problem, solution.problem))
-    result: FloatArray = solution.jacobian * (new / old)[:, None]
+    new, old = (p.by_row(lambda case, n: case.noise[n]) for p in (problem, solution.problem))
+    result: FloatArray = solution.jacobian * (old / new)[:, None]
     return result
 
 

@@ -37,10 +37,13 @@ class Hypothesis:
         return self.effect.name
 
 
-def extended_problem(present: Problem, effect: Effect, start: dict[str, float]) -> Problem:
-    """Return the present problem with one more effect whose parameters may move."""
+def extended(
+    present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
+) -> tuple[Problem, FloatArray]:
+    """Return the present problem with one more effect whose parameters may move, and where it begins."""
     unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
-    return replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
+    problem = replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
+    return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
 def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
@@ -77,19 +80,17 @@ def is_mode(effect: Effect) -> bool:
 
 
 def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:
-    problem = extended_problem(present.problem, effect, start)
-    theta = np.concatenate([present.theta, start_vector(problem.unknowns)[len(present.theta) :]])
-    solution = solve(problem, theta, iterations=_STEPS)
+    solution = solve(*extended(present.problem, present.theta, effect, start), iterations=_STEPS)
+    problem = solution.problem
     return Hypothesis(effect, problem, solution.theta, solution.cost)
 
 
 def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis | None:
     """Return where two steps lead; None for an effect that no channel shows there."""
-    problem = extended_problem(present.problem, effect, start)
+    problem, theta = extended(present.problem, present.theta, effect, start)
     n = len(present.theta)
     prior = np.array([1.0 / u.doubt for u in problem.unknowns])
     centre = start_vector(problem.unknowns)
-    theta = np.concatenate([present.theta, centre[n:]])
     residual = problem.residual(theta)
     own = jacobian_columns(problem, theta, residual, range(n, len(theta)))
     if not own.any():

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
 from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
-from rsea_ros.diagnosis.hypothesise import extended_problem
+from rsea_ros.diagnosis.hypothesise import extended
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
@@ -17,7 +15,6 @@ from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.unknowns import start_vector
 
 
 def pruned(found: Search, effects: Sequence[Effect], at_work: Workers) -> Search:
@@ -73,8 +70,7 @@ class Smaller:
         start = new.typical | (
             {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
         )
-        larger = extended_problem(smaller, new, start)
-        beginning = np.concatenate([theta, start_vector(larger.unknowns)[len(theta) :]])
+        larger, beginning = extended(smaller, theta, new, start)
         return fitted(self.cases, larger, beginning, weights=model.choose, run=self.at_work.run)
 
 

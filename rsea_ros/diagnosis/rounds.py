@@ -15,15 +15,15 @@ import numpy as np
 from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
 from rsea_ros.diagnosis.hints import starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, extended_problem, screen
+from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
 from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, jacobian, solve
-from rsea_ros.identification.unknowns import apply, start_vector
+from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.unknowns import apply
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
 
@@ -80,11 +80,7 @@ class Round:
     def _unfitted(self, effect: Effect) -> Solution:
         """Return the present model on the pieces with an effect of typical size, as it stands."""
         there = self.on_pieces
-        problem = extended_problem(there.problem, effect, dict(effect.typical))
-        theta = np.concatenate([there.theta, start_vector(problem.unknowns)[len(there.theta) :]])
-        residual = problem.residual(theta)
-        matrix = jacobian(problem, theta, residual)
-        return Solution(problem, theta, residual, matrix, float(residual @ residual))
+        return solve(*extended(there.problem, there.theta, effect, dict(effect.typical)), iterations=0)
 
     @cached_property
     def on_pieces(self) -> Solution:
@@ -99,18 +95,25 @@ class Round:
         """Return what two cheap steps of every other effect reach beside a solution, best first."""
         acting = {e.name for e in there.problem.rig.effects}
         effects = [e for e in self.effects if e.name not in acting]
+        starts = self._starts
 
         def screen_one(i: int) -> Hypothesis | None:
             self._say(effects[i].name, 0.4 * i / len(effects))
-            return screen(there, effects[i], self._starts(effects[i]))
+            return screen(there, effects[i], starts[effects[i].name])
 
         found = [h for h in self.at_work.fits.map(screen_one, range(len(effects))) if h is not None]
         return sorted(found, key=lambda h: h.cost)
 
-    def _starts(self, effect: Effect) -> list[dict[str, float]]:
+    @cached_property
+    def _starts(self) -> dict[str, list[dict[str, float]]]:
+        """Where fits of every effect that does not act yet begin."""
         there = self.present.solution
         rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
-        return starts_of(effect, self.cases[0], rig, self.present.outputs[0])
+        effects = [e for e in self.effects if e.name not in self.present.causes]
+        found = self.at_work.fits.map(
+            lambda e: starts_of(e, self.cases[0], rig, self.present.outputs[0]), effects
+        )
+        return {e.name: starts for e, starts in zip(effects, found, strict=True)}
 
     def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return the best on pieces, and what is said to be confused with the very best."""

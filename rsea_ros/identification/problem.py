@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -132,17 +132,6 @@ def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
     return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
 
 
-def weights_of(cases: Sequence[Case], channels: Sequence[str]) -> FloatArray:
-    """Return 1 / noise of every sample that counts, case after case, channel after channel."""
-    parts = [
-        np.full(np.count_nonzero(case.mask[n]), 1.0 / case.noise[n])
-        for case in cases
-        for n in channels
-        if n in case.measured
-    ]
-    return np.concatenate(parts)
-
-
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
     """Return (simulated - measured) / noise of the samples that count, channel after channel."""
     return np.concatenate([((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels])
@@ -171,6 +160,15 @@ class Problem:
     def residual(self, theta: FloatArray) -> FloatArray:
         """Return the weighted residuals at theta, shape (m,)."""
         return self.residual_of(self.outputs(theta))
+
+    def by_row(self, number: Callable[[Case, str], float]) -> FloatArray:
+        """Return a number that belongs to each case and channel for every residual, shape (m,)."""
+        parts = [
+            np.full(np.count_nonzero(case.mask[n]), number(case, n))
+            for case in self.cases
+            for n in self.present(case)
+        ]
+        return np.concatenate(parts)
 
     def present(self, case: Case) -> list[str]:
         """Return the channels of a case that count, in a fixed order."""

@@ -12,7 +12,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rsea_ros.identification.problem import Problem, simulated
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector
@@ -82,7 +81,8 @@ def jacobian_columns(
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
         later, earlier = run(lambda sign: _read_later(problem, theta, sign * _CLOCK_DIFFERENCE), (1, -1))
-        rate, channel = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE), _channel_of_rows(problem)
+        rate = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE)
+        channel = problem.by_row(lambda case, n: problem.channels.index(n))
         columns |= {i: np.where(channel == problem.channels.index(n), rate, 0.0) for i, n in clocks.items()}
     return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
 
@@ -92,16 +92,6 @@ def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray
     rig, offsets = apply(problem.rig, problem.unknowns, theta)
     shifted = {n: offsets.get(n, 0.0) + delay for n in problem.channels}
     return problem.residual_of(simulated(problem.cases, rig, shifted, ride=problem.ride))
-
-
-def _channel_of_rows(problem: Problem) -> npt.NDArray[np.int64]:
-    """Return by residual which channel it is of."""
-    rows = [
-        np.full(np.count_nonzero(case.mask[n]), problem.channels.index(n))
-        for case in problem.cases
-        for n in problem.present(case)
-    ]
-    return np.concatenate(rows)
 
 
 def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:

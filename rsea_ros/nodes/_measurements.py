@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from rclpy.node import Node
 
-from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
+from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.controller import Reading
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._mailbox import Mailbox
@@ -26,15 +26,14 @@ class Measurements:
 
     def __init__(self, node: Node, axis: str, period: float) -> None:
         self._period = period
-        self._sign = -1.0 if axis.startswith("-") else 1.0
+        self._sign, along = sign_and_index(axis)
         self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
         self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self.desired = CommandQueue()
         self.unusable = 0
-        along = ("wrench", AXES.index(axis.removeprefix("-")))
         state = (("position", 0), ("velocity", 0), ("effort", 0))
         self._states = Mailbox(node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state)
-        self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, along)
+        self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, ("wrench", along))
         self._desired = Mailbox(
             node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0)
         )

@@ -10,7 +10,7 @@ from statistics import median
 
 from rclpy.node import Node
 
-from msg_adapters.topics import AXES, JOINT_STATE, WRENCH
+from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
@@ -27,7 +27,7 @@ class Inputs:
 
     def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool) -> None:
         self._observer = observer
-        self._sign = -1.0 if axis.startswith("-") else 1.0
+        self._sign, along = sign_and_index(axis)
         self._timeout = round(ft_timeout * SECOND)
         self._epoch: int | None = None
         self._state_stamp = self._ft_stamp = self._told = 0
@@ -39,7 +39,7 @@ class Inputs:
             for kind, topic, usual, *fields in (
                 (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),
                 (JOINT_STATE, "joint_states", MEASUREMENT, ("position", 0), ("effort", 0)),
-                (WRENCH, "ft", MEASUREMENT, ("wrench", AXES.index(axis.removeprefix("-")))),
+                (WRENCH, "ft", MEASUREMENT, ("wrench", along)),
             )
         )
 

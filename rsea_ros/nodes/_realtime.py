@@ -8,6 +8,7 @@ import os
 import sys
 import threading
 from contextlib import suppress
+from typing import Protocol
 
 from rclpy.node import Node
 
@@ -25,7 +26,23 @@ REALTIME = Parameter(
 """Of every node that has to answer in time."""
 
 
-def let_in_at_once() -> None:
+class Worker(Protocol):
+    """What has a thread of its own."""
+
+    thread: threading.Thread
+
+    def start(self) -> None:
+        """Begin."""
+
+
+def keep_time(node: Node, worker: Worker, priority: int) -> None:
+    """Start a worker whose thread keeps time, with the priority that a user asks for (0: as any)."""
+    _let_in_at_once()
+    worker.start()
+    _hurry(node, worker.thread, priority)
+
+
+def _let_in_at_once() -> None:
     """Make threads that keep time wait little for those that do not, nor for a look at all objects.
 
     Python's own interval of 5 ms is longer than a cycle, and so is a collection of garbage in what a node has
@@ -36,7 +53,7 @@ def let_in_at_once() -> None:
     gc.freeze()
 
 
-def hurry(node: Node, first: threading.Thread, priority: int) -> None:
+def _hurry(node: Node, first: threading.Thread, priority: int) -> None:
     """Give a thread that keeps time the priority that a user asks for; warn where it is not permitted."""
     if priority:
         try:

@@ -21,7 +21,7 @@ from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
 from rsea_ros.nodes._measurements import Measurements
 from rsea_ros.nodes._qos import COMMAND
-from rsea_ros.nodes._realtime import hurry, let_in_at_once
+from rsea_ros.nodes._realtime import keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
 
@@ -56,9 +56,7 @@ class Controller:
         for line in summary(self._design):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
-        let_in_at_once()
-        self._waiter.start()
-        hurry(node, self._waiter.thread, values["realtime_priority"])
+        keep_time(node, self._waiter, values["realtime_priority"])
 
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""

@@ -24,7 +24,7 @@ from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._parameters import Parameter
-from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once, usual_priority
+from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -70,9 +70,7 @@ class Driver(ManagedEntity):
         self._guarded.guard.clear()
         self._bench = Bench(self._node, strict=True, every_record=self._values["ft_all"])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
-        let_in_at_once()
-        self._cycle.start()
-        hurry(self._node, self._cycle.thread, self._values["realtime_priority"])
+        keep_time(self._node, self._cycle, self._values["realtime_priority"])
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -23,7 +23,7 @@ from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED
-from rsea_ros.nodes._realtime import REALTIME, hurry, let_in_at_once
+from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
 
@@ -74,9 +74,7 @@ class Model:
         self._lock = threading.Lock()
         self._health = Health(node, self._report)
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
-        let_in_at_once()
-        self._waiter.start()
-        hurry(node, self._waiter.thread, values["realtime_priority"])
+        keep_time(node, self._waiter, values["realtime_priority"])
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
 
     def _work(self) -> None:
