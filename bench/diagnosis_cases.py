@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path += [str(ROOT), str(ROOT / "test")]  # the second bench is a part of the tests
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
 
 from independent.bench import Bench, drawn_bench, record_run
 from independent.faults import FAULTS
