@@ -8,7 +8,6 @@ import threading
 import time
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
@@ -20,7 +19,7 @@ from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
 from rsea_ros.nodes._measurements import Measurements
-from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
@@ -125,7 +124,7 @@ class Controller:
         after = max(self._last + round(self._period), time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self._last else 1):
             self._commands.publish(torque_command_message(after + round(k * self._period), 0.0))
-        self._commands.wait_for_all_acked(Duration(seconds=0, nanoseconds=SECOND // 5))
+        await_arrival(self._commands)
         self._node.get_logger().info(f"torque zero after {self._steps} commands")
 
     def _report(self) -> Report:

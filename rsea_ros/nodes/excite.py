@@ -7,7 +7,6 @@ import sys
 import time
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.node import Node
 
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
@@ -15,7 +14,7 @@ from rsea_ros.identification.excitation import KINDS, Settings, check_limits, ex
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import OK, WARN, Health, Report
 from rsea_ros.nodes._parameters import Parameter
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
 from rsea_ros.nodes._run import run_node
 
 TABLE = (
@@ -101,7 +100,7 @@ class Excite:
         last = max(self._stamp, time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self._started else 1):
             self._publisher.publish(torque_command_message(last + round(k * SECOND / self._rate), 0.0))
-        self._publisher.wait_for_all_acked(Duration(seconds=0, nanoseconds=SECOND // 5))
+        await_arrival(self._publisher)
         self._node.get_logger().info(f"torque zero after {self._next} commands, {self._left_out} left out")
 
     def _tell(self) -> None:

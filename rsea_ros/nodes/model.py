@@ -22,7 +22,7 @@ from rsea_ros.nodes._model_health import ModelHealth
 from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, Parameter
-from rsea_ros.nodes._qos import COMMAND, LATCHED
+from rsea_ros.nodes._qos import COMMAND, LATCHED, await_arrival
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
@@ -100,9 +100,10 @@ class Model:
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Leave nothing behind: the flag of a node that is gone is down."""
+        """Leave nothing behind: the flag of a node that is gone is down, and its subscribers know."""
         self._waiter.stop()
         self._pure.publish(bool_message(False))
+        await_arrival(self._pure)
 
 
 def main() -> int:
