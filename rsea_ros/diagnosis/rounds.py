@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
-from rsea_ros.diagnosis.hints import starts_of
+from rsea_ros.diagnosis.hints import Seen, Start, starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
 from rsea_ros.diagnosis.split import FIT
 from rsea_ros.diagnosis.trial import Trial, trial_of
@@ -105,14 +105,13 @@ class Round:
         return sorted(found, key=lambda h: h.cost)
 
     @cached_property
-    def _starts(self) -> dict[str, list[dict[str, float]]]:
+    def _starts(self) -> dict[str, list[Start]]:
         """Where fits of every effect that does not act yet begin."""
         there = self.present.solution
         rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
         effects = [e for e in self.effects if e.name not in self.present.causes]
-        found = self.at_work.fits.map(
-            lambda e: starts_of(e, self.cases[0], rig, self.present.outputs[0]), effects
-        )
+        seen = Seen(self.cases[0], rig, self.present.outputs[0])
+        found = self.at_work.fits.map(lambda e: starts_of(e, seen), effects)
         return {e.name: starts for e, starts in zip(effects, found, strict=True)}
 
     def _finalists(self, screened: Sequence[Hypothesis]) -> list[Hypothesis]:
