@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from rsea_ros.effects._friction import ln_cosh_and_tanh
+from rsea_ros.effects._friction import mean_tanh
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
@@ -30,7 +30,7 @@ from rsea_ros.model.rig import Rig
 SMOOTHING = 0.3
 """Of K_s gap. A sharper crossing takes more torque than helps: of 0.15 to 1 the best for 3 to 30 N m."""
 
-_ln_cosh_and_tanh: Callable[[float], tuple[float, float]] = ln_cosh_and_tanh.py_func
+_mean_tanh: Callable[[float, float, float], tuple[float, float]] = mean_tanh.py_func
 """Without its compiler: a controller that compiles in its first cycles is late."""
 
 COMPENSATED = ("coulomb_friction", "stribeck_friction", "torque_ripple", "backlash")
@@ -49,11 +49,8 @@ class Friction:
         """Return the torque that overcomes it, N m, mean over a hold. start, end: rad/s."""
         middle = 0.5 * (start + end)
         size = self.coulomb + self.stribeck * math.exp(-((middle / self.stribeck_velocity) ** 2))
-        change = (end - start) / self.creep
-        if abs(change) < 1e-3:
-            return size * math.tanh(middle / self.creep)
-        over, under = (_ln_cosh_and_tanh(speed / self.creep)[0] for speed in (end, start))
-        return size * (over - under) / change
+        start, end = start / self.creep, end / self.creep
+        return size * _mean_tanh(start, end, math.exp(-2.0 * abs(start)))[0]
 
 
 @dataclass(frozen=True)

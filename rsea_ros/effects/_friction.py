@@ -23,7 +23,8 @@ PRESLIDING = Parameter(
 
 _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
 _TURNS = 3.0  # in creep velocities: below it the motion may turn, and its speed does not go straight there
-_PARTS = 4  # of such a step
+_STRAIGHT = 0.3  # what friction can take off the speed times its change, in creep velocities: below it it does
+_PARTS = 4  # of a step in which it does not
 
 
 @njit(inline="always")
@@ -42,7 +43,8 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
         return size
     if start < -_SLIDES and free + gain < -_SLIDES:
         return -size
-    if start * predicted > 0.0 and min(abs(start), abs(predicted)) > _TURNS:
+    turns = start * predicted <= 0.0 or min(abs(start), abs(predicted)) < _TURNS
+    if not turns or gain * abs(predicted - start) < _STRAIGHT:
         return size * _implicit_mean(start, free, gain)
     at, total = start, 0.0
     for _ in range(_PARTS):
@@ -56,12 +58,12 @@ def mean_friction(s, size, last, presliding):  # type: ignore[no-untyped-def]
 @njit(inline="always")
 def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
     """Return the mean of tanh over the path from start to end = free - gain * mean."""
-    low, high = free - abs(gain), free + abs(gain)
-    end, from_start = min(max(start, low), high), ln_cosh_and_tanh(start)[0]
+    low, high, fade = free - abs(gain), free + abs(gain), math.exp(-2.0 * abs(start))
+    end = free - gain * math.copysign((1.0 - fade) / (1.0 + fade), start)
     for _ in range(40):
-        mean, slope = _mean_sign(start, end, from_start)
+        mean, slope = mean_tanh(start, end, fade)
         change = (end + gain * mean - free) / (1.0 + gain * slope)
-        if abs(change) < 1e-4:
+        if abs(change) < 1e-3:
             break
         low, high = (low, end) if change > 0.0 else (end, high)
         end = end - change if low < end - change < high else 0.5 * (low + high)
@@ -69,19 +71,16 @@ def _implicit_mean(start, free, gain):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always")
-def _mean_sign(a, b, from_a):  # type: ignore[no-untyped-def]
-    """Return the mean of tanh over the straight path from a to b, and its slope by b. from_a: ln cosh(a)."""
+def mean_tanh(a, b, fade):  # type: ignore[no-untyped-def]
+    """Return the mean of tanh over the straight path from a to b, and its slope by b. fade: exp(-2 |a|).
+
+    ln cosh x is |x| + ln(1 + exp(-2 |x|)) - ln 2, which no large x overflows.
+    """
     path = b - a
     if abs(path) < 1e-3:
         mean = math.tanh(0.5 * (a + b))
         return mean, 0.5 * (1.0 - mean * mean)
-    from_b, at_b = ln_cosh_and_tanh(b)
-    mean = (from_b - from_a) / path
+    fade_b = math.exp(-2.0 * abs(b))
+    mean = (abs(b) - abs(a) + math.log((1.0 + fade_b) / (1.0 + fade))) / path
+    at_b = math.copysign((1.0 - fade_b) / (1.0 + fade_b), b)
     return mean, (at_b - mean) / path
-
-
-@njit(inline="always")
-def ln_cosh_and_tanh(x):  # type: ignore[no-untyped-def]
-    """Return ln cosh x + ln 2, which no large x overflows, and tanh x, of one exponential."""
-    small = math.exp(-2.0 * abs(x))
-    return abs(x) + math.log1p(small), math.copysign((1.0 - small) / (1.0 + small), x)
