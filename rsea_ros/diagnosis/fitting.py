@@ -13,6 +13,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise import residual_floor
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.model.drive import Drive, coarser
 from rsea_ros.signals import FloatArray
 
 AT_FLOOR = 1.04
@@ -64,14 +65,16 @@ def fitted(
     gain: float = _SEARCH_GAIN,
     near: Solution | None = None,
     run: Map = serial,
+    quick: bool = False,
 ) -> Model:
     """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise.
 
     gain: relative fall of the cost below which the fit is done, at the noise; farther off it grows.
     near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
-    run: how derivatives are made, one after another or in a pool.
+    run: how derivatives are made, one after another or in a pool. quick: on coarser steps.
     """
     masked = on_places(problem, cases, places, weights)
+    masked = quicker(masked) if quick else masked
     fit = partial(solve, masked, iterations=iterations, gain=gain * _distance(weights), run=run)
     solution = fit(theta, matrix=None if near is None else _reweighted(near, masked))
     moved = with_common_clock_in_delay(solution)
@@ -91,6 +94,16 @@ def on_places(
 ) -> Problem:
     """Return a problem on some blocks of the cases. weights: a score whose misfit counts as noise."""
     return replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
+
+
+def quicker(problem: Problem) -> Problem:
+    """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
+    return replace(
+        problem,
+        cases=tuple(
+            replace(c, drive=coarser(c.drive)) if isinstance(c.drive, Drive) else c for c in problem.cases
+        ),
+    )
 
 
 def _reweighted(solution: Solution, problem: Problem) -> FloatArray:
@@ -131,11 +144,11 @@ def as_model(cases: Sequence[Case], solution: Solution) -> Model:
     return Model(solution, outputs, score_on(solution.problem, cases, CHOOSE, outputs))
 
 
-def refitted(cases: Sequence[Case], model: Model, run: Map) -> Model:
+def refitted(cases: Sequence[Case], model: Model, run: Map, quick: bool = False) -> Model:
     """Fit a model again with each channel in units of what the model leaves of it."""
     there = model.solution
     weights = rescored(cases, model).choose
-    return fitted(cases, there.problem, there.theta, weights=weights, near=there, run=run)
+    return fitted(cases, there.problem, there.theta, weights=weights, near=there, run=run, quick=quick)
 
 
 def rescored(cases: Sequence[Case], model: Model) -> Model:

@@ -19,8 +19,11 @@ from rsea_ros.signals import FloatArray
 
 _FEWEST_PERIODS = 1.5
 """As often a ripple must have repeated over the rotor's travel to be one."""
-_MOST_WAVES = 1e7
-_CYCLES = np.arange(0.5, 60.0, 0.125)
+_FEWEST, _MOST = 0.5, 60.0
+"""Cycles per revolution of a ripple."""
+_REVOLUTIONS = 8
+"""After so many every whole multiple of 1/8 cycle repeats."""
+_BINS = 1 << 13
 
 
 def ripples(case: Case, rig: Rig) -> list[dict[str, float]]:
@@ -29,14 +32,18 @@ def ripples(case: Case, rig: Rig) -> list[dict[str, float]]:
     if found is None:
         return []
     angle, torque = found[0] * rig["gear.ratio"], found[1] - np.mean(found[1])
-    every = math.ceil(len(angle) * len(_CYCLES) / _MOST_WAVES)
-    angle, torque = angle[::every], torque[::every]
-    cycles = _CYCLES[_CYCLES * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS]
-    if not len(cycles):
-        return []
-    power = np.abs(torque @ np.exp(1j * angle[:, None] * cycles[None, :])) ** 2
+    cycles, power = _periodogram(angle, torque)
+    seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
+    power = np.where(seen & (cycles < _MOST), power, 0.0)
     at = [refined(cycles, power, k) for k in peaks(power, apart=6)]
     return [{"cycles_per_revolution": c, **sine_at(angle, torque, c)} for c in at]
+
+
+def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return cycles per revolution and their power: a sum over bins of the angle, folded where all repeat."""
+    folded = (angle / (2.0 * math.pi * _REVOLUTIONS) % 1.0 * _BINS).astype(np.int64) % _BINS
+    power = np.abs(np.fft.rfft(np.bincount(folded, torque, _BINS))) ** 2
+    return np.arange(len(power)) / _REVOLUTIONS, power
 
 
 def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None:

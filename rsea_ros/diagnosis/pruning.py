@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from rsea_ros.diagnosis.choice import is_far
 from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
 from rsea_ros.diagnosis.hypothesise import extended
 from rsea_ros.diagnosis.judge import compare
@@ -57,7 +58,7 @@ class Smaller:
 
     def _changed(self, model: Model, name: str, rival: str | None = None) -> Model:
         """Fit a model again without one of its causes, or with a rival of the same size in its place."""
-        problem = model.solution.problem
+        problem, far = model.solution.problem, is_far(model)
         keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
         rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
         smaller, theta = (
@@ -65,13 +66,13 @@ class Smaller:
             model.solution.theta[keep],
         )
         if rival is None:
-            return fitted(self.cases, smaller, theta, weights=model.choose, run=self.at_work.run)
+            return fitted(self.cases, smaller, theta, weights=model.choose, run=self.at_work.run, quick=far)
         old, new = effect_named(name).main, effect_named(rival)
         start = new.typical | (
             {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
         )
         larger, beginning = extended(smaller, theta, new, start)
-        return fitted(self.cases, larger, beginning, weights=model.choose, run=self.at_work.run)
+        return fitted(self.cases, larger, beginning, weights=model.choose, run=self.at_work.run, quick=far)
 
 
 def without_needless(found: Search, smaller: Smaller) -> Search:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
-from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, refitted
+from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, quicker, refitted
 from rsea_ros.diagnosis.hints import Seen, Start, starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
 from rsea_ros.diagnosis.split import FIT
@@ -89,6 +89,7 @@ class Round:
         pieces = tuple(heavier(w, self.present.choose) for c, out in runs for w in windows_of(c, out))
         solution = self.present.solution
         problem, theta = without_clocks(replace(solution.problem, cases=pieces), solution.theta)
+        problem = quicker(problem) if is_far(self.present) else problem
         return solve(problem, theta, iterations=_PRESENT_ITERATIONS)
 
     def _screened(self, there: Solution) -> list[Hypothesis]:
@@ -138,13 +139,15 @@ class Round:
 
     def _fit_all(self, h: Hypothesis) -> Model:
         self._say(f"fitting {h.name} on everything", 0.8)
-        weights = self.present.choose
+        weights, run, far = self.present.choose, self.at_work.run, is_far(self.present)
         problem, theta = self._with_clocks(h)
         masked = on_places(problem, self.cases, FIT, weights)
+        masked = quicker(masked) if far else masked
         start = min(self._starts_of_all(theta), key=lambda t: float(np.sum(masked.residual(t) ** 2)))
-        run = self.at_work.run
-        first = fitted(self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run)
-        return refitted(self.cases, first, run) if self._has_moved(first) else first
+        first = fitted(
+            self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
+        )
+        return refitted(self.cases, first, run, quick=is_far(first)) if self._has_moved(first) else first
 
     def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:
         """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.

@@ -23,7 +23,7 @@ PRESLIDING = Parameter(
 
 _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
 _TURNS = 3.0  # in creep velocities: below it the motion may turn, and its speed does not go straight there
-_STRAIGHT = 0.3  # what friction can take off the speed times its change, in creep velocities: below it it does
+_STRAIGHT = 0.3  # friction's own change of speed times the whole: below it the speed goes nearly straight
 _PARTS = 4  # of a step in which it does not
 
 

@@ -8,9 +8,10 @@ import slow
 from random_rigs import WITH_SPRING
 
 from rsea_ros.errors import ChannelError, IdentificationError
-from rsea_ros.model.drive import LONGEST_STEP, drive_from, steps_per_sample
+from rsea_ros.model.drive import LONGEST_STEP, coarser, drive_from, steps_per_sample
+from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.model.simulation import simulate, simulate_drive, synthesize
 from rsea_ros.signals import Channel, Record
 
 RATE = 280.0
@@ -149,3 +150,46 @@ def test_commands_that_cannot_drive_are_refused(command, message):
 def test_a_record_without_a_command_is_refused():
     with pytest.raises(ChannelError, match="no channel 'command'"):
         drive_from(Record({"ft": Channel(np.arange(20.0), np.zeros(20))}, source="bag"))
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.31])
+@pytest.mark.parametrize("length", [300, 301])
+def test_a_coarser_drive_is_half_as_long_and_exact_for_a_linear_rig(shift, length):
+    stamps = np.arange(length) / RATE
+    drive = drive_from(record_of(stamps, white(length), stamps + (1 + shift) / RATE))
+    rig, coarse = load_rig("paper_high_impedance"), coarser(drive)
+    assert len(coarse.command) == len(drive.command) // 2
+    fine, rough = simulate_drive(rig, drive), simulate_drive(rig, coarse)
+    for n in SIGNALS:
+        assert np.max(np.abs(fine[n] - rough[n])[:-2]) < 0.1 * rig.sensors[n].noise
+
+
+def test_a_coarser_drive_keeps_what_late_commands_have_brought():
+    """Stamps off the grid of the steps: about four times the error that the finer steps have."""
+    rng = np.random.default_rng(4)
+    stamps = np.arange(300) / RATE + 1e-4 * rng.uniform(-1.0, 1.0, 300)
+    rig, command = load_rig("paper_high_impedance"), white(300)
+    drive = drive_from(record_of(stamps, command, stamps[5:]))
+    exact = slow.respond(rig, stamps, command, stamps[5:])
+    for n, truth in zip(SIGNALS, exact, strict=True):
+        fine, rough = (np.std((simulate_drive(rig, d)[n] - truth)[:-1]) for d in (drive, coarser(drive)))
+        assert fine < rough < 6.0 * fine
+
+
+def test_a_coarser_drive_has_four_times_the_error_of_friction():
+    rig = load_rig("paper_high_impedance").with_effects(EffectSetting("coulomb_friction", {"torque": 3.0}))
+    stamps = np.arange(3000) / RATE
+    record = record_of(stamps, white(3000), stamps + 1 / RATE)
+    truth = simulate_drive(rig, drive_from(record, refine=8))
+    drive = drive_from(record)
+    fine, rough = (
+        np.std(simulate_drive(rig, d)["position"] - truth["position"]) for d in (drive, coarser(drive))
+    )
+    assert fine < rough < 8.0 * fine
+    assert rough < 0.2 * rig.sensors["position"].noise
+
+
+def test_a_command_that_changes_with_every_step_is_left_as_it_is():
+    stamps = np.arange(300) / 4000.0
+    drive = drive_from(record_of(stamps, white(300), stamps))
+    assert coarser(drive) is drive
