@@ -12,12 +12,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress"}
+BASE = {"errors", "signals", "progress", "wording"}
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors"},
     "progress": set(),
+    "wording": set(),
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},

@@ -21,6 +21,7 @@ from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.wording import listed
 
 _DURATION = 12.0
 _ENOUGH = 0.5
@@ -58,7 +59,7 @@ CANDIDATES = tuple(
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
     """Return the cheapest run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
-    names = " and ".join(r.problem.rig.effects[-1].name for r in rivals)
+    names = listed([r.problem.rig.effects[-1].name for r in rivals])
     cause = accepted.problem.rig.effects[-1].name
     if not isinstance(case.drive, Drive):
         return Experiment(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Fault, Verdict
 from rsea_ros.effects.effect import Effect
+from rsea_ros.wording import listed
 
 _CHANNELS = {
     "ft": "F/T torque",
@@ -25,7 +26,7 @@ def verdict_sentence(
 ) -> str:
     """Return the verdict as one sentence. before, after: held-out residual over noise."""
     name, data = _CHANNELS[channel], _data(faults)
-    named = _listed([c.name.replace("_", " ") for c in causes])
+    named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
     if verdict == "nothing_wrong":
@@ -56,10 +57,6 @@ def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
         f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
         "most of it is noise there, and what these data say of those frequencies is said by chance.",
     )
-
-
-def _listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def _data(faults: Sequence[Fault]) -> str:

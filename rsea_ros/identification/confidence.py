@@ -17,6 +17,7 @@ from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.wording import listed
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
@@ -161,10 +162,9 @@ def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
         source = "what is known of it is the rig's prior" if prior else "they do not show it"
         remedy = _REMEDY.get(names[0], _MEASURE)
         return f"{names[0]} is not identifiable from these data: {source}. {remedy}"
-    listed = ", ".join(names[:-1]) + " and " + names[-1]
     if all(u.name in FIELDS for u in unknowns) and moved.min() > _ALIKE * moved.max():
         return (
-            f"Only ratios of {listed} are identifiable from these data: a common factor is taken from the "
-            "rig. A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+            f"Only ratios of {listed(names)} are identifiable from these data: a common factor is taken from "
+            "the rig. A measured spring stiffness, the encoder (position), or a known inertia would fix it."
         )
-    return f"{listed} are identifiable from these data only together, not each. {_MEASURE}"
+    return f"{listed(names)} are identifiable from these data only together, not each. {_MEASURE}"

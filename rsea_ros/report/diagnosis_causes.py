@@ -13,6 +13,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis_tables import table
 from rsea_ros.report.page import bullets, equation, paragraph, section
 from rsea_ros.report.palette import AFTER, GRID, MEASURED, QUIET, faint
+from rsea_ros.wording import listed
 
 _WIDTH, _HEIGHT = 180.0, 18.0
 _GAIN = "Gain: share of the residual that is gone, on data that took no part in any fit or choice."
@@ -45,7 +46,7 @@ def _sizes(cause: Cause) -> str:
 def _rivals(cause: Cause) -> str:
     if not cause.confusable_with:
         return ""
-    rivals = words.listed([say.effect(n) for n in cause.confusable_with])
+    rivals = listed([say.effect(n) for n in cause.confusable_with])
     return paragraph(f"These data do not tell it from {rivals}.")
 
 
@@ -75,7 +76,7 @@ def _by_reason(rejected: Sequence[Rejected]) -> list[str]:
     names: dict[str, list[str]] = {}
     for r in rejected:
         names.setdefault(r.why, []).append(say.effect(r.name))
-    return [f"{words.sentence(say.prose(why))}: {words.listed(sorted(n))}." for why, n in names.items()]
+    return [f"{words.sentence(say.prose(why))}: {listed(sorted(n))}." for why, n in names.items()]
 
 
 def _row(name: str, gain: float, outcome: str, strong: bool = False) -> str:

@@ -16,6 +16,7 @@ from rsea_ros.report.overlay import Simulated, overlay_figure
 from rsea_ros.report.palette import AFTER, BEFORE, faint
 from rsea_ros.report.spectrum import Curve, finding, in_bands, residual_figure
 from rsea_ros.signals import FloatArray
+from rsea_ros.wording import listed
 
 _ABOVE = 2.0
 _FIRST_VIEW = 3.0
@@ -43,7 +44,7 @@ def _gained(spectrum: Spectrum) -> dict[str, object]:
 
 
 def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
-    causes = words.listed([say.effect(c.name) for c in diagnosis.causes])
+    causes = listed([say.effect(c.name) for c in diagnosis.causes])
     f, before = in_bands(s.frequency, s.before / s.noise)
     _, after = in_bands(s.frequency, s.after / s.noise)
     k, left = int(np.argmax(before)), int(np.argmax(after))

@@ -11,6 +11,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis_profile import Profile
 from rsea_ros.report.figure import Figure, Json, axis, label, layout, line
 from rsea_ros.report.palette import AFTER, BEFORE, NOISE, QUIET
+from rsea_ros.wording import listed
 
 _DEPENDS = 1.5
 _GAP = 0.035
@@ -47,7 +48,8 @@ def finding(profiles: Sequence[Profile]) -> str:
     most = max(physical or profiles, key=lambda p: p.contrast)
     if most.contrast >= _DEPENDS or not physical:
         return f"The residual depends most on {say.respect(most.what)}: {_extremes(most)}"
-    alike = f"The residual is alike at every {_either([say.respect(p.what) for p in physical])}"
+    respects = listed([say.respect(p.what) for p in physical], "or")
+    alike = f"The residual is alike at every {respects}"
     changing = [p for p in profiles if p.what == "time" and p.contrast >= _DEPENDS]
     return f"{alike}; over time it changes: {_extremes(changing[0])}" if changing else alike
 
@@ -59,10 +61,6 @@ def _extremes(profile: Profile) -> str:
     return (
         f"{most} times the noise from {low} to {high} {words.unit(profile.unit)}, {least} where it is least"
     )
-
-
-def _either(names: list[str]) -> str:
-    return words.listed(names).replace(" and ", " or ")
 
 
 def _traces(profile: Profile, x: str, changed: bool, colour: str) -> list[Json]:

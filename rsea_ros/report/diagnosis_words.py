@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Fault, Misfit
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
+from rsea_ros.wording import listed
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
 _ORDER = ("ft", "position", "velocity", "motor_torque")
@@ -51,7 +52,7 @@ def size(cause: Cause) -> str:
 
 def named(causes: Sequence[Cause]) -> str:
     """Return causes with their sizes: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
-    return words.listed([f"{effect(c.name)} ({size(c)})" for c in causes])
+    return listed([f"{effect(c.name)} ({size(c)})" for c in causes])
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -90,7 +91,7 @@ def faults(items: Sequence[Fault]) -> str:
     kinds: dict[str, list[str]] = {}
     for f in items:
         kinds.setdefault(f.channel, []).append(_kind(f))
-    parts = [f"{words.listed(k)} in {words.channel(n)}" for n, k in kinds.items()]
+    parts = [f"{listed(k)} in {words.channel(n)}" for n, k in kinds.items()]
     return f"Faults in the data, masked: {'; '.join(parts)}."
 
 
@@ -120,7 +121,7 @@ def excitation(settings: Mapping[str, float | str]) -> str:
 
 
 def _either(names: Sequence[str]) -> str:
-    return words.listed([effect(n) for n in names]).replace(" and ", " or ")
+    return listed([effect(n) for n in names], "or")
 
 
 def _times(ratio: float) -> str:

@@ -91,8 +91,3 @@ def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
         return number(value, 6), number(half, 2)
     shown = max(0, decimals)
     return f"{round(value, decimals):.{shown}f}".replace("-", "−"), f"{round(half, decimals):.{shown}f}"
-
-
-def listed(items: list[str]) -> str:
-    """Return items as `a, b and c`."""
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
