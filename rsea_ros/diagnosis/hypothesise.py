@@ -15,7 +15,7 @@ import numpy as np
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.problem import Problem
-from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, solve
+from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
 from rsea_ros.signals import FloatArray
 
@@ -86,19 +86,21 @@ def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, fl
 
 
 def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis | None:
-    """Return where two steps lead; None for an effect that no channel shows there."""
+    """Return where two steps lead; None for an effect that no channel shows there, or that runs away."""
     problem, theta = extended(present.problem, present.theta, effect, start)
     n = len(present.theta)
     prior = np.array([1.0 / u.doubt for u in problem.unknowns])
     centre = start_vector(problem.unknowns)
     residual = problem.residual(theta)
+    if power(residual) == np.inf:
+        return None
     own = jacobian_columns(problem, theta, residual, range(n, len(theta)))
     if not own.any():
         return None
     matrix = np.column_stack([present.jacobian, own])
     normal = matrix.T @ matrix + np.diag(prior**2)
     normal += np.diag(1e-6 * np.diag(normal) + 1e-12)
-    cost = float(residual @ residual) + float(np.sum((prior * (theta - centre)) ** 2))
+    cost = power(residual) + float(np.sum((prior * (theta - centre)) ** 2))
     best = Hypothesis(effect, problem, theta, cost)
     for _ in range(_STEPS):
         slope = matrix.T @ residual + prior**2 * (theta - centre)
@@ -106,7 +108,7 @@ def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> H
         for share in (1.0, 0.3):
             trial = theta + share * (aim - theta)
             trial_residual = problem.residual(trial)
-            cost = float(trial_residual @ trial_residual) + float(np.sum((prior * (trial - centre)) ** 2))
+            cost = power(trial_residual) + float(np.sum((prior * (trial - centre)) ** 2))
             if cost < best.cost:
                 break
         else:

@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Solution, solve
+from rsea_ros.identification.solver import Solution, power, solve
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray
@@ -143,7 +143,7 @@ class Round:
         problem, theta = self._with_clocks(h)
         masked = on_places(problem, self.cases, FIT, weights)
         masked = quicker(masked) if far else masked
-        start = min(self._starts_of_all(theta), key=lambda t: float(np.sum(masked.residual(t) ** 2)))
+        start = min(self._starts_of_all(theta), key=lambda t: power(masked.residual(t)))
         first = fitted(
             self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
         )

@@ -23,6 +23,8 @@ _CLOCK_DIFFERENCE = 1e-6
 _SMALLEST_GAIN = 1e-6
 _SMALLEST_FALL = 0.5
 """Of the cost: less than a standard deviation of one parameter, after which next to nothing is left."""
+_RUN_AWAY = 1e100
+"""Noises from which a simulation is unstable, not wrong."""
 _AS_PROMISED = 0.5
 """Of the fall of the cost that the derivatives promise: a step that brings so much speaks for them."""
 
@@ -64,7 +66,10 @@ def jacobian(problem: Problem, theta: FloatArray, residual: FloatArray, run: Map
 def jacobian_columns(
     problem: Problem, theta: FloatArray, residual: FloatArray, which: Sequence[int], run: Map = serial
 ) -> FloatArray:
-    """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta."""
+    """Return columns of d residual / d theta, shape (m, len(which)). residual: at theta.
+
+    Zero where a step of the unknown makes the simulation run away.
+    """
 
     clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if problem.unknowns[i].is_clock}
     others = [i for i in which if i not in clocks]
@@ -75,8 +80,10 @@ def jacobian_columns(
         step = _DIFFERENCE * unknown.scale
         beyond = theta[i] + step > unknown.inner(unknown.high)
         moved[i] += -step if beyond else step
-        slope: FloatArray = (problem.residual(moved) - residual) / (moved[i] - theta[i])
-        return slope
+        there = problem.residual(moved)
+        if power(there) == np.inf:
+            return np.zeros(len(residual))
+        return np.asarray((there - residual) / (moved[i] - theta[i]))
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
@@ -85,6 +92,11 @@ def jacobian_columns(
         channel = problem.by_row(lambda case, n: problem.channels.index(n))
         columns |= {i: np.where(channel == problem.channels.index(n), rate, 0.0) for i, n in clocks.items()}
     return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
+
+
+def power(residual: FloatArray) -> float:
+    """Return the sum of squares of a residual; infinite where the simulation ran away."""
+    return float(residual @ residual) if np.max(np.abs(residual), initial=0.0) < _RUN_AWAY else np.inf
 
 
 def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray:
@@ -109,6 +121,7 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on.
 
     matrix: derivatives to begin with, those of a fit that ended near, shape (m, n).
+    A start from where the simulation runs away is returned as it is, at an infinite cost.
     Where a step brings what the derivatives promised, they are kept and only corrected along the step
     (Broyden, Math. Comp. 19, 1965); they are made anew where it does not, or where no step helps.
     """
@@ -117,11 +130,12 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     weight = 1.0 / np.array([u.doubt for u in problem.unknowns])
 
     def cost_of(r: FloatArray, at: FloatArray) -> float:
-        total = float(r @ r) + float(np.sum((weight * (at - start)) ** 2))
-        return total if np.isfinite(total) else np.inf
+        return power(r) + float(np.sum((weight * (at - start)) ** 2))
 
     residual = problem.residual(theta)
     cost, damping = cost_of(residual, theta), 1e-7
+    if cost == np.inf:
+        return Solution(problem, theta, residual, np.zeros((len(residual), len(theta))), cost)
     is_fresh = matrix is None
     matrix = jacobian(problem, theta, residual, run) if matrix is None else matrix
     for _ in range(iterations):

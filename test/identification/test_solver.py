@@ -1,0 +1,63 @@
+"""The solver on curves whose minimum is known, and on simulations that run away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rsea_ros.identification.solver import jacobian_columns, power, solve
+from rsea_ros.identification.unknowns import Unknown
+
+T, NOISE = np.linspace(0.0, 1.0, 200), 1e-4
+
+
+@dataclass(frozen=True)
+class Decay:
+    """y = a exp(-b t), measured without noise; from a rate b of `cliff` on it runs away."""
+
+    truth: tuple[float, float] = (2.0, 3.0)
+    start: tuple[float, float] = (1.0, 1.0)
+    cliff: float = np.inf
+
+    @property
+    def unknowns(self):
+        return tuple(
+            Unknown(name, start, "1", 0.0, 100.0, False, np.inf, 1.0)
+            for name, start in zip(("a", "b"), self.start, strict=True)
+        )
+
+    def residual(self, theta):
+        if theta[1] >= self.cliff:
+            return np.full(len(T), np.nan)
+        return (theta[0] * np.exp(-theta[1] * T) - self.truth[0] * np.exp(-self.truth[1] * T)) / NOISE
+
+
+def test_the_minimum_of_a_curve_is_found():
+    assert solve(Decay()).theta == pytest.approx([2.0, 3.0], rel=1e-5)
+
+
+def test_a_cliff_behind_the_minimum_is_walked_around():
+    """A step over it is taken shorter; where a derivative needs one, that unknown stays for a while."""
+    found = solve(Decay(start=(1.0, 3.4), cliff=3.40001))
+    assert np.isfinite(found.cost) and found.theta[1] < 3.40001
+    assert solve(Decay(cliff=3.1)).theta == pytest.approx([2.0, 3.0], rel=1e-5)
+
+
+def test_a_start_beyond_the_cliff_is_returned_at_an_infinite_cost():
+    found = solve(Decay(start=(1.0, 5.0), cliff=4.0))
+    assert found.cost == np.inf and found.theta == pytest.approx([1.0, 5.0])
+
+
+def test_derivatives_across_the_cliff_are_zero():
+    problem = Decay(start=(1.0, 3.4), cliff=3.40001)
+    theta = np.array([1.0, 3.4])
+    columns = jacobian_columns(problem, theta, problem.residual(theta), (0, 1))
+    assert columns[:, 0].any() and not columns[:, 1].any()
+
+
+@pytest.mark.parametrize("worst", [np.nan, np.inf, 1e200])
+def test_power_of_what_ran_away_is_infinite(worst):
+    assert power(np.array([1.0, worst])) == np.inf
+    assert power(np.array([1.0, 2.0])) == 5.0
