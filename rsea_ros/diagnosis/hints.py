@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rsea_ros.diagnosis.missing_torque import ripples
+from rsea_ros.diagnosis.missing_torque import residual_of, ripples
 from rsea_ros.diagnosis.peaks import peaks, refined, sine_at
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
@@ -43,8 +43,7 @@ class Seen(NamedTuple):
 
     def residual(self, channel: str) -> FloatArray:
         """Return what is measured less what is simulated, zero where that is masked."""
-        case = self.case
-        return np.where(case.mask[channel], case.measured[channel] - self.outputs[channel], 0.0)
+        return residual_of(self.case, self.outputs, channel)
 
 
 def starts_of(effect: Effect, seen: Seen) -> list[Start]:
@@ -68,7 +67,7 @@ def _own_starts(effect: Effect) -> list[Start]:
 
 def _ripple(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     """Begin at what repeats with the rotor's angle; without that there is no ripple."""
-    return [{**effect.typical, **hint} for hint in ripples(seen.case, seen.rig)]
+    return [{**effect.typical, **hint} for hint in ripples(seen.case, seen.rig, seen.outputs)]
 
 
 def _play(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:

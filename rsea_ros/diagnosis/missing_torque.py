@@ -1,13 +1,15 @@
 """The torque that a model lacks for the measured motion, and what of it repeats with the rotor's angle.
 
-    J_m a + b_m v + T - T_m,   all but the command measured
+    J_m a + b_m v + T,   of the residuals: measured less simulated motion and load
 
-A simulated rotor angle of a 502:1 gear loses its phase; the measured one does not.
+What the model has right, the command with its lags included, is in both. A simulated rotor angle of a 502:1
+gear loses its phase; the measured one does not.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -26,9 +28,9 @@ _REVOLUTIONS = 8
 _BINS = 1 << 13
 
 
-def ripples(case: Case, rig: Rig) -> list[dict[str, float]]:
+def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
     """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats most."""
-    found = missing_torque(case, rig)
+    found = missing_torque(case, rig, outputs)
     if found is None:
         return []
     angle, torque = found[0] * rig["gear.ratio"], found[1] - np.mean(found[1])
@@ -46,10 +48,12 @@ def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, Flo
     return np.arange(len(power)) / _REVOLUTIONS, power
 
 
-def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None:
+def missing_torque(
+    case: Case, rig: Rig, outputs: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray] | None:
     """Return the measured position (rad) and the torque that is missing there, N m.
 
-    None without a position, or for a free housing.
+    outputs: simulated channels of the case. None without a position, or for a free housing.
     """
     if (
         not isinstance(case.drive, Drive)
@@ -57,28 +61,18 @@ def missing_torque(case: Case, rig: Rig) -> tuple[FloatArray, FloatArray] | None
         or "housing_end" not in rig.clamped
     ):
         return None
-    t, q = case.t["position"], case.measured["position"]
-    v = (
-        np.interp(t, case.t["velocity"], case.measured["velocity"])
-        if "velocity" in case.measured
-        else np.gradient(q, t)
-    )
-    load = (
-        np.interp(t, case.t["ft"], case.measured["ft"])
-        if "ft" in case.measured
-        else rig["spring.stiffness"] * q
+    t, q = case.t["position"], residual_of(case, outputs, "position")
+    v, load = (
+        np.interp(t, case.t[n], residual_of(case, outputs, n)) if n in case.measured else otherwise
+        for n, otherwise in (("velocity", np.gradient(q, t)), ("ft", rig["spring.stiffness"] * q))
     )
     acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
     torque = inertia * acceleration + rig["rotor.reflected_damping"] * v[1:-1] + load[1:-1]
-    torque -= _command_around(case.drive, t[1:-1] - case.start, float(np.median(np.diff(t))))
     keep = case.mask["position"][1:-1]
-    return q[1:-1][keep], torque[keep]
+    return case.measured["position"][1:-1][keep], torque[keep]
 
 
-def _command_around(drive: Drive, t: FloatArray, period: float) -> FloatArray:
-    """Return the mean of the command from a sample's period before each time to one after, N m."""
-    steps = np.clip((t / drive.step).astype(int), 0, len(drive.command) - 1)
-    width = max(1, round(period / drive.step))
-    mean = np.convolve(drive.command, np.ones(2 * width) / (2 * width), mode="same")
-    return np.asarray(mean[steps])
+def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
+    """Return what is measured less what is simulated, zero where that is masked."""
+    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
