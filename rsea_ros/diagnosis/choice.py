@@ -22,6 +22,10 @@ _ENOUGH = {1: 0.1, 2: 0.3}
 """Relative fall of a channel's residual that makes one effect, or two at once, causes above the floor."""
 
 
+_CLEARLY = 1.0
+"""Fall of what the priors cost that counts: odds of 1.6 to 1."""
+
+
 def is_progress(model: Model, present: Model) -> bool:
     """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it.
 
@@ -90,6 +94,11 @@ def prior_cost(solution: Solution) -> float:
             if np.isfinite(u.doubt)
         )
     )
+
+
+def is_likelier(model: Model, other: Model) -> bool:
+    """Tell whether a model that does as well as another needs clearly less of what is known beforehand."""
+    return prior_cost(model.solution) + loss_excess(model, other) < prior_cost(other.solution) - _CLEARLY
 
 
 def loss_excess(model: Model, best: Model) -> float:

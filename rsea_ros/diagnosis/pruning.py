@@ -1,4 +1,4 @@
-"""Pruning: no cause stays that the others make needless, or that a simpler one replaces."""
+"""Pruning: no cause stays that the others make needless, or that a simpler or likelier one replaces."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from rsea_ros.diagnosis.choice import is_far
+from rsea_ros.diagnosis.choice import is_far, is_likelier
 from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
 from rsea_ros.diagnosis.hypothesise import extended
 from rsea_ros.diagnosis.judge import compare
@@ -21,7 +21,7 @@ from rsea_ros.identification.problem import Case
 def pruned(found: Search, effects: Sequence[Effect], at_work: Workers) -> Search:
     """Return the search with no cause more than the data need, and its models as they nest."""
     smaller = Smaller(found.cases, effects, at_work)
-    return sequenced(with_simpler(without_needless(found, smaller), smaller), smaller)
+    return sequenced(with_better(without_needless(found, smaller), smaller), smaller)
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,19 @@ class Smaller:
             self.known[model.causes] = dict(zip(model.causes, found, strict=True))
         return self.known[model.causes]
 
-    def with_simpler(self, model: Model) -> list[tuple[str, str, Model]]:
-        """Return cause, simpler effect that it is said to be confused with, and the model with that."""
+    def with_rivals(self, model: Model) -> list[tuple[str, str, Model]]:
+        """Return cause, another effect that it is said to be confused with, and the model with that.
+
+        The other is simpler, or as simple where the choice between them was made without the other causes.
+        """
         pairs = [
             (name, rival)
             for name in model.causes
             for rival in self._taken_for(name)
-            if rival not in model.causes and effect_size(rival) < effect_size(name)
+            if rival not in model.causes and effect_size(rival) < effect_size(name) + (len(model.causes) > 1)
         ]
         found = self.at_work.fits.map(lambda pair: self._changed(model, *pair), pairs)
-        return [(*pair, simpler) for pair, simpler in zip(pairs, found, strict=True)]
+        return [(*pair, other) for pair, other in zip(pairs, found, strict=True)]
 
     def _taken_for(self, name: str) -> list[str]:
         """Return the effects that are said to be confused with one, from either side."""
@@ -85,13 +88,21 @@ def without_needless(found: Search, smaller: Smaller) -> Search:
     return found
 
 
-def with_simpler(found: Search, smaller: Smaller) -> Search:
-    """Put in a cause's place the simpler ones that it is said to be confused with, where they do as well."""
+def with_better(found: Search, smaller: Smaller) -> Search:
+    """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
     last = found.last
-    for name, rival, simpler in smaller.with_simpler(last):
-        if not compare(last.choose, simpler.choose, last.parameters - simpler.parameters).better:
-            without, why = smaller.without(last)[name], f"no better than {rival}, which is simpler"
-            return with_simpler(_replaced(found, simpler, trial_of(last, name, without, why)), smaller)
+    for name, rival, other in smaller.with_rivals(last):
+        if compare(last.choose, other.choose, last.parameters - other.parameters).better:
+            continue
+        without = smaller.without(last)[name]
+        if other.size < last.size:
+            why = f"no better than {rival}, which is simpler"
+            return with_better(_replaced(found, other, trial_of(last, name, without, why)), smaller)
+        if is_likelier(other, last):
+            why = f"no better than {rival}, which needs less of what is known beforehand"
+            swapped = _replaced(found, other, trial_of(last, name, without, why))
+            equal = _sorted(last, [*(c for c in last.causes if c != name), name])
+            return with_better(replace(swapped, rivals={**found.rivals, rival: (equal,)}), smaller)
     return found
 
 

@@ -1,0 +1,34 @@
+"""Two effects at once: the second shows only beside the first, or changes what the first is called."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+from independent.hidden import MAIN_PARAMETER, hide
+from independent.severities import drawn_parameters
+
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.model.rig_file import load_rig
+
+DURATION = 24.0
+
+
+@pytest.mark.parametrize(
+    ("pair", "seed"),
+    [
+        (("current_loop_lag", "torque_ripple"), 2),  # the ripple is in what the lag does not explain
+        (("base_compliance", "torque_constant_error"), 3),  # without the base ft_gain_error is likelier
+    ],
+)
+def test_both_causes_are_found_with_their_sizes(pair, seed):
+    rng = np.random.default_rng(seed)
+    bench, sizes = drawn_bench(rng), {}
+    for effect in pair:
+        parameters = drawn_parameters(effect, "medium", rng)
+        bench = hide(bench, effect, parameters)
+        sizes[effect] = parameters[MAIN_PARAMETER[effect]]
+    diagnosis = diagnose([record_run(bench, seed, "multisine", DURATION)], load_rig("paper_high_impedance"))
+    assert diagnosis.verdict == "explained"
+    found = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
+    assert found == pytest.approx(sizes, rel=0.1)
