@@ -18,8 +18,13 @@ _FAR = 5.0
 """RMS of the residual over the noise, in the worst channel, above which a model is far from the floor."""
 _ROOM = 0.1
 """How much larger the residual of a simpler model may be there, for each parameter that it saves."""
-_ENOUGH = {1: 0.1, 2: 0.3}
-"""Relative fall of a channel's residual that makes one effect, or two at once, causes above the floor."""
+_ENOUGH, _MUCH = 0.1, 0.3
+"""Relative fall of the residual that counts above the floor: of any channel, of the worst where in doubt.
+
+Doubtful are two causes at once, another in the place of one, and a third beside two that leaves much: such
+bend to whatever is there.
+"""
+_FEW = 2
 
 
 _CLEARLY = 1.0
@@ -35,9 +40,12 @@ def is_progress(model: Model, present: Model) -> bool:
         return False
     if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
         return False
+    if worst(model) < AT_FLOOR:
+        return True
+    if len(model.causes) != len(present.causes) + 1 or (len(present.causes) >= _FEW and is_far(model)):
+        return worst(model) < (1.0 - _MUCH) * worst(present)
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
-    added = len(model.causes) - len(present.causes)
-    return fall > _ENOUGH[added] or all(model.choose.ratio(n) < AT_FLOOR for n in model.choose.sums)
+    return fall > _ENOUGH
 
 
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:
@@ -73,7 +81,12 @@ def is_near(model: Model, best: Model) -> bool:
 
 def is_far(model: Model) -> bool:
     """Tell whether a model is far from the floor in its worst channel."""
-    return max(model.choose.ratio(n) for n in model.choose.sums) >= _FAR
+    return worst(model) >= _FAR
+
+
+def worst(model: Model) -> float:
+    """Return the RMS of the residual over the noise in the worst channel."""
+    return max(model.choose.ratio(n) for n in model.choose.sums)
 
 
 def at_bound(solution: Solution) -> bool:

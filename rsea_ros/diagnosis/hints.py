@@ -92,22 +92,26 @@ def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
 
 
 def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
-    """Begin with a part on a spring of its own, its mode at the highest peak of the most telling channel.
+    """Begin with a part on a spring of its own, its mode at the highest peak of each channel.
 
     The rig's spring is stiffer then: both in series are what the fit without the effect knows.
     """
     if seen.rig.rigid_spring:
         return own
-    channel = max(seen.outputs.keys() & seen.case.measured.keys(), key=lambda n: _left_of(seen, n))
-    found = _lines(seen, channel, sine=False)
-    if not found:
-        return own
-    known, turn = seen.rig[STIFFNESS], 2.0 * math.pi * found[0]
+    channels = sorted(seen.outputs.keys() & seen.case.measured.keys())
+    found = {round(f, 1): f for n in channels for f in _lines(seen, n, sine=False)[:1]}
+    known = seen.rig[STIFFNESS]
     springs = [(k * known, known / (1.0 - 1.0 / k)) for k in _STIFFER]
     return [
-        {**effect.typical, "stiffness": k, STIFFNESS: rest, "inertia": (k + rest) / turn**2}
+        {
+            **effect.typical,
+            "stiffness": k,
+            STIFFNESS: rest,
+            "inertia": (k + rest) / (2.0 * math.pi * f) ** 2,
+        }
+        for f in found.values()
         for k, rest in springs
-    ]
+    ] or own
 
 
 def _train(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
@@ -161,12 +165,6 @@ def _lines(seen: Seen, channel: str, sine: bool) -> list[float]:
         apart = _APART
     level = np.where((bins > 1.0) & (bins < 0.49 * rate), level, 0.0)
     return [refined(bins, level, k) for k in peaks(level, apart)]
-
-
-def _left_of(seen: Seen, channel: str) -> float:
-    """Return the RMS of a channel's residual over its noise."""
-    left = seen.residual(channel)[seen.case.mask[channel]]
-    return float(np.sqrt(np.mean(left**2))) / seen.case.noise[channel]
 
 
 def _has(*names: str) -> Callable[[Effect], bool]:

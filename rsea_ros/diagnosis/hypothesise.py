@@ -7,7 +7,7 @@ too sharp for that: near it the nominal values need derivatives of their own.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, w
 from rsea_ros.signals import FloatArray
 
 _STEPS = 2
+_DEAR = 3
+"""So many starts that need derivatives of their own are tried: those that cost least as they stand."""
 
 
 @dataclass(frozen=True)
@@ -46,23 +48,51 @@ def extended(
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
+def reduced(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
+    """Return a problem without one of its effects, and theta without its parameters."""
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
+    rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
+    return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
 def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
     """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have.
 
     A start may also name values of the rig, which begin there then: no longer where the derivatives are.
     """
-    best: Hypothesis | None = None
+    cheap: list[tuple[Solution, dict[str, float]]] = []
+    dear: list[tuple[Solution, dict[str, float]]] = []
     for start in starts:
-        own = {name: value for name, value in start.items() if "." not in name}
         there = moved(present, {name: value for name, value in start.items() if "." in name})
-        try_start = _with_new_derivatives if is_mode(effect) or there is not present else _from_start
-        try:
-            tried = try_start(there, effect, own)
-        except RseaError:
-            continue
-        if tried is not None and (best is None or tried.cost < best.cost):
-            best = tried
-    return best
+        own = {name: value for name, value in start.items() if "." not in name}
+        (dear if is_mode(effect) or there is not present else cheap).append((there, own))
+    if len(dear) > _DEAR:
+        dear = sorted(dear, key=lambda begin: _cost_at(begin[0], effect, begin[1]))[:_DEAR]
+    tried = [_attempt(_from_start, there, effect, own) for there, own in cheap]
+    tried += [_attempt(_with_new_derivatives, there, effect, own) for there, own in dear]
+    return min((h for h in tried if h is not None), key=lambda h: h.cost, default=None)
+
+
+def _cost_at(there: Solution, effect: Effect, own: dict[str, float]) -> float:
+    """Return the cost of a start as it stands, infinite for an effect that the rig cannot have."""
+    try:
+        problem, theta = extended(there.problem, there.theta, effect, own)
+        return power(problem.residual(theta))
+    except RseaError:
+        return np.inf
+
+
+def _attempt(
+    steps: Callable[[Solution, Effect, dict[str, float]], Hypothesis | None],
+    there: Solution,
+    effect: Effect,
+    own: dict[str, float],
+) -> Hypothesis | None:
+    """Return where steps lead from a start; None for an effect that the rig cannot have."""
+    try:
+        return steps(there, effect, own)
+    except RseaError:
+        return None
 
 
 def moved(present: Solution, values: Mapping[str, float]) -> Solution:

@@ -8,12 +8,12 @@ from functools import partial
 
 from rsea_ros.diagnosis.choice import is_far, is_likelier
 from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
-from rsea_ros.diagnosis.hypothesise import extended
+from rsea_ros.diagnosis.hypothesise import extended, reduced
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.workers import Workers
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
 
@@ -43,31 +43,23 @@ class Smaller:
     def with_rivals(self, model: Model) -> list[tuple[str, str, Model]]:
         """Return cause, another effect that it is said to be confused with, and the model with that.
 
-        The other is simpler, or as simple where the choice between them was made without the other causes.
+        The other is simpler, or as simple where the choice between them was made without the other causes
+        and the model is near the floor: far from it priors say nothing.
         """
+        as_simple = len(model.causes) > 1 and not is_far(model)
         pairs = [
-            (name, rival)
+            (name, rival.name)
             for name in model.causes
-            for rival in self._taken_for(name)
-            if rival not in model.causes and effect_size(rival) < effect_size(name) + (len(model.causes) > 1)
+            for rival in look_alikes(name, self.effects)
+            if rival.name not in model.causes and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         found = self.at_work.fits.map(lambda pair: self._changed(model, *pair), pairs)
         return [(*pair, other) for pair, other in zip(pairs, found, strict=True)]
 
-    def _taken_for(self, name: str) -> list[str]:
-        """Return the effects that are said to be confused with one, from either side."""
-        own = effect_named(name).claims.confusable_with
-        return [e.name for e in self.effects if e.name in own or name in e.claims.confusable_with]
-
     def _changed(self, model: Model, name: str, rival: str | None = None) -> Model:
         """Fit a model again without one of its causes, or with a rival of the same size in its place."""
-        problem, far = model.solution.problem, is_far(model)
-        keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-        rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-        smaller, theta = (
-            replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)),
-            model.solution.theta[keep],
-        )
+        far = is_far(model)
+        smaller, theta = reduced(model.solution.problem, model.solution.theta, name)
         if rival is None:
             return fitted(self.cases, smaller, theta, weights=model.choose, run=self.at_work.run, quick=far)
         old, new = effect_named(name).main, effect_named(rival)

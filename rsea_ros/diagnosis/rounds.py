@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +44,17 @@ _PIECES_ITERATIONS = 12
 _FULL_ITERATIONS = 6
 
 
+class Played(NamedTuple):
+    """The model to accept, if any, all other trials, and the models that do as well as it."""
+
+    accepted: Model | None
+    trials: list[Trial]
+    equals: tuple[Model, ...]
+
+
+NOTHING = Played(None, [], ())
+
+
 @dataclass(frozen=True)
 class Round:
     """What a round starts from: every sample of the cases, the effects to try, and the model so far."""
@@ -54,8 +66,8 @@ class Round:
     at_work: Workers
     tell: Progress
 
-    def play(self) -> tuple[Model | None, list[Trial], tuple[Model, ...]]:
-        """Return the model to accept, all other trials, and the models that do as well as it."""
+    def play(self) -> Played:
+        """Try every effect, where none helps two at once."""
         screened = self._screened(self.on_pieces)
         finalists = self._finalists(screened)
         models = list(self.at_work.fits.map(self._fit_all, finalists))
@@ -66,7 +78,7 @@ class Round:
         final = {h.name for h in finalists}
         trials = [self._far_behind(h) for h in screened if h.name not in final]
         trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
-        return chosen, trials, equals
+        return Played(chosen, trials, equals)
 
     def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
         """Return models with two more effects, for where none helps alone: each of some with every other."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rsea_ros.diagnosis.exchange import exchanged
 from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, refitted, requieted, rescored
-from rsea_ros.diagnosis.rounds import Round
+from rsea_ros.diagnosis.rounds import NOTHING, Round
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
@@ -17,7 +18,7 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.progress import Progress
 
 _FIRST_ITERATIONS = 25
-_MOST_CAUSES = 4
+_MOST_CAUSES, _MOST_EXCHANGES = 4, 2
 
 
 @dataclass(frozen=True)
@@ -47,14 +48,19 @@ def search(
     models = [refitted(cases, models[0], at_work.run)]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
-    for number in range(_MOST_CAUSES):
-        if at_floor(models[-1], cases):
+    for number in range(_MOST_CAUSES + _MOST_EXCHANGES):
+        present, played = models[-1], NOTHING
+        if at_floor(present, cases):
             break
-        accepted, tried, rivals = Round(cases, effects, models[-1], number, at_work, tell).play()
-        trials += tried
+        if len(present.causes) < _MOST_CAUSES:
+            played = Round(cases, effects, present, number, at_work, tell).play()
+            trials += played.trials
+        if played.accepted is None:
+            played = exchanged(cases, effects, present, number, at_work, tell)
+        accepted = played.accepted
         if accepted is None:
             break
-        equals[accepted.causes[-1]] = rivals
+        equals[accepted.causes[-1]] = played.equals
         quieter = requieted(cases, accepted)
         accepted = refitted(quieter, accepted, at_work.run)
         models = [*(rescored(quieter, m) for m in models), accepted]
