@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +85,7 @@ class Case:
 class Plan:
     """What a case is made from; without: effects that the diagnosis has to do without.
 
-    group: single, pair, clean, off_catalogue, taken_out, faulty or reading.
+    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair or drawn_triple.
     """
 
     name: str
@@ -124,7 +125,7 @@ class Plan:
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
     """Return all cases that a seed makes, each with a seed of its own."""
-    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out)
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _drawn)
     rng = np.random.default_rng(seed)
     return tuple(case for maker in makers for case in maker(rng))
 
@@ -183,6 +184,22 @@ def _faulty(rng: np.random.Generator) -> Iterator[Plan]:
             hidden = {"coulomb_friction": drawn_parameters("coulomb_friction", "medium", rng)}
             name = f"fault-{fault}-coulomb_friction"
             yield Plan(name, "faulty", _seed(rng), _excitation(k), hidden, faults=(fault,))
+
+
+def _drawn(rng: np.random.Generator) -> Iterator[Plan]:
+    """Two or three effects drawn at random, of those that are not confused with each other."""
+    effects, names = catalogue(), list(SIZES)
+    for group, count, number in (("drawn_pair", 2, 50), ("drawn_triple", 3, 25)):
+        drawn = 0
+        while drawn < number:
+            chosen = [str(n) for n in rng.choice(names, count, replace=False)]
+            if any(b in effects[a].claims.confusable_with for a, b in permutations(chosen, 2)):
+                continue
+            drawn += 1
+            severity = SEVERITIES[1 + int(rng.integers(2))]
+            hidden = {effect: drawn_parameters(effect, severity, rng) for effect in chosen}
+            name = f"{'+'.join(chosen)}-{severity}"
+            yield Plan(name, group, _seed(rng), _excitation(int(rng.integers(2))), hidden)
 
 
 def _readings(rng: np.random.Generator) -> Iterator[Plan]:

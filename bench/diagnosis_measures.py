@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis_outcome import FLOOR, OUTSIDE, Found, Outcome
 from independent.hidden import CATALOGUE
 
+HIDDEN = ("single", "pair", "drawn_pair", "drawn_triple")
 NOTHING, UNEXPLAINED, OFF = "nothing wrong", "unexplained", "not in the catalogue"
 
 
@@ -31,8 +32,8 @@ class Measure:
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
     """Return the issue's measures, in the issue's order; one without a case is left out."""
-    found = [f for o in outcomes if o.group in ("single", "pair") for f in o.found if f.main]
-    ended = [o for o in outcomes if o.group in ("single", "pair", "clean") and not o.error]
+    found = [f for o in outcomes if o.group in HIDDEN for f in o.found if f.main]
+    ended = [o for o in outcomes if o.group in (*HIDDEN, "clean") and not o.error]
     groups = {name: [o for o in outcomes if o.group == name] for name in {o.group for o in outcomes}}
     lines = [
         _at_least("first cause right, one effect, %", _right(groups.get("single", ())), 97.0),
@@ -40,6 +41,8 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
             "the same, or a rival that it is confusable with, %", _lenient(groups.get("single", ())), 97.0
         ),
         _at_least("both causes right, two effects, %", _right(groups.get("pair", ())), 90.0),
+        _at_least("both causes right, two drawn at random, %", _right(groups.get("drawn_pair", ())), 90.0),
+        _at_least("all causes right, three drawn at random, %", _right(groups.get("drawn_triple", ())), 90.0),
         _at_least("nothing wrong said of a clean bench, %", _right(groups.get("clean", ())), 98.0),
         _at_least(
             "unexplained, effect outside the catalogue, %", _right(groups.get("off_catalogue", ())), 90.0

@@ -25,8 +25,6 @@ Doubtful are two causes at once, another in the place of one, and a third beside
 bend to whatever is there.
 """
 _FEW = 2
-
-
 _CLEARLY = 1.0
 """Fall of what the priors cost that counts: odds of 1.6 to 1."""
 

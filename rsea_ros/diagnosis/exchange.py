@@ -1,4 +1,4 @@
-"""Exchange: a cause's place is offered to what it is said to be confused with and is less simple.
+"""Exchange: a cause's place is offered to the more detailed effects that it is said to be confused with.
 
 What was named first was chosen while the other causes still hid in the residual: a hardening spring stands in
 for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one does better.
