@@ -126,7 +126,7 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
         ),
         equation=effect.equation,
         channel=speaks,
-        confusable_with=tuple(m.causes[-1] for m in found.rivals.get(effect.name, ())),
+        confusable_with=tuple(m.causes[-1] for m in found.rivals_of(effect.name)),
     )
 
 
@@ -149,7 +149,7 @@ def _next_experiment(
 ) -> Experiment | None:
     """Return the run that would tell what these data cannot; None when nothing is left to tell."""
     for stage in stages[1:]:
-        rivals = found.rivals.get(stage.solution.problem.rig.effects[-1].name, ())
+        rivals = found.rivals_of(stage.solution.problem.rig.effects[-1].name)
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained"):

@@ -98,8 +98,8 @@ def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     """
     if seen.rig.rigid_spring:
         return own
-    channels = sorted(seen.outputs.keys() & seen.case.measured.keys())
-    found = {round(f, 1): f for n in channels for f in _lines(seen, n, sine=False)[:1]}
+    channels = sorted(seen.outputs.keys() & seen.case.measured.keys() - {"motor_torque"})
+    found = {round(f): f for n in channels for f in _lines(seen, n, sine=False)[:1]}
     known = seen.rig[STIFFNESS]
     springs = [(k * known, known / (1.0 - 1.0 / k)) for k in _STIFFER]
     return [

@@ -7,7 +7,7 @@ too sharp for that: near it the nominal values need derivatives of their own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,8 +20,6 @@ from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, w
 from rsea_ros.signals import FloatArray
 
 _STEPS = 2
-_DEAR = 3
-"""So many starts that need derivatives of their own are tried: those that cost least as they stand."""
 
 
 @dataclass(frozen=True)
@@ -60,39 +58,18 @@ def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]
 
     A start may also name values of the rig, which begin there then: no longer where the derivatives are.
     """
-    cheap: list[tuple[Solution, dict[str, float]]] = []
-    dear: list[tuple[Solution, dict[str, float]]] = []
+    best: Hypothesis | None = None
     for start in starts:
-        there = moved(present, {name: value for name, value in start.items() if "." in name})
         own = {name: value for name, value in start.items() if "." not in name}
-        (dear if is_mode(effect) or there is not present else cheap).append((there, own))
-    if len(dear) > _DEAR:
-        dear = sorted(dear, key=lambda begin: _cost_at(begin[0], effect, begin[1]))[:_DEAR]
-    tried = [_attempt(_from_start, there, effect, own) for there, own in cheap]
-    tried += [_attempt(_with_new_derivatives, there, effect, own) for there, own in dear]
-    return min((h for h in tried if h is not None), key=lambda h: h.cost, default=None)
-
-
-def _cost_at(there: Solution, effect: Effect, own: dict[str, float]) -> float:
-    """Return the cost of a start as it stands, infinite for an effect that the rig cannot have."""
-    try:
-        problem, theta = extended(there.problem, there.theta, effect, own)
-        return power(problem.residual(theta))
-    except RseaError:
-        return np.inf
-
-
-def _attempt(
-    steps: Callable[[Solution, Effect, dict[str, float]], Hypothesis | None],
-    there: Solution,
-    effect: Effect,
-    own: dict[str, float],
-) -> Hypothesis | None:
-    """Return where steps lead from a start; None for an effect that the rig cannot have."""
-    try:
-        return steps(there, effect, own)
-    except RseaError:
-        return None
+        there = moved(present, {name: value for name, value in start.items() if "." in name})
+        try_start = _with_new_derivatives if is_mode(effect) or there is not present else _from_start
+        try:
+            tried = try_start(there, effect, own)
+        except RseaError:
+            continue
+        if tried is not None and (best is None or tried.cost < best.cost):
+            best = tried
+    return best
 
 
 def moved(present: Solution, values: Mapping[str, float]) -> Solution:

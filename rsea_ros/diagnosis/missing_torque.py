@@ -19,7 +19,7 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-_FEWEST_PERIODS = 1.5
+_FEWEST_PERIODS = 2.0
 """As often a ripple must have repeated over the rotor's travel to be one."""
 _FEWEST, _MOST = 0.5, 60.0
 """Cycles per revolution of a ripple."""

@@ -8,14 +8,17 @@ from functools import partial
 
 from rsea_ros.diagnosis.choice import is_far, is_likelier
 from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
-from rsea_ros.diagnosis.hypothesise import extended, reduced
+from rsea_ros.diagnosis.hints import Seen, starts_of
+from rsea_ros.diagnosis.hypothesise import reduced, screen
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.problem import Case
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.signals import FloatArray
 
 
 def pruned(found: Search, effects: Sequence[Effect], at_work: Workers) -> Search:
@@ -36,7 +39,7 @@ class Smaller:
     def without(self, model: Model) -> dict[str, Model]:
         """Return by cause the model without it."""
         if model.causes not in self.known:
-            found = self.at_work.fits.map(partial(self._changed, model), model.causes)
+            found = self.at_work.fits.map(partial(self._less, model), model.causes)
             self.known[model.causes] = dict(zip(model.causes, found, strict=True))
         return self.known[model.causes]
 
@@ -48,26 +51,33 @@ class Smaller:
         """
         as_simple = len(model.causes) > 1 and not is_far(model)
         pairs = [
-            (name, rival.name)
+            (name, rival)
             for name in model.causes
             for rival in look_alikes(name, self.effects)
             if rival.name not in model.causes and effect_size(rival.name) < effect_size(name) + as_simple
         ]
-        found = self.at_work.fits.map(lambda pair: self._changed(model, *pair), pairs)
-        return [(*pair, other) for pair, other in zip(pairs, found, strict=True)]
+        rests = self.without(model) if pairs else {}
+        found = self.at_work.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
+        return [(name, rival.name, m) for (name, rival), m in zip(pairs, found, strict=True) if m is not None]
 
-    def _changed(self, model: Model, name: str, rival: str | None = None) -> Model:
-        """Fit a model again without one of its causes, or with a rival of the same size in its place."""
-        far = is_far(model)
-        smaller, theta = reduced(model.solution.problem, model.solution.theta, name)
-        if rival is None:
-            return fitted(self.cases, smaller, theta, weights=model.choose, run=self.at_work.run, quick=far)
-        old, new = effect_named(name).main, effect_named(rival)
-        start = new.typical | (
-            {new.main.name: model.solution.values[f"{name}.{old.name}"]} if old.unit == new.main.unit else {}
-        )
-        larger, beginning = extended(smaller, theta, new, start)
-        return fitted(self.cases, larger, beginning, weights=model.choose, run=self.at_work.run, quick=far)
+    def _less(self, model: Model, name: str) -> Model:
+        """Fit a model again without one of its causes."""
+        return self._fitted(model, *reduced(model.solution.problem, model.solution.theta, name))
+
+    def _with(self, model: Model, rest: Model, name: str, rival: Effect) -> Model | None:
+        """Fit a model again with a rival, of the same size where that is one, in the place of a cause."""
+        old, there = effect_named(name).main, rest.solution
+        same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
+        rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
+        starts = starts_of(rival, Seen(self.cases[0], rig, rest.outputs[0]))
+        starts += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
+        begun = screen(there, rival, starts)
+        return None if begun is None else self._fitted(model, begun.problem, begun.theta)
+
+    def _fitted(self, model: Model, problem: Problem, theta: FloatArray) -> Model:
+        """Fit what is left or made of a model as that was."""
+        run, far = self.at_work.run, is_far(model)
+        return fitted(self.cases, problem, theta, weights=model.choose, run=run, quick=far)
 
 
 def without_needless(found: Search, smaller: Smaller) -> Search:

@@ -33,6 +33,10 @@ class Search:
     trials: tuple[Trial, ...] = ()
     rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
 
+    def rivals_of(self, cause: str) -> tuple[Model, ...]:
+        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
+        return tuple(m for m in self.rivals.get(cause, ()) if m.causes[-1] not in self.last.causes)
+
     @property
     def last(self) -> Model:
         """The model with all accepted causes."""

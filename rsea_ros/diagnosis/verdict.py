@@ -41,7 +41,7 @@ def is_trusted(found: Search, first: Score, last: Score) -> bool:
     takes away half of the residual in every channel that misfits, or all of one that misfits much
     without adding to another, and nothing else does as well as the first.
     """
-    if found.rivals.get(found.last.causes[0], ()):
+    if found.rivals_of(found.last.causes[0]):
         return False
     misfitting = [n for n in first.sums if first.ratio(n) > MISFIT]
     falls = [last.ratio(n) / first.ratio(n) for n in misfitting]

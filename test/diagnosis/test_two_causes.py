@@ -15,20 +15,24 @@ DURATION = 24.0
 
 
 @pytest.mark.parametrize(
-    ("pair", "seed"),
+    ("pair", "severity", "excitation", "seed"),
     [
-        (("current_loop_lag", "torque_ripple"), 2),  # the ripple is in what the lag does not explain
-        (("base_compliance", "torque_constant_error"), 3),  # without the base ft_gain_error is likelier
+        # the ripple is in what the lag does not explain
+        (("current_loop_lag", "torque_ripple"), "medium", "multisine", 2),
+        # without the base a wrong gain of the sensor is likelier
+        (("base_compliance", "torque_constant_error"), "medium", "multisine", 3),
+        # a hardening spring and Coulomb friction are named first; both give way
+        (("hard_stop", "stribeck_friction"), "strong", "chirp_noise", 3),
     ],
 )
-def test_both_causes_are_found_with_their_sizes(pair, seed):
+def test_both_causes_are_found_with_their_sizes(pair, severity, excitation, seed):
     rng = np.random.default_rng(seed)
     bench, sizes = drawn_bench(rng), {}
     for effect in pair:
-        parameters = drawn_parameters(effect, "medium", rng)
+        parameters = drawn_parameters(effect, severity, rng)
         bench = hide(bench, effect, parameters)
         sizes[effect] = parameters[MAIN_PARAMETER[effect]]
-    diagnosis = diagnose([record_run(bench, seed, "multisine", DURATION)], load_rig("paper_high_impedance"))
+    diagnosis = diagnose([record_run(bench, seed, excitation, DURATION)], load_rig("paper_high_impedance"))
     assert diagnosis.verdict == "explained"
     found = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
     assert found == pytest.approx(sizes, rel=0.1)
