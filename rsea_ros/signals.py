@@ -72,17 +72,37 @@ class Channel:
 
 
 @dataclass(frozen=True)
+class Fault:
+    """A fault of the data, found before any physics.
+
+    kind: a name of the contract (`frozen_samples`, `missing_messages`, `clock_offset`, …).
+    channel: the channel, or the topic or file where no channel is known.
+    share: of the channel's samples, 0 to 1; NaN where the fault is not one of single samples.
+    size: how large, in `unit`, where the fault has a size; detail: where and what, for people.
+    """
+
+    kind: str
+    channel: str
+    share: float
+    detail: str = ""
+    size: float | None = None
+    unit: str = ""
+
+
+@dataclass(frozen=True)
 class Record:
     """One run: channels by name (see UNITS), and where they came from.
 
     epoch_ns: the stamp that is t = 0, nanoseconds since the epoch of the recording clock.
-    source: path or topic prefix, for messages to people.
+    source: path or topic prefix, for messages to people. notes: what was repaired or taken for granted.
+    faults: damage found while reading; every result made from the record repeats it.
     """
 
     channels: Mapping[str, Channel]
     source: str = ""
     epoch_ns: int = 0
     notes: tuple[str, ...] = field(default=())
+    faults: tuple[Fault, ...] = field(default=())
 
     def __post_init__(self) -> None:
         unknown = set(self.channels) - set(UNITS)

@@ -60,6 +60,7 @@ def _print(result: Identification, report: Path) -> None:
     """Print the table, and a line for each thing to know beside it."""
     from rich.console import Console
 
+    from rsea_ros.report.fault_words import fault
     from rsea_ros.report.statics_words import statics_sentences
     from rsea_ros.report.terminal import terminal_table
 
@@ -70,4 +71,6 @@ def _print(result: Identification, report: Path) -> None:
     found = statics_sentences(result.statics) if result.statics else ()
     for sentence in (*found, *result.statements, *result.notes):
         print(sentence)
+    for damage in result.faults:
+        print(f"data: {fault(damage)}")
     print(f"report: {report}")

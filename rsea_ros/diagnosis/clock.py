@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.diagnosis.result import Fault
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import Channel, Fault, FloatArray, Record
 
 _GAP = 1.6
 """In sample periods: a longer interval is a gap."""

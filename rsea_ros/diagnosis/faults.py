@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.clock import repair_clock
-from rsea_ros.diagnosis.result import Fault
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 
 _AROUND = 10
 _SPIKE = 12.0
@@ -39,7 +38,7 @@ class Checked:
 
 def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
-    faults = [Fault("missing_topic", name, 1.0) for name in missing(record, rig)]
+    faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_clock(record)
     faults += clock_faults
     masked: dict[str, BoolArray] = {}

@@ -11,19 +11,9 @@ import numpy.typing as npt
 
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A fault of the data, found before any physics. share: of the channel's samples, 0 … 1."""
-
-    kind: str
-    channel: str
-    share: float
-    detail: str = ""
 
 
 @dataclass(frozen=True)

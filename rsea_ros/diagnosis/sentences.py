@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.result import Cause, Fault, Verdict
+from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
+from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
 _CHANNELS = {

@@ -160,6 +160,7 @@ def _result(
         statics=statics_of(records[0], rig),
         statements=what_is_not_told(problem.unknowns, confidence),
         notes=tuple(note for r in records for note in r.notes),
+        faults=tuple(fault for r in records for fault in r.faults),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, FloatArray
+from rsea_ros.signals import ComplexArray, Fault, FloatArray
 
 
 @dataclass(frozen=True)
@@ -83,3 +83,4 @@ class Identification:
     statics: Statics | None = None
     statements: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    faults: tuple[Fault, ...] = field(default=())

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Fault, Misfit, Rejected
-from rsea_ros.report.identification_json import finite, numbers, parameter
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Misfit, Rejected
+from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
 
 SCHEMA = 1
 
@@ -23,7 +23,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             "bags": list(d.sources),
             "duration_s": finite(d.duration),
             "rate_hz": finite(d.rate),
-            "faults": [_fault(f) for f in d.faults],
+            "faults": [fault_json(f) for f in d.faults],
         },
         "baseline": {
             "parameters": {p.name: parameter(p) for p in d.baseline},
@@ -43,11 +43,6 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(d.statements),
     }
-
-
-def _fault(fault: Fault) -> dict[str, Any]:
-    told = {"detail": fault.detail} if fault.detail else {}
-    return {"kind": fault.kind, "channel": fault.channel, "share": finite(fault.share), **told}
 
 
 def _misfit(m: Misfit) -> dict[str, Any]:

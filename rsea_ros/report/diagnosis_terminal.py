@@ -11,6 +11,7 @@ from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import was_fitted
+from rsea_ros.report.fault_words import fault
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _WIDTH = 12
@@ -42,8 +43,8 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "not told", sentence
     if d.next_experiment is not None:
         yield "next run", _next(d.next_experiment)
-    for fault in d.faults:
-        yield "data", say.fault(fault)
+    for found in d.faults:
+        yield "data", fault(found)
 
 
 def _next(experiment: Experiment) -> str:

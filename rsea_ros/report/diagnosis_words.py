@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Fault, Misfit
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
 from rsea_ros.wording import listed
@@ -75,28 +75,6 @@ def misfit(m: Misfit) -> str:
     """Return `speed −0.02 to 0 rad/s (48 times)`."""
     low, high = (words.number(side, 2) for side in (m.low, m.high))
     return f"{respect(m.what)} {low} to {high} {words.unit(m.unit)} ({_times(m.times_noise)})"
-
-
-def fault(f: Fault) -> str:
-    """Return `outliers in F/T torque, 0.04 % of the samples`."""
-    if f.kind == "missing_topic":
-        return f"{words.channel(f.channel)} is missing"
-    detail = f" ({f.detail})" if f.detail else ""
-    share = f"{words.number(100.0 * f.share, 2)} % of the samples"
-    return f"{_kind(f)} in {words.channel(f.channel)}, {share}{detail}"
-
-
-def faults(items: Sequence[Fault]) -> str:
-    """Return all faults in a short sentence."""
-    kinds: dict[str, list[str]] = {}
-    for f in items:
-        kinds.setdefault(f.channel, []).append(_kind(f))
-    parts = [f"{listed(k)} in {words.channel(n)}" for n, k in kinds.items()]
-    return f"Faults in the data, masked: {'; '.join(parts)}."
-
-
-def _kind(f: Fault) -> str:
-    return "NaN" if f.kind == "nan" else f.kind.replace("_", " ")
 
 
 def confusions(diagnosis: Diagnosis) -> list[str]:

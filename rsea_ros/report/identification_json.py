@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.signals import Fault
 
 SCHEMA = 1
 
@@ -18,7 +19,8 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
-        "data": {"bags": list(i.sources), "duration_s": finite(i.duration), "rate_hz": finite(i.rate)},
+        "data": {"bags": list(i.sources), "duration_s": finite(i.duration), "rate_hz": finite(i.rate),
+                 "faults": [fault_json(f) for f in i.faults]},
         "parameters": {p.name: parameter(p) for p in i.parameters},
         "correlation": {
             "names": [p.name for p in i.parameters],
@@ -36,6 +38,13 @@ def identification_json(identification: Identification) -> dict[str, Any]:
         "statements": list(i.statements),
         "notes": list(i.notes),
     }  # fmt: skip
+
+
+def fault_json(fault: Fault) -> dict[str, Any]:
+    """Return a fault of the data as it stands in the result files."""
+    size = {} if fault.size is None else {"size": finite(fault.size), "unit": fault.unit}
+    detail = {"detail": fault.detail} if fault.detail else {}
+    return {"kind": fault.kind, "channel": fault.channel, "share": finite(fault.share), **size, **detail}
 
 
 def parameter(p: ParameterEstimate) -> dict[str, Any]:

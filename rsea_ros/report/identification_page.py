@@ -7,6 +7,7 @@ import numpy as np
 from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.report import words
 from rsea_ros.report.bode import bode_figure
+from rsea_ros.report.fault_words import fault
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.overlay import Simulated, overlay_figure
 from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragraph, section
@@ -159,4 +160,5 @@ def _untold(identification: Identification) -> str:
 
 def _footer(identification: Identification) -> list[str]:
     sources = f"Data: {', '.join(identification.sources)}"
-    return [sources, *identification.notes, "rsea identify. All values in SI."]
+    damage = [words.sentence(f"{fault(f)}.") for f in identification.faults]
+    return [sources, *damage, *identification.notes, "rsea identify. All values in SI."]

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.result import Estimate, Experiment, Fault
+from rsea_ros.diagnosis.result import Estimate, Experiment
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.diagnosis_files import NAMES
 from rsea_ros.report.diagnosis_json import diagnosis_json
+from rsea_ros.signals import Fault
 
 
 def strict(text: str) -> Any:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Fault
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment
 from rsea_ros.errors import BagError
 from rsea_ros.report.diagnosis_files import write_diagnosis
 from rsea_ros.report.diagnosis_page import diagnosis_report
+from rsea_ros.signals import Fault
 
 HEADINGS = (
     "is what the simulation lacks",

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rsea_ros.diagnosis.result import Estimate, Fault, Misfit, Rejected
+from rsea_ros.diagnosis.result import Estimate, Misfit, Rejected
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.diagnosis_profile import BINS, profiles
 from rsea_ros.report.diagnosis_terminal import terminal_lines
 from rsea_ros.report.diagnosis_where import finding
+from rsea_ros.signals import Fault
 
 
 def terminal(diagnosis):
