@@ -95,7 +95,8 @@ def run_case(case: Case, rig_name: str = "paper_high_impedance") -> Outcome:
     """Diagnose a case and set the result beside the truth; an exception is an outcome too."""
     start = time.perf_counter()
     try:
-        diagnosis = diagnose([case.record], load_rig(rig_name), settings=DiagnosisSettings(without=case.without))
+        settings = DiagnosisSettings(without=case.without)
+        diagnosis = diagnose([case.record], load_rig(rig_name), settings=settings)
     except Exception:
         told = traceback.format_exc(limit=-3)
         named = ()
