@@ -34,8 +34,9 @@ class Drive:
     N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
     each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
-    initial: position (rad) and velocity (rad/s) at the start. origin, whole: when the drive begins in its
-    record and how long that is, s; they differ from 0 and `duration` when the drive is a piece of one.
+    initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
+    origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
+    `duration` when the drive is a piece of one.
     """
 
     step: float
@@ -46,6 +47,7 @@ class Drive:
     reference: FloatArray
     angle: FloatArray
     initial: tuple[float, float]
+    hold: int = 1
     origin: float = 0.0
     whole: float = math.nan
 
@@ -80,7 +82,8 @@ def drive_from(
             f"{record.source}: command has {len(command)} samples, expected at least 10"
         )
     period = _period(command.t)
-    step = period / (steps_per_sample(period) * refine)
+    hold = steps_per_sample(period) * refine
+    step = period / hold
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
     count = math.ceil((stop - start) / step - 1e-6)
@@ -100,17 +103,19 @@ def drive_from(
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=np.interp(ends, *_ty(record["position"])) if "position" in record else np.empty(0),
         initial=(0.0, 0.0) if from_rest else _initial(record),
+        hold=hold,
     )
 
 
 def coarser(drive: Drive) -> Drive:
     """Return a drive on steps twice as long, for a first look: at half the cost four times the error.
 
-    One whose command mostly changes within such steps is returned as it is.
+    One whose command changes within such a step is returned as it is: the motor torque that is read there
+    would miss by the change.
     """
     steps = len(drive.command) // 2 * 2
     pairs = drive.command[:steps].reshape(-1, 2)
-    if np.mean(pairs[:, 0] == pairs[:, 1]) < 0.5:
+    if drive.hold % 2 or not np.array_equal(pairs[:, 0], pairs[:, 1]):
         return drive
     brought = np.concatenate([[0.0], np.cumsum(drive.command[:steps])])
 
@@ -127,6 +132,7 @@ def coarser(drive: Drive) -> Drive:
         impulse={n: i + beside(drive.at[n]) for n, i in drive.impulse.items()},
         reference=drive.reference[:steps:2],
         angle=drive.angle[1:steps:2],
+        hold=drive.hold // 2,
     )
 
 
