@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.choice import as_well, at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, quicker, refitted
 from rsea_ros.diagnosis.hints import Seen, Start, starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
@@ -156,9 +156,13 @@ class Round:
         masked = on_places(problem, self.cases, FIT, weights)
         masked = quicker(masked) if far else masked
         start = min(self._starts_of_all(theta), key=lambda t: power(masked.residual(t)))
-        first = fitted(
-            self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
+        fit = partial(
+            fitted, self.cases, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
         )
+        first = fit(problem, start)
+        if problem.ride:
+            free = fit(replace(problem, ride=False), first.solution.theta)
+            first = free if as_well(free, first) else first
         return refitted(self.cases, first, run, quick=is_far(first)) if self._has_moved(first) else first
 
     def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicHermiteSpline
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.step import OUTPUTS
@@ -93,7 +94,7 @@ def drive_from(
         torque = torque - np.interp(command.t, *_ty(record[made]))
     held = _mean_of_held(knots, torque, count)
     at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
-    ends = start + step * np.arange(1, count + 1)
+    ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step,
         start=start,
@@ -101,7 +102,7 @@ def drive_from(
         at=MappingProxyType(at),
         impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
-        angle=np.interp(ends, *_ty(record["position"])) if "position" in record else np.empty(0),
+        angle=_angle(record, ends),
         initial=(0.0, 0.0) if from_rest else _initial(record),
         hold=hold,
     )
@@ -161,6 +162,17 @@ def _initial(record: Record) -> tuple[float, float]:
     position, velocity = (record[n].y if n in record else np.zeros(2) for n in ("position", "velocity"))
     moved = _moved(position) or _moved(velocity)
     return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
+
+
+def _angle(record: Record, ends: FloatArray) -> FloatArray:
+    """Return the measured position at some times (s), by cubics where its speed is measured with it."""
+    if "position" not in record:
+        return np.empty(0)
+    t, q = _ty(record["position"])
+    if "velocity" in record and np.array_equal(record["velocity"].t, t):
+        spline = CubicHermiteSpline(t, q, record["velocity"].y)
+        return np.asarray(spline(np.clip(ends, t[0], t[-1])))
+    return np.interp(ends, t, q)
 
 
 def _moved(y: FloatArray) -> bool:
