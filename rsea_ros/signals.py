@@ -119,7 +119,8 @@ class Record:
     def from_arrays(cls, t: npt.ArrayLike, *, source: str = "arrays", **channels: npt.ArrayLike) -> Record:
         """Return a record of channels that share their stamps; the values are copied.
 
-        t: stamps, s, shape (n,), rising. channels: values by name of UNITS (or an alias such as `q`, `u`,
+        t: stamps, s, shape (n,), rising: a command takes effect at its stamp and is held, a measurement was
+        taken at its stamp, so the row of a control loop that reads and then commands is one stamp. channels: values by name of UNITS (or an alias such as `q`, `u`,
         `tau`), in SI, shape (n,): arrays, lists or columns of a table.
         Raises ChannelError for an unknown name, another shape, or stamps that do not rise.
         """
