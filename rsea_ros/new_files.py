@@ -110,7 +110,9 @@ class NewFiles:
 
 
 def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
-    """Write one file, complete or not at all, and return its path. Raises as NewFiles does."""
+    """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
+    with naming(Path(path)):
+        Path(path).parent.stat()
     with NewFiles(Place(Path(path).parent, force)) as new:
         return new.write(Path(path).name, text)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import codecs
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from io import TextIOWrapper
 from typing import Any, TextIO
 
 from rsea_ros.wording import printable
@@ -38,7 +39,7 @@ def shown() -> Iterator[None]:
     codecs.register_error("rsea", _instead)
     before = sys.stdout
     for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError):
+        if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
     sys.stdout = Shown(before)  # type: ignore[assignment]
     try:

@@ -31,5 +31,5 @@ def run(args: argparse.Namespace) -> int:
         try:
             return pytest.wait()
         except KeyboardInterrupt as stop:
-            if isinstance(stop, Stopped) and stop.number != signal.SIGINT:  # that one the terminal sends to pytest too
+            if isinstance(stop, Stopped) and stop.number != signal.SIGINT:  # which the terminal sends it
                 pytest.send_signal(signal.SIGINT)

@@ -97,7 +97,11 @@ def test_an_interrupt_that_an_import_turns_into_another_error_is_an_interrupt(ve
 
 @pytest.mark.parametrize(
     ("number", "line"),
-    [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "stopped by SIGTERM"), (signal.SIGHUP, "stopped by SIGHUP")],
+    [
+        (signal.SIGINT, "interrupted"),
+        (signal.SIGTERM, "stopped by SIGTERM"),
+        (signal.SIGHUP, "stopped by SIGHUP"),
+    ],
 )
 def test_signals_are_one_line_and_their_status(verb, capsys, number, line):
     before = signal.getsignal(number)
@@ -124,7 +128,7 @@ HOSTILE = "ft\x1b]0;title\x07\x1b[2J\x9b1m\u202ecod\udce9\r"
 
 
 def test_control_characters_reach_no_terminal(verb, capsys):
-    assert verb(lambda args: print(HOSTILE) or 0) == 0
+    assert verb(lambda args: sys.stdout.write(HOSTILE + "\n") and 0) == 0
     assert verb(raising(BagError(HOSTILE))) == 2
     told = capsys.readouterr()
     shown = "ft\\u001b]0;title\\u0007\\u001b[2J\\u009b1m\\u202ecod\\udce9"
@@ -141,7 +145,8 @@ def test_any_encoding_will_do():
         "import sys, types; from pathlib import Path; from rsea_ros.cli import main as cli\n"
         "from rsea_ros.errors import BagError\n"
         "def run(args): print('3 N·m ± 1 µrad 数'); raise BagError('b\\xe4g')\n"
-        "sys.modules['rsea_ros.cli.fake'] = types.SimpleNamespace(HELP='', add_arguments=lambda p: 0, run=run)\n"
+        "fake = types.SimpleNamespace(HELP='', add_arguments=lambda parser: 0, run=run)\n"
+        "sys.modules['rsea_ros.cli.fake'] = fake\n"
         "cli.verbs = lambda: {'fake': Path('fake.py')}; sys.exit(cli.main(['fake']))"
     )
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
