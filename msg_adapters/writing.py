@@ -72,6 +72,9 @@ class BagWriter:
         except OSError as error:
             self._clear()
             raise BagError(f"{error.filename or self.path}: cannot be made: {error.strerror}") from None
+        except BaseException:
+            self._clear()
+            raise
         return self
 
     def write(self, topic: str, msgtype: str, log_time: int, raw: bytes) -> None:

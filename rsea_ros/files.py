@@ -83,7 +83,10 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
     undo: Undo = []
     with undisturbed():
         try:
-            replaced = [_take(source, target, force, undo) for source, target in pairs]
+            replaced = []
+            for source, target in pairs:
+                with naming(target):
+                    replaced.append(_take(source, target, force, undo))
             for folder in {target.parent for _, target in pairs}:
                 sync(folder)
         except BaseException:
@@ -110,26 +113,31 @@ def remove(path: Path) -> None:
 
 def _take(source: Path, target: Path, force: bool, undo: Undo) -> Path | None:
     """Give one file or folder its name; return where what it replaced is now."""
-    folder = source.is_dir()
     if force and os.path.lexists(target):
-        if folder != (target.is_dir() and not target.is_symlink()):
-            raise OutputError(f"{target}: is a {'file' if folder else 'folder'}, expected a new name")
+        if source.is_dir() != (target.is_dir() and not target.is_symlink()):
+            kind = "folder" if source.is_dir() else "file"
+            raise OutputError(f"{target}: is no {kind}, expected a new name")
         return _exchange(source, target, undo)
     try:
-        if folder:
-            target.mkdir()  # takes the name, or fails; a rename may replace this empty folder
-            undo.append(target.rmdir)
-            os.rename(source, target)
-            undo[-1] = lambda: os.rename(target, source)
-        elif _linked(source, target):
-            undo.append(target.unlink)
-        else:
-            os.close(create(target))  # takes the name, or fails
-            undo.append(target.unlink)
-            os.rename(source, target)
+        _take_free(source, target, undo)
     except FileExistsError:
         raise taken(target) from None
     return None
+
+
+def _take_free(source: Path, target: Path, undo: Undo) -> None:
+    """Give a file or folder its name, or raise FileExistsError."""
+    if source.is_dir():
+        target.mkdir()  # takes the name, or fails; a rename may replace this empty folder
+        undo.append(target.rmdir)
+        os.rename(source, target)
+        undo[-1] = lambda: os.rename(target, source)
+    elif _linked(source, target):
+        undo.append(target.unlink)
+    else:
+        os.close(create(target))  # takes the name, or fails
+        undo.append(target.unlink)
+        os.rename(source, target)
 
 
 def _exchange(source: Path, target: Path, undo: Undo) -> Path:
@@ -168,5 +176,6 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        error.filename = str(path)
+        if error.errno is not None:  # else it is an error of ours, with its whole message
+            error.filename = str(path)
         raise

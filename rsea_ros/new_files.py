@@ -123,6 +123,11 @@ def siblings(path: Path) -> Iterator[Path]:
     yield from (path.with_name(f"{path.name}-{number}") for number in count(2))
 
 
+def unused(path: Path) -> Path:
+    """Return the first of NAME, NAME-2, NAME-3, … that does not exist."""
+    return next(one for one in siblings(path) if not os.path.lexists(one))
+
+
 def check_free(paths: Iterable[Path], *, force: bool = False, inputs: Collection[str | Path] = ()) -> None:
     """Refuse, before any work, a name that is taken (unless `force`) and one of the inputs (always).
 

@@ -41,7 +41,7 @@ def shown() -> Iterator[None]:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
-    sys.stdout = Shown(before)  # type: ignore[assignment]
+    sys.stdout = Shown(before)
     try:
         yield
     finally:
