@@ -63,7 +63,7 @@ def run_node(
     stop = _Stop()
     try:
         _initialise(arguments)
-        node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        node = _make(kind, name)
         done = _work(node, make(node, declare(node, table)), stop)
         return SUCCESS if done or endless else stop.status
     except Stopped as stopped:
@@ -110,6 +110,14 @@ def _initialise(arguments: Sequence[str]) -> None:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise ParameterError(f"ROS arguments: {str(error).split(', at /')[0]}") from None
+
+
+def _make(kind: type[Node], name: str) -> Node:
+    """Make the node. Raises RseaError where the middleware cannot, as with security that it does not have."""
+    try:
+        return kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+    except RuntimeError as error:
+        raise RseaError(str(error).split(", at /")[0]) from None
 
 
 def _work(node: Node, program: Program, stop: _Stop) -> bool:

@@ -1,4 +1,4 @@
-"""A power cut, and a disk that fails, under a recording: what was on the disk is there, and no more is lost."""
+"""A power cut, and a disk that fails, under a recording: what was on the disk is there, no more is lost."""
 
 import pytest
 
