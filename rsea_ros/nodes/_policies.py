@@ -1,7 +1,7 @@
 """SROS 2 policies of the nodes, read from the nodes themselves: python -m rsea_ros.nodes._policies > FILE.
 
-Each node is made in this process with its defaults and asked for its topics and services. `operator` stands for a
-person, who may listen to everything, call every service, and publish nothing.
+Each node is made in this process with its defaults and asked for its topics and services. `operator` stands
+for a person, who may listen to everything, call every service, and publish nothing.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ PARAMETERS: Mapping[str, Mapping[str, object]] = {
 """What a node needs so that it has all its topics."""
 OPERATOR = "operator"
 Interfaces = dict[tuple[str, str], set[str]]
-"""Names by what is done with them: (topics, publish), (topics, subscribe), (services, reply), (services, request)."""
+"""Names by what is done with them: topics publish or subscribe, services reply or request."""
 
 
 def main() -> int:
