@@ -16,8 +16,8 @@ from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
+from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
-from rsea_ros.files import PREFIX, give_names, make_folder, remove, sync, taken, write_new
 from rsea_ros.interrupts import undisturbed
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
@@ -65,7 +65,7 @@ class BagWriter:
         self._made: list[Path] = []
         try:
             with undisturbed():
-                self._made = make_folder(self.path.parent)
+                self._made = files.make_folder(self.path.parent)
                 self.partial = _new_directory(self.path, self._recording)
                 self._made.insert(0, self.partial)
                 self._open()
@@ -138,7 +138,11 @@ class BagWriter:
         """Refuse a name that is taken by something that may not be replaced. Raises BagError."""
         if self.path.exists() or self.path.is_symlink():
             if not self._force:
-                raise BagError(str(taken(self.path)))
+                raise BagError(str(files.taken(self.path)))
+            try:
+                files.check_replaceable(self.path)
+            except OutputError as error:
+                raise BagError(str(error)) from None
             inside = self.path.iterdir() if self.path.is_dir() else ()
             if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
                 raise BagError(f"{self.path}: holds more than a bag, expected a new name")
@@ -148,22 +152,22 @@ class BagWriter:
         name = self.path.stem if self._single else self.path.name
         self._storage = opened(self.partial / f"{name}{suffix}")
         for folder in (self.partial, self.path.parent) if self._recording else ():
-            sync(folder)
+            files.sync(folder)
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
         self._storage.close()
         file = self._storage.path
         if self._single:
-            give_names([(file, self.path)], force=self._force)
-            remove(self.partial)
+            files.give_names([(file, self.path)], force=self._force)
+            files.remove(self.partial)
             return
         topics = [topic for _, topic in self._topics.values()]
-        remove(self.partial / metadata.NAME)
-        write_new(
+        files.remove(self.partial / metadata.NAME)
+        files.write_new(
             self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.notes)
         )
-        give_names([(self.partial, self.path)], force=self._force)
+        files.give_names([(self.partial, self.path)], force=self._force)
 
     def _abandon(self) -> None:
         with suppress(OSError):
@@ -174,7 +178,7 @@ class BagWriter:
     def _clear(self) -> None:
         """Remove what was made, the folders above it only where they are empty."""
         for path in self._made[:1]:
-            remove(path)
+            files.remove(path)
         for path in self._made[1:]:
             with suppress(OSError):
                 path.rmdir()
@@ -190,9 +194,10 @@ def _new_directory(path: Path, recording: bool) -> Path:
     """Make a directory that nobody has: NAME.partial of a recording; a killed recorder's stays."""
     number = 0
     while True:
-        name = f"{path.name}.partial{number or ''}" if recording else f"{PREFIX}{secrets.token_hex(4)}"
+        name = f"{path.name}.partial{number or ''}" if recording else f"{files.PREFIX}{secrets.token_hex(4)}"
         try:
-            path.with_name(name).mkdir()
+            with files.naming(path):
+                path.with_name(name).mkdir()
             return path.with_name(name)
         except FileExistsError:
             number += 1

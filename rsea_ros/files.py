@@ -103,6 +103,12 @@ def taken(path: Path) -> OutputError:
     return OutputError(f"{path}: exists already, expected a new name or --force")
 
 
+def check_replaceable(path: Path) -> None:
+    """Refuse what nobody may replace: a device, a pipe, a symbolic link. Raises OutputError."""
+    if path.is_symlink() or not (path.is_file() or path.is_dir()):
+        raise OutputError(f"{path}: is no regular file, expected a new name")
+
+
 def remove(path: Path) -> None:
     """Remove a file or a folder, if it can be removed."""
     if path.is_dir() and not path.is_symlink():
@@ -114,7 +120,8 @@ def remove(path: Path) -> None:
 def _take(source: Path, target: Path, force: bool, undo: Undo) -> Path | None:
     """Give one file or folder its name; return where what it replaced is now."""
     if force and os.path.lexists(target):
-        if source.is_dir() != (target.is_dir() and not target.is_symlink()):
+        check_replaceable(target)
+        if source.is_dir() != target.is_dir():
             kind = "folder" if source.is_dir() else "file"
             raise OutputError(f"{target}: is no {kind}, expected a new name")
         return _exchange(source, target, undo)

@@ -16,7 +16,16 @@ from pathlib import Path
 from types import TracebackType
 
 from rsea_ros.errors import OutputError, RseaError
-from rsea_ros.files import PREFIX, give_names, make_folder, naming, remove, taken, write_new
+from rsea_ros.files import (
+    PREFIX,
+    check_replaceable,
+    give_names,
+    make_folder,
+    naming,
+    remove,
+    taken,
+    write_new,
+)
 from rsea_ros.interrupts import undisturbed
 
 
@@ -137,8 +146,10 @@ def check_free(paths: Iterable[Path], *, force: bool = False, inputs: Collection
         for one in map(Path, inputs):
             if one.exists() and _touches(path, one):
                 raise OutputError(f"{path}: is the input {one} or lies in it, expected another name")
-        if not force and os.path.lexists(path):
-            raise taken(path)
+        if os.path.lexists(path):
+            if not force:
+                raise taken(path)
+            check_replaceable(path)
 
 
 def _touches(path: Path, one: Path) -> bool:

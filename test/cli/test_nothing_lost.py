@@ -19,6 +19,7 @@ from rsea_ros.cli.main import main
 from rsea_ros.control import study
 from rsea_ros.design import judge, margins
 from rsea_ros.diagnosis import diagnose, usable
+from rsea_ros.errors import OutputError
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig_file import load_rig
@@ -188,9 +189,24 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
     (folder / "precious").write_bytes(OLD)
     (folder / "out" / names[0]).symlink_to(folder / "precious")
     assert main(words) == 2
-    assert main([*words, "--force"]) == 0
+    assert main([*words, "--force"]) == 2
+    assert "is no regular file, expected a new name" in capsys.readouterr().err
     assert (folder / "precious").read_bytes() == OLD
-    assert not (folder / "out" / names[0]).is_symlink()
+    assert [p.name for p in (folder / "out").iterdir()] == [names[0]]
+
+
+@pytest.mark.parametrize("verb", ["predict", "simulate", "export", "identify", "simulate to a directory"])
+def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
+    """A pipe stands for devices: to replace /dev/null takes a system down."""
+    words, names = WRITERS[verb]
+    (folder / "out").mkdir()
+    os.mkfifo(folder / "out" / names[0])
+    assert main([*words, "--force"]) == 2
+    line = capsys.readouterr().err
+    assert "is no regular file, expected a new name" in line and line.count("\n") == 1
+    assert (folder / "out" / names[0]).is_fifo()
+    with pytest.raises(OutputError, match="is no regular file"):
+        files.give_names([(folder / "run.csv", folder / "out" / names[0])], force=True)
 
 
 @pytest.mark.parametrize(
@@ -256,3 +272,13 @@ def test_any_name_of_an_output_works(folder, capsys, name):
     assert main(["identify", name, "--json", "--out", f"{name} results"]) == 0
     told = capsys.readouterr()
     assert told.err == "" and "\x1b" not in told.out and "\udce9" not in told.out
+
+
+@pytest.mark.parametrize("option", ["--namespace", "--joint", "--topic"])
+@pytest.mark.parametrize("name", ["\udcff", "a\x1b[2J", "a\nb"])
+def test_a_name_of_ros_that_cannot_be_written_is_refused(folder, capsys, option, name):
+    words = [*WRITERS["simulate"][0], option, f"ft={name}" if option == "--topic" else name]
+    assert main(words) == 2
+    line = capsys.readouterr().err
+    assert "expected a name of ROS" in line and line.count("\n") == 1 and "\x1b" not in line
+    assert not (folder / "out").exists()
