@@ -100,7 +100,7 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
 
 def taken(path: Path) -> OutputError:
     """Return the error of a name that is taken."""
-    return OutputError(f"{path}: exists already, expected a new name or --force")
+    return OutputError(f"{path}: exists already, expected a new name")
 
 
 def check_replaceable(path: Path) -> None:

@@ -137,10 +137,12 @@ def unused(path: Path) -> Path:
     return next(one for one in siblings(path) if not os.path.lexists(one))
 
 
-def check_free(paths: Iterable[Path], *, force: bool = False, inputs: Collection[str | Path] = ()) -> None:
+def check_free(
+    paths: Iterable[Path], *, force: bool | None = None, inputs: Collection[str | Path] = ()
+) -> None:
     """Refuse, before any work, a name that is taken (unless `force`) and one of the inputs (always).
 
-    Raises OutputError.
+    force: --force of a verb; None where nothing offers it. Raises OutputError.
     """
     for path in paths:
         for one in map(Path, inputs):
@@ -148,7 +150,7 @@ def check_free(paths: Iterable[Path], *, force: bool = False, inputs: Collection
                 raise OutputError(f"{path}: is the input {one} or lies in it, expected another name")
         if os.path.lexists(path):
             if not force:
-                raise taken(path)
+                raise OutputError(f"{taken(path)}{'' if force is None else ' or --force'}")
             check_replaceable(path)
 
 

@@ -152,7 +152,7 @@ def test_a_taken_name_is_refused_before_anything_is_written(tmp_path, record):
 def test_a_bag_is_replaced_only_by_force_and_only_by_a_complete_one(tmp_path, record, target):
     path = tmp_path / target
     write_record(record, path)
-    with pytest.raises(BagError, match=f"{target}: exists already, expected a new name or --force"):
+    with pytest.raises(BagError, match=f"{target}: exists already, expected a new name"):
         write_record(record.between(0.0, 1.0), path)
     with pytest.raises(ZeroDivisionError), BagWriter(path, recording=False, force=True):
         raise ZeroDivisionError
