@@ -27,7 +27,7 @@ from rsea_ros.report.fault_words import fault
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
 RIG = "paper_high_impedance"
 NAMES = ("bag", "bag-2", "bench.yaml", "log", "identification.json", "model.yaml", "report.html")
-DISTURBANCES = {"commands_left_out", "watchdog_trip"}
+DISTURBANCES = {"commands_left_out", "late_commands", "lost_messages", "watchdog_trips"}
 """Faults of a bag whose bench or excitation was held up: its commands did not act as it says."""
 SHORT, FULL = 20.0, 160.0
 SPREAD = 0.1

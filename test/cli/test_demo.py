@@ -141,8 +141,8 @@ def test_a_demo_that_is_killed_leaves_no_node(tmp_path):
     ("kinds", "bag", "lines"),
     [
         (["", ""], "bag", 0),
-        (["watchdog_trip", "outliers"], "bag-2", 1),
-        (["commands_left_out", "watchdog_trip"], "bag-2", 2),
+        (["watchdog_trips", "outliers"], "bag-2", 1),
+        (["commands_left_out", "watchdog_trips"], "bag-2", 2),
     ],
 )
 def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch, kinds, bag, lines):
