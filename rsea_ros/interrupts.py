@@ -55,7 +55,8 @@ class Stops:
         if not isinstance(report.exc_value, Stopped):
             self._hook(report)
             return
-        again = threading.Timer(AGAIN, signal.raise_signal, [report.exc_value.number])
+        main = threading.main_thread().ident
+        again = threading.Timer(AGAIN, signal.pthread_kill, [main, report.exc_value.number])
         again.daemon = True
         again.start()
 
