@@ -63,6 +63,8 @@ def run_node(
     stop = _Stop()
     try:
         _initialise(arguments)
+        if effects := os.environ.get("RSEA_EFFECTS"):
+            get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         node = _make(kind, name)
         done = _work(node, make(node, declare(node, table)), stop)
         return SUCCESS if done or endless else stop.status
