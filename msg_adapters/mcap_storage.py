@@ -6,6 +6,7 @@ ten seconds of an actuator's topics: too much to lose with a recorder that is ki
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -22,6 +23,7 @@ from msg_adapters.mcap_file import (
     RECORD,
     SCHEMA,
 )
+from rsea_ros.files import create, write_at
 
 HEADER, MESSAGE_INDEX, CHUNK_INDEX, STATISTICS = 0x01, 0x07, 0x08, 0x0B
 CHUNK_SIZE = 1 << 20
@@ -33,7 +35,7 @@ class McapStorage:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = path.open("xb", buffering=0)
+        self._file = create(path)
         self._end = 0
         self._chunk = bytearray()
         self._index: dict[int, list[tuple[int, int]]] = {}
@@ -98,11 +100,17 @@ class McapStorage:
         summary = self._schemas + self._channels + b"".join(self._chunks) + self._statistics()
         footer = _record(FOOTER, struct.pack("<QQI", self._end + len(data_end), 0, 0))
         self._put(data_end + summary + footer + MAGIC)
-        self._file.close()
+        self.abort()
+
+    def sync(self) -> None:
+        """Wait until what was flushed is on the disk."""
+        os.fsync(self._file)
 
     def abort(self) -> None:
         """Let go of the file; what was flushed stays."""
-        self._file.close()
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
 
     def _statistics(self) -> bytes:
         times = self._times or [0]
@@ -112,10 +120,7 @@ class McapStorage:
 
     def _put(self, data: bytes) -> None:
         """Write at the end. The end moves only when all is written, so that a second try mends the first."""
-        self._file.seek(self._end)
-        rest = memoryview(data)
-        while rest:
-            rest = rest[self._file.write(rest) :]
+        write_at(self._file, data, self._end)
         self._end += len(data)
 
 

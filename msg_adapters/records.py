@@ -16,15 +16,17 @@ JOINT = "joint"
 
 
 def write_record(
-    record: Record, path: str | Path, topics: TopicMap | None = None, storage: str = "mcap"
-) -> None:
-    """Write one record as a bag (see BagWriter for path and storage)."""
-    write_records([(record, topics or TopicMap())], path, storage)
+    record: Record, path: str | Path, topics: TopicMap | None = None, storage: str = "mcap", *,
+    force: bool = False,
+) -> None:  # fmt: skip
+    """Write one record as a bag (see BagWriter for path, storage and force)."""
+    write_records([(record, topics or TopicMap())], path, storage, force=force)
 
 
 def write_records(
-    records: Sequence[tuple[Record, TopicMap]], path: str | Path, storage: str = "mcap"
-) -> None:
+    records: Sequence[tuple[Record, TopicMap]], path: str | Path, storage: str = "mcap", *,
+    force: bool = False,
+) -> None:  # fmt: skip
     """Write several records into one bag, each under the topics of its own map; all or nothing.
 
     Log times are the stamps, or the highest stamp so far where a stamp goes back, so that a reader finds
@@ -39,7 +41,7 @@ def write_records(
             rows += [(at, name, msgtype, raw) for at, raw in zip(log_times, messages, strict=True)]
     rows.sort(key=lambda row: row[0])
     notes = [note for record, _ in records for note in record.notes]
-    with BagWriter(path, storage, recording=False, notes=notes) as bag:
+    with BagWriter(path, storage, recording=False, notes=notes, force=force) as bag:
         for log_time, name, msgtype, raw in rows:
             bag.write(name, msgtype, log_time, raw)
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from msg_adapters.definitions import definition
+from rsea_ros.files import create
 
 TABLES = """
 CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
@@ -32,17 +36,19 @@ class SqliteStorage:
         self.path = path
         self._types: set[str] = set()
         self._rows: list[tuple[int, int, bytes]] = []
-        path.touch(exist_ok=False)
+        os.close(create(path))
         self._database = sqlite3.connect(path, check_same_thread=False)
-        self._database.executescript(TABLES)
+        with _system_errors():
+            self._database.executescript(TABLES)
 
     def add(self, topic: str, msgtype: str) -> int:
         """Declare a topic; return its key."""
         text, digest = definition(msgtype)
-        if msgtype not in self._types:
-            self._types.add(msgtype)
-            self._database.execute(DEFINITION, (msgtype, text, digest))
-        return int(self._database.execute(TOPIC, (topic, msgtype, digest)).lastrowid or 0)
+        with _system_errors():
+            if msgtype not in self._types:
+                self._types.add(msgtype)
+                self._database.execute(DEFINITION, (msgtype, text, digest))
+            return int(self._database.execute(TOPIC, (topic, msgtype, digest)).lastrowid or 0)
 
     def write(self, key: int, log_time: int, raw: bytes) -> None:
         """Append a serialised message."""
@@ -50,12 +56,13 @@ class SqliteStorage:
 
     def flush(self) -> None:
         """Commit the messages. Raises OSError when the disk is full."""
-        try:
+        with _system_errors():
             self._database.executemany(MESSAGE, self._rows)
             self._database.commit()
-        except sqlite3.OperationalError as error:
-            raise OSError(f"{error}") from error
         self._rows.clear()
+
+    def sync(self) -> None:
+        """Do nothing: a commit waits for the disk."""
 
     def close(self) -> None:
         """Commit the rest."""
@@ -65,3 +72,12 @@ class SqliteStorage:
     def abort(self) -> None:
         """Let go of the file; what was flushed stays."""
         self._database.close()
+
+
+@contextmanager
+def _system_errors() -> Iterator[None]:
+    """Turn an error of sqlite into the system's. Raises OSError."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise OSError(f"{error}") from error

@@ -20,6 +20,9 @@ class Storage(Protocol):
     def flush(self) -> None:
         """Hand what was written to the system: from here on it survives the end of this process."""
 
+    def sync(self) -> None:
+        """Wait until what was flushed is on the disk: from here on it survives a power cut too."""
+
     def close(self) -> None:
         """Write the rest and the index."""
 

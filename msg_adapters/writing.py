@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import shutil
+import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -16,14 +16,18 @@ from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
-from rsea_ros.errors import BagError
+from rsea_ros import files
+from rsea_ros.errors import BagError, OutputError
+from rsea_ros.interrupts import undisturbed
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
     "mcap": (".mcap", McapStorage),
     "sqlite3": (".db3", SqliteStorage),
 }
-FLUSH_INTERVAL = 1.0
-"""Seconds of a recording that may be lost with a recorder that is killed."""
+PARTS = {".mcap", ".db3", ".zstd"}
+"""Suffixes of the files of a bag that is a directory, beside its metadata."""
+INTERVAL = 1.0
+"""Seconds of a recording that may be lost with a recorder that is killed, or with the power."""
 
 
 class BagWriter:
@@ -33,36 +37,44 @@ class BagWriter:
     storage: 'mcap' or 'sqlite3', for a directory.
     recording: what has been written is worth keeping. Then Ctrl-C completes the bag, and a failure
     leaves NAME.partial, a bag that can be read. Otherwise either removes what was written.
+    force: a bag that has the name may be replaced.
+    interval: s, after which what was recorded is put on the disk.
     Raises BagError for a path that is taken and for a disk that is full.
     """
 
     def __init__(
-        self, path: str | Path, storage: str = "mcap", *, recording: bool = True, notes: Sequence[str] = ()
-    ) -> None:
+        self, path: str | Path, storage: str = "mcap", *, recording: bool = True, notes: Sequence[str] = (),
+        force: bool = False, interval: float = INTERVAL,
+    ) -> None:  # fmt: skip
         self.path = Path(path)
         by_suffix = {suffix: name for name, (suffix, _) in STORAGES.items()}
         self._single = self.path.suffix in by_suffix
         self._kind = by_suffix.get(self.path.suffix, storage)
         if self._kind not in STORAGES:
             raise BagError(f"{path}: storage {storage!r}, expected one of {', '.join(STORAGES)}")
-        self._recording = recording
+        self._recording, self._force, self._interval = recording, force, interval
         self.notes = list(notes)
         self._topics: dict[str, tuple[int, Topic]] = {}
         self._span = (0, 0)
         self._flushed = time.monotonic()
+        self._disk = ThreadPoolExecutor(1, "disk")
+        self._syncing: Future[None] | None = None
 
     def __enter__(self) -> BagWriter:
-        if self.path.exists() and not self._single:
-            raise BagError(f"{self.path}: exists already, expected a new name")
+        self._check_name()
+        self._made: list[Path] = []
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.partial = _new_directory(self.path)
-            suffix, opened = STORAGES[self._kind]
-            self._storage = opened(
-                self.partial / f"{self.path.stem if self._single else self.path.name}{suffix}"
-            )
+            with undisturbed():
+                self._made = files.make_folder(self.path.parent)
+                self.partial = _new_directory(self.path, self._recording)
+                self._made.insert(0, self.partial)
+                self._open()
         except OSError as error:
+            self._clear()
             raise BagError(f"{error.filename or self.path}: cannot be made: {error.strerror}") from None
+        except BaseException:
+            self._clear()
+            raise
         return self
 
     def write(self, topic: str, msgtype: str, log_time: int, raw: bytes) -> None:
@@ -76,10 +88,16 @@ class BagWriter:
             known.count += 1
             first, last = self._span if self._span[1] else (log_time, log_time)
             self._span = (min(first, log_time), max(last, log_time))
-            if time.monotonic() - self._flushed > FLUSH_INTERVAL:
-                self.flush()
         except OSError as error:
             raise self._error(error) from None
+        self.keep_up()
+
+    def keep_up(self) -> None:
+        """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
+        if time.monotonic() - self._flushed > self._interval:
+            self.flush()
+            if self._recording:
+                self._sync()
 
     def flush(self) -> None:
         """Make what was written safe against the end of this process."""
@@ -89,51 +107,97 @@ class BagWriter:
             raise self._error(error) from None
         self._flushed = time.monotonic()
 
+    def _sync(self) -> None:
+        """Have what was flushed put on the disk, unless the disk is still busy with what was before."""
+        if self._syncing is not None and not self._syncing.done():
+            return
+        try:
+            if self._syncing is not None:
+                self._syncing.result()
+        except OSError as error:
+            raise self._error(error) from None
+        self._syncing = self._disk.submit(self._storage.sync)
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         complete = kind is None or (self._recording and issubclass(kind, KeyboardInterrupt))
-        try:
-            if complete:
-                self._complete()
-        except OSError as failure:
-            complete = False
-            raise self._error(failure) from None
-        finally:
-            if not complete:
-                self._abandon()
+        with undisturbed():
+            self._disk.shutdown()
+            try:
+                if complete:
+                    self._complete()
+            except OSError as failure:
+                complete = False
+                raise self._error(failure) from None
+            finally:
+                if not complete:
+                    self._abandon()
+
+    def _check_name(self) -> None:
+        """Refuse a name that is taken by something that may not be replaced. Raises BagError."""
+        if self.path.exists() or self.path.is_symlink():
+            if not self._force:
+                raise BagError(str(files.taken(self.path)))
+            try:
+                files.check_replaceable(self.path)
+            except OutputError as error:
+                raise BagError(str(error)) from None
+            inside = self.path.iterdir() if self.path.is_dir() else ()
+            if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
+                raise BagError(f"{self.path}: holds more than a bag, expected a new name")
+
+    def _open(self) -> None:
+        suffix, opened = STORAGES[self._kind]
+        name = self.path.stem if self._single else self.path.name
+        self._storage = opened(self.partial / f"{name}{suffix}")
+        for folder in (self.partial, self.path.parent) if self._recording else ():
+            files.sync(folder)
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
         self._storage.close()
         file = self._storage.path
         if self._single:
-            file.replace(self.path)
-            self.partial.rmdir()
+            files.give_names([(file, self.path)], force=self._force)
+            files.remove(self.partial)
             return
         topics = [topic for _, topic in self._topics.values()]
-        text = metadata.text(file, self._kind, topics, self._span, self.notes)
-        (self.partial / metadata.NAME).write_text(text)
-        os.rename(self.partial, self.path)
+        files.remove(self.partial / metadata.NAME)
+        files.write_new(
+            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.notes)
+        )
+        files.give_names([(self.partial, self.path)], force=self._force)
 
     def _abandon(self) -> None:
         with suppress(OSError):
             self._storage.abort()
         if not self._recording:
-            shutil.rmtree(self.partial, ignore_errors=True)
+            self._clear()
+
+    def _clear(self) -> None:
+        """Remove what was made, the folders above it only where they are empty."""
+        for path in self._made[:1]:
+            files.remove(path)
+        for path in self._made[1:]:
+            with suppress(OSError):
+                path.rmdir()
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
+        if isinstance(error, OutputError):
+            return BagError(f"{error}{kept}")
         return BagError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")
 
 
-def _new_directory(path: Path) -> Path:
-    """Make a directory NAME.partial that is not another's: a killed recorder's leavings stay."""
+def _new_directory(path: Path, recording: bool) -> Path:
+    """Make a directory that nobody has: NAME.partial of a recording; a killed recorder's stays."""
     number = 0
     while True:
-        partial = path.with_name(f"{path.name}.partial{number or ''}")
+        name = f"{path.name}.partial{number or ''}" if recording else f"{files.PREFIX}{secrets.token_hex(4)}"
         try:
-            partial.mkdir()
-            return partial
+            with files.naming(path):
+                path.with_name(name).mkdir()
+            return path.with_name(name)
         except FileExistsError:
             number += 1

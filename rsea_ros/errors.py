@@ -36,5 +36,9 @@ class IdentificationError(RseaError, ValueError):
     """Data from which the parameters asked for cannot be had."""
 
 
+class OutputError(RseaError, OSError):
+    """A file that cannot be written as asked: its name is taken, or it is an input."""
+
+
 class DeviceError(RseaError, OSError):
     """A device that does not answer, or answers with a fault."""

@@ -1,10 +1,25 @@
-"""Names in a sentence."""
+"""Names in a sentence, and text from outside on a terminal."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+
+_CONTROLS = r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+_COLOUR = r"\x1b(?!\[[\d;]*m)"
+_PLAIN, _COLOURED = re.compile(f"{_CONTROLS}|\x1b"), re.compile(f"{_CONTROLS}|{_COLOUR}")
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
     """Return names as `a, b and c`; last: the word before the last of them."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+
+
+def printable(text: str, *, colours: bool = False) -> str:
+    """Return text in which control characters (all but tab and newline) are shown as \\u001b.
+
+    A name in a file may hold sequences that a terminal obeys, or that turn the direction of writing.
+    colours: let sequences pass that set a colour.
+    """
+    pattern = _COLOURED if colours else _PLAIN
+    return pattern.sub(lambda match: f"\\u{ord(match[0]):04x}", text)

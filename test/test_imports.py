@@ -12,13 +12,16 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress", "wording"}
+BASE = {"errors", "signals", "progress", "wording", "interrupts", "files", "new_files"}
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
     "progress": set(),
     "wording": set(),
+    "interrupts": set(),
+    "files": {"errors", "interrupts"},
+    "new_files": {"errors", "files", "interrupts"},
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},

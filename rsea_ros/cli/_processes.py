@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import json
 import os
 import re
 import signal
@@ -9,15 +11,18 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 
 from rsea_ros.errors import RseaError
+from rsea_ros.interrupts import undisturbed
 
 ROOT = Path(__file__).resolve().parents[2]
 POLL = 0.1
 PATIENCE = 10.0
-"""Seconds that a node gets to close after SIGINT."""
+"""Seconds that a node gets to close."""
+_PRCTL, _PARENT_DEATH_SIGNAL = ctypes.CDLL(None).prctl, 1
 
 
 class Processes:
@@ -26,11 +31,11 @@ class Processes:
     def __init__(self, logs: Path, domain: int) -> None:
         logs.mkdir(parents=True, exist_ok=True)
         self._logs = logs
+        self._log_of: dict[str, Path] = {}
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._environment = {
             **os.environ,
             "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_LOG_DIR": str(logs / "ros"),
             "RCUTILS_COLORIZED_OUTPUT": "0",
             "PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])),
@@ -42,20 +47,23 @@ class Processes:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.stop(*self._running)
+        with undisturbed():
+            self.stop(*self._running)
 
     def log(self, node: str) -> Path:
-        """Return where a node's output goes."""
-        return self._logs / f"{node}.log"
+        """Return where the output of a node goes, of its last start."""
+        return self._log_of.get(node, self._logs / f"{node}.log")
 
     def start(self, node: str, parameters: Mapping[str, object]) -> None:
-        """Start a node; Ctrl-C on the terminal reaches only this process, which stops the node itself."""
+        """Start a node; signals of the terminal reach only this process, which stops the node itself."""
         options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]
-        with self.log(node).open("wb") as log:
+        names = (self._logs / (f"{node}-{k}.log" if k > 1 else f"{node}.log") for k in count(1))
+        self._log_of[node] = next(name for name in names if not name.exists())
+        with undisturbed(), self.log(node).open("xb") as log:
             self._running[node] = subprocess.Popen(
                 [sys.executable, "-m", f"rsea_ros.nodes.{node}", "--ros-args", *options],
                 env=self._environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                start_new_session=True,
+                start_new_session=True, preexec_fn=_follow,
             )  # fmt: skip
 
     def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
@@ -78,11 +86,11 @@ class Processes:
         progress(1.0)
 
     def stop(self, *nodes: str) -> None:
-        """Ask nodes to end (SIGINT) and wait for it; kill what does not."""
+        """Ask nodes to end (SIGTERM) and wait for it; kill what does not."""
         processes = [self._running.pop(node) for node in nodes]
         for process in processes:
             if process.poll() is None:
-                process.send_signal(signal.SIGINT)
+                process.terminate()
         for process in processes:
             try:
                 process.wait(PATIENCE)
@@ -101,8 +109,13 @@ class Processes:
         return RseaError(f"{node} {what}: {last} (log: {self.log(node)})")
 
 
+def _follow() -> None:
+    """Have the kernel end this process when the one that started it is killed."""
+    _PRCTL(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+
+
 def _text(value: object) -> str:
     """Return a parameter as ROS reads it on a command line."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
+    return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else str(value)

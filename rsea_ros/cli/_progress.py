@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from rsea_ros.wording import printable
+
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[str, float], None]]:
@@ -24,4 +26,4 @@ def progress(title: str) -> Iterator[Callable[[str, float], None]]:
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0, step="")
-        yield lambda step, share: bar.update(task, completed=share, step=step)
+        yield lambda step, share: bar.update(task, completed=share, step=printable(step))

@@ -21,6 +21,7 @@ from rsea_ros.hardware.peer.requests import LineRequests
 from rsea_ros.hardware.peer.station import Station
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.new_files import check_free
 
 HELP = "a motor on a pseudo-terminal and an F/T sensor on UDP, with a simulated plant behind both"
 PLANT_RATE = 2000.0
@@ -45,6 +46,8 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError(f"--ft-rate {args.ft_rate:g} Hz, expected 1 to 7000 Hz")
     if not 0 <= args.return_delay <= 254:
         raise ParameterError(f"--return-delay {args.return_delay}, expected 0 to 254 (unit 2 µs)")
+    if not args.port.is_symlink():  # a link is what a bench that was killed leaves
+        check_free([args.port])
     plant = SimulatedDevice(load_rig(args.rig), PLANT_RATE, seed=args.seed, clock=time.monotonic_ns)
     wrong = Misbehaviour(seed=args.seed)
     motor = Motor(args.model, plant, args.torque_constant)

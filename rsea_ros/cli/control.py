@@ -6,13 +6,17 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
+from rsea_ros.new_files import NewFiles
 
 if TYPE_CHECKING:
     from rsea_ros.control.study import Motor, Study
     from rsea_ros.model.rig import Rig
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
+
+JSON, REPORT = "control.json", "report.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path("out/control"),
-        help="directory for control.json and report.html (default %(default)s)",
+        help="directory for control.json and report.html (default out/control, -2, …)",
     )
+    add_force(parser)
     parser.add_argument("--json", action="store_true", help="print control.json to stdout and nothing else")
     parser.add_argument("--fail-on", choices=["missed"], help="status 1 when a trial misses what is asked")
 
@@ -45,15 +49,16 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.control_json import control_json
     from rsea_ros.report.control_page import control_report
-    from rsea_ros.report.results import write_json, write_text
+    from rsea_ros.report.results import json_text
 
+    place = results_place(args, "out/control", (JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)
     rig = load_rig(args.rig)
     with progress("control") as told:
         found = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=told)
-    args.out.mkdir(parents=True, exist_ok=True)
-    path = write_json(args.out / "control.json", control_json(found))
-    report = write_text(args.out / "report.html", control_report(found))
+    with NewFiles(place) as new:
+        path = new.write(JSON, json_text(control_json(found)))
+        report = new.write(REPORT, control_report(found))
     if args.json:
         print(path.read_text(encoding="utf-8"), end="")
     else:

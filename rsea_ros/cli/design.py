@@ -7,9 +7,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
+from rsea_ros.new_files import NewFiles
 
 HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
+JSON, REPORT = "design.json", "report.html"
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
 
 
@@ -75,9 +78,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path("out/design"),
-        help="directory for design.json and report.html (default %(default)s)",
+        help="directory for design.json and report.html (default out/design, -2, …)",
     )
+    add_force(parser)
     parser.add_argument("--json", action="store_true", help="print design.json to stdout and nothing else")
     parser.add_argument("--fail-on", choices=["unmet"], help="status 1 when the stiffness misses a demand")
 
@@ -89,17 +92,18 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design.margins import robust_stiffness
     from rsea_ros.report.design_json import design_json
     from rsea_ros.report.design_page import design_report
-    from rsea_ros.report.results import write_json, write_text
+    from rsea_ros.report.results import json_text
 
+    place = results_place(args, "out/design", (JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
     requirement, unit = _requirement(args), unit_named(args.unit, args.catalogue)
     asked = judge(requirement, unit, args.stiffness)
     least = judge(requirement, unit, least_stiffness(requirement, unit))
     enough = robust_stiffness(requirement, unit)
     robust = judge(requirement, unit, enough) if math.isfinite(enough) else None
-    args.out.mkdir(parents=True, exist_ok=True)
-    path = write_json(args.out / "design.json", design_json(asked, least, robust))
-    report = write_text(args.out / "report.html", design_report(asked, least, robust))
+    with NewFiles(place) as new:
+        path = new.write(JSON, json_text(design_json(asked, least, robust)))
+        report = new.write(REPORT, design_report(asked, least, robust))
     if args.json:
         print(path.read_text(encoding="utf-8"), end="")
     else:

@@ -8,11 +8,11 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
+from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
-from rsea_ros.errors import ParameterError
 from rsea_ros.signals import Record
 
 HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
@@ -29,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
     add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
     add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
-    add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG)")
+    add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG, -2, …)")
+    add_force(parser)
     add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help="effects not to try")
     most = "causes at most (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
@@ -50,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
     """Diagnose and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
-    out = directory(args.out or Path("out") / f"diagnose-{Path(args.bags[0]).stem}")
+    inputs = [*args.bags, args.rig, args.holdout]
+    place = results_place(args, Path("out") / f"diagnose-{Path(args.bags[0]).stem}", FILES, inputs)
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
@@ -62,19 +64,12 @@ def run(args: argparse.Namespace) -> int:
 
         without = tuple(effect_named(name).name for name in args.without)
         result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
-        report = write_diagnosis(result, records[0], out, write_overlay)
+        report = write_diagnosis(result, records[0], place, write_overlay)
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:
         _print(result, report)
     return FOUND if result.verdict in args.fail_on else 0
-
-
-def directory(path: str | Path) -> Path:
-    """Return where the results go. Raises ParameterError, before any work, when it is a file."""
-    if Path(path).exists() and not Path(path).is_dir():
-        raise ParameterError(f"--out {path}: is a file, expected a directory or a new name")
-    return Path(path)
 
 
 def readable(bag: str, topics: TopicMap) -> Record:

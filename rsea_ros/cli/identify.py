@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msg_adapters import read_record
+from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "frequency response and parameters with confidence from recorded runs"
+FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
 
@@ -28,8 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--out",
-        help="directory for identification.json, model.yaml, report.html (default out/identify-BAG)",
+        help="directory for identification.json, model.yaml, report.html (default out/identify-BAG, -2, …)",
     )
+    add_force(parser)
     parser.add_argument(
         "--json", action="store_true", help="print identification.json to stdout and nothing else"
     )
@@ -40,6 +43,8 @@ def run(args: argparse.Namespace) -> int:
     """Identify and write the results."""
     from rsea_ros.model.rig_file import load_rig
 
+    default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
+    place = results_place(args, default, FILES, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
@@ -48,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.report.results import write_results
 
         result = identify(records, rig, tell)
-        report = write_results(result, args.out or Path("out") / f"identify-{Path(args.bags[0]).stem}")
+        report = write_results(result, place)
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
     else:

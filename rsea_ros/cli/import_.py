@@ -7,8 +7,10 @@ from pathlib import Path
 
 from msg_adapters import write_record
 from msg_adapters.tables import import_record, load_map, summary
+from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.model.rig_file import rig_folders
+from rsea_ros.new_files import check_free
 
 HELP = "turn a CSV, TSV or MAT file of a real machine into a bag, by a map of columns and units"
 
@@ -18,15 +20,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", help="measurement: .csv, .tsv (also .gz) or .mat (up to version 7)")
     parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
     parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
+    add_force(parser)
     parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
     add_topic_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag and say what is in it."""
+    check_free([Path(args.out)], force=args.force, inputs=[args.file, _map_path(args.map)])
     mapping = load_map(_map_path(args.map))
     record = import_record(args.file, mapping)
-    write_record(record, args.out, topic_map(args), args.storage)
+    write_record(record, args.out, topic_map(args), args.storage, force=args.force)
     for line in summary(record, mapping):
         print(line)
     rate = next(iter(record.channels.values())).rate

@@ -7,13 +7,19 @@ import ast
 import importlib
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Protocol, cast
+from typing import NoReturn, Protocol, cast
 
-from rsea_ros.errors import RseaError
+from rsea_ros.cli._shown import shown
+from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.interrupts import Stopped, Stops
+from rsea_ros.wording import printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
+FAULT = "this is a fault of rsea, please report it"
 
 
 class Verb(Protocol):
@@ -31,27 +37,26 @@ class Verb(Protocol):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `rsea VERB …` and return its exit status: 0, 1 a finding asked for by status, 2 bad input."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    prefix = "rsea"
-    try:
-        if not arguments or arguments[0] in ("-h", "--help"):
-            print(overview())
-            return SUCCESS
-        name = arguments[0]
-        if name not in verbs():
-            return _fail(prefix, f"no verb {name!r}, expected one of: {', '.join(verbs())}")
-        prefix = f"rsea {name}"
-        status = _run(name, arguments[1:])
-        sys.stdout.flush()
-        return status
-    except BrokenPipeError:
-        _silence_stdout()
-        return READER_GONE
-    except RseaError as error:
-        return _fail(prefix, str(error))
-    except OSError as error:
-        return _fail(prefix, _describe(error))
-    except KeyboardInterrupt:
-        return _fail(prefix, "interrupted", INTERRUPTED)
+    name = arguments[0] if arguments else "--help"
+    prefix = f"rsea {name}" if name in verbs() else "rsea"
+    with shown(), Stops() as stops:
+        try:
+            status = _call(name, arguments[1:])
+            sys.stdout.flush()
+            return status
+        except BrokenPipeError:
+            _silence_stdout()
+            return READER_GONE
+        except RseaError as error:
+            return _fail(prefix, str(error))
+        except OSError as error:
+            return _fail(prefix, _describe(error))
+        except KeyboardInterrupt as error:
+            return _stopped(prefix, error)
+        except Exception as error:
+            if stops.last is not None:  # a library that was being imported has made another error of it
+                return _stopped(prefix, stops.last)
+            return _fail(prefix, _fault(error))
 
 
 def verbs() -> dict[str, Path]:
@@ -78,6 +83,18 @@ def summary(path: Path) -> str:
     return ""
 
 
+def _call(name: str, arguments: Sequence[str]) -> int:
+    """Run a verb, or print the overview. Raises ParameterError for an unknown verb."""
+    if name in ("-h", "--help"):
+        print(overview())
+        return SUCCESS
+    if name not in verbs():
+        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}")
+    if effects := os.environ.get("RSEA_EFFECTS"):
+        _fail(f"rsea {name}", f"RSEA_EFFECTS={effects}: code from there runs as part of this program")
+    return _run(name, arguments)
+
+
 def _run(name: str, arguments: Sequence[str]) -> int:
     """Import the verb, parse its arguments and run it.
 
@@ -85,7 +102,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     ones there.
     """
     verb = cast(Verb, importlib.import_module(f"rsea_ros.cli.{verbs()[name].stem}"))
-    parser = argparse.ArgumentParser(prog=f"rsea {name}", description=verb.HELP)
+    parser = _Parser(prog=f"rsea {name}", description=verb.HELP)
     verb.add_arguments(parser)
     args, rest = parser.parse_known_args(arguments)
     if "pass_on" in args:
@@ -95,15 +112,44 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     return verb.run(args)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, as all others."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with status 2."""
+        sys.exit(_fail(self.prog, f"{message} (see {self.prog} --help)"))
+
+
 def _describe(error: OSError) -> str:
     """Return one line that names the file, where the error knows it."""
     reason = error.strerror or str(error)
     return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
 
 
+def _fault(error: Exception) -> str:
+    """Return one line about an error that nobody expected; RSEA_TRACEBACK=1 shows where it came from."""
+    if os.environ.get("RSEA_TRACEBACK"):
+        traceback.print_exception(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{Path(place.filename).name}:{place.lineno}"
+    return f"{FAULT}: {type(error).__name__} in {where}: {error} (RSEA_TRACEBACK=1 shows more)"
+
+
+def _stopped(prefix: str, error: KeyboardInterrupt) -> int:
+    """Say that a signal has ended the work, and return its status."""
+    if isinstance(error, Stopped) and error.status != INTERRUPTED:
+        return _fail(prefix, f"stopped by {error}", error.status)
+    return _fail(prefix, "interrupted", INTERRUPTED)
+
+
 def _fail(prefix: str, message: str, status: int = BAD_INPUT) -> int:
     """Write one line to stderr and return the status."""
-    print(f"{prefix}: {' '.join(message.split())}", file=sys.stderr)
+    with suppress(OSError):
+        print(printable(f"{prefix}: {' '.join(message.split())}"), file=sys.stderr, flush=True)
+    try:
+        sys.stdout.flush()
+    except OSError:
+        _silence_stdout()
     return status
 
 

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
+from rsea_ros.new_files import NewFiles, Place, check_free
 
 if TYPE_CHECKING:
     from rsea_ros.report.paper_page import PaperTests
@@ -21,6 +23,10 @@ MOVING = {
     "separate_stiffnesses": ("ft", "position"),
 }
 """Rigs of the moving-output tests, the paper's first, and what the fit sees."""
+JSON, REPORT = "paper.json", "report.html"
+CLAMPED = "paper_high_impedance"
+BAGS = (CLAMPED, *(f"{rig}_{end}_end" for rig in MOVING for end in ("spring", "housing")))
+FILES = (JSON, REPORT, *(f"{name}.mcap" for name in BAGS))
 SHORTEST = 20.0
 
 
@@ -29,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path("out/paper"),
-        help="directory for paper.json, report.html and the simulated bags (default %(default)s)",
+        help="directory for paper.json, report.html and the simulated bags (default out/paper, -2, …)",
     )
+    add_force(parser)
     parser.add_argument(
         "--duration", type=float, default=160.0, help="s, of each simulated test (default %(default)s)"
     )
@@ -51,21 +57,20 @@ def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
     from rsea_ros.report.paper_json import paper_json
     from rsea_ros.report.paper_page import paper_report
-    from rsea_ros.report.results import write_json, write_text
+    from rsea_ros.report.results import json_text
 
     if args.figures:
-        return _figures(args.figures)
+        return _figures(args)
     if not args.duration >= SHORTEST:
         raise ParameterError(f"--duration {args.duration:g} s, expected at least {SHORTEST:g} s")
     if args.seed < 0:
         raise ParameterError(f"--seed {args.seed}, expected 0 or more")
-    args.out.mkdir(parents=True, exist_ok=True)
-    with progress("paper") as tell:
-        tests = _tests(args, tell)
+    with progress("paper") as tell, NewFiles(results_place(args, "out/paper", FILES)) as new:
+        tests = _tests(args, new, tell)
         tell("page", 0.95)
         results = paper_json(tests)
-        path = write_json(args.out / "paper.json", results)
-        report = write_text(args.out / "report.html", paper_report(tests))
+        path = new.write(JSON, json_text(results))
+        report = new.write(REPORT, paper_report(tests))
     if args.json:
         print(path.read_text(encoding="utf-8"), end="")
         return 0
@@ -83,17 +88,19 @@ def _share(explained: float) -> str:
     return f"{100.0 * explained:.2f} %" if explained > 0.0 else "none (worse than no model)"
 
 
-def _figures(folder: Path) -> int:
+def _figures(args: argparse.Namespace) -> int:
     from rsea_ros.report.paper_docs import documentation_figures
-    from rsea_ros.report.results import write_text
 
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, svg in documentation_figures().items():
-        print(write_text(folder / name, svg))
+    figures = documentation_figures()
+    check_free((args.figures / name for name in figures), force=args.force)
+    with NewFiles(Place(args.figures, args.force)) as new:
+        paths = [new.write(name, svg) for name, svg in figures.items()]
+    for path in paths:
+        print(path)
     return 0
 
 
-def _tests(args: argparse.Namespace, tell: Callable[[str, float], None]) -> PaperTests:
+def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float], None]) -> PaperTests:
     """Simulate the paper's tests, each through a bag."""
     import numpy as np
 
@@ -106,12 +113,12 @@ def _tests(args: argparse.Namespace, tell: Callable[[str, float], None]) -> Pape
     from rsea_ros.signals import Channel
 
     def bag(name: str, record: Record) -> Record:
-        return through_bag(args.out / f"{name}.mcap", record)
+        return through_bag(new.staged(f"{name}.mcap"), record)
 
     tell("high impedance", 0.0)
     values = excitation("chirp", Settings(rate=RATE, duration=args.duration, seed=args.seed))
     command = Channel(np.arange(len(values)) / RATE, values)
-    rig = load_rig("paper_high_impedance")
+    rig = load_rig(CLAMPED)
     clamped = estimate_response(bag(rig.name, synthesize(rig, command, seed=args.seed)), "ft")
     moving = {}
     for i, (name, channels) in enumerate(MOVING.items()):
@@ -123,9 +130,8 @@ def _tests(args: argparse.Namespace, tell: Callable[[str, float], None]) -> Pape
 
 
 def through_bag(path: Path, record: Record) -> Record:
-    """Write a record as a bag (over an older one) and return what is read back."""
+    """Write a record as a bag and return what is read back."""
     from msg_adapters import read_record, write_record
 
-    path.unlink(missing_ok=True)
     write_record(record, path)
     return read_record([path])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import numpy as np
 
 from msg_adapters import write_record
+from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
@@ -14,6 +16,7 @@ from rsea_ros.identification.excitation import KINDS, Settings, check_limits, ex
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.new_files import check_free
 from rsea_ros.signals import Channel
 
 HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
@@ -23,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("rig", help="rig or model.yaml, or the name of one in config/rigs")
     parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
+    add_force(parser)
     parser.add_argument(
         "--effect",
         action="append",
@@ -68,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate and write the bag."""
+    check_free([Path(args.out)], force=args.force, inputs=[args.rig])
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
     settings = Settings(
@@ -84,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     check_limits(values, args.limit, args.rate)
     command = Channel(np.arange(len(values)) / args.rate, values)
     record = synthesize(rig, command, seed=args.seed + 1, noise=not args.no_noise)
-    write_record(record, args.out, topic_map(args))
+    write_record(record, args.out, topic_map(args), force=args.force)
     print(
         f"{args.out}: {args.duration:g} s at {args.rate:g} Hz of {rig.name}"
         + "".join(f", {e.name}" for e in rig.effects)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 from rsea_ros.errors import RseaError
+from rsea_ros.interrupts import Stopped
 
 HELP = "run the tests; further arguments go to pytest (paths are relative to the repository)"
 
@@ -28,5 +30,6 @@ def run(args: argparse.Namespace) -> int:
     while True:
         try:
             return pytest.wait()
-        except KeyboardInterrupt:  # the terminal interrupts pytest too; it closes with its own summary
-            continue
+        except KeyboardInterrupt as stop:
+            if isinstance(stop, Stopped) and stop.number != signal.SIGINT:  # which the terminal sends it
+                pytest.send_signal(signal.SIGINT)

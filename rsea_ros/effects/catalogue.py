@@ -66,7 +66,10 @@ def _load(path: str) -> ModuleType:
     if spec is None or spec.loader is None or not Path(path).exists():
         raise ParameterError(f"{EXTRA_PATH}: {path}: no such file, expected a Python file with an EFFECT")
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ParameterError(f"{EXTRA_PATH}: {path}: {type(error).__name__}: {error}") from error
     if not isinstance(getattr(module, "EFFECT", None), Effect):
         raise ParameterError(f"{EXTRA_PATH}: {path}: no EFFECT in it, expected a constant of type Effect")
     return module

@@ -58,12 +58,16 @@ class Diagnosed:
 
         return overlay_figure(self.result.before, self.result.after)
 
-    def write_report(self, directory: str | Path) -> Path:
-        """Write diagnosis.json, model.yaml, overlay.mcap and report.html; return the report's path."""
+    def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
+        """Write diagnosis.json, model.yaml, overlay.mcap and report.html; return the report's path.
+
+        force: results that lie there may be replaced; without it they raise OutputError.
+        """
         from msg_adapters.overlay import write_overlay
+        from rsea_ros.new_files import Place
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
-        return write_diagnosis(self.result, self.record, directory, write_overlay)
+        return write_diagnosis(self.result, self.record, Place(Path(directory), force), write_overlay)
 
     def __repr__(self) -> str:
         """Return the verdict and the causes in one line."""

@@ -52,11 +52,15 @@ class Fit:
 
         return fit_figure(self.result, response)
 
-    def write_report(self, directory: str | Path) -> Path:
-        """Write identification.json, model.yaml and report.html; return the report's path."""
+    def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
+        """Write identification.json, model.yaml and report.html; return the report's path.
+
+        force: results that lie there may be replaced; without it they raise OutputError.
+        """
+        from rsea_ros.new_files import Place
         from rsea_ros.report.results import write_results
 
-        return write_results(self.result, directory)
+        return write_results(self.result, Place(Path(directory), force))
 
     def __repr__(self) -> str:
         """Return rig, fit and parameters in one line."""

@@ -1,21 +1,20 @@
-"""Rigs in YAML files: found by name, loaded with every error naming the file, saved aside and renamed.
+"""Rigs in YAML files: found by name, loaded with every error naming the file, saved complete or not at all.
 
 `model.yaml`, what identification and diagnosis write, is a rig file with an `effects` list.
 """
 
 from __future__ import annotations
 
-import os
 import sysconfig
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 
 import yaml
 
-from rsea_ros.errors import RigError
+from rsea_ros.errors import OutputError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.new_files import write_text
 
 
 def rig_path(name_or_path: str | Path) -> Path:
@@ -60,18 +59,19 @@ def load_rig(name_or_path: str | Path) -> Rig:
         raise RigError(f"{path}: {error}") from None
 
 
-def save_rig(rig: Rig, path: str | Path) -> None:
-    """Write a rig as YAML that `load_rig` reads back to the same rig; aside first, then renamed.
+def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
+    """Write a rig as YAML that `load_rig` reads back to the same rig; `force`: over a file that has the name.
 
     Raises RigError, and leaves nothing behind, when it cannot be written.
     """
-    path = Path(path)
-    aside = path.with_name(path.name + ".partial")
-    text = yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True)
     try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
+        write_text(path, rig_text(rig), force=force)
+    except OutputError as error:
+        raise RigError(str(error)) from None
     except OSError as error:
-        with suppress(OSError):
-            aside.unlink()
         raise RigError(f"{path}: {error.strerror}, expected a place that can be written") from None
+
+
+def rig_text(rig: Rig) -> str:
+    """Return the YAML of a rig."""
+    return str(yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True))

@@ -11,6 +11,7 @@ from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.usable import check_diagnosable
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
+from rsea_ros.new_files import Place
 from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.signals import Record
 
@@ -19,13 +20,14 @@ _POLL = 0.02
 
 
 class Diagnosing:
-    """At most one diagnosis at a time; its files go to `out`."""
+    """At most one diagnosis at a time; its files go to `out`, those of a second to out-2."""
 
     def __init__(self, rig: Rig, out: Path) -> None:
         self._rig, self._out = rig, out
         self._pool = ThreadPoolExecutor(1, "diagnosis")
         self._work: Future[Diagnosis] | None = None
         self._step, self._stopped = "", False
+        self._report = out / "report.html"
 
     @property
     def busy(self) -> bool:
@@ -51,7 +53,7 @@ class Diagnosing:
             return Report(OK, f"diagnosing: {self._step}", {})
         if error := self._work.exception():
             return Report(WARN, f"diagnosis failed: {error}", {})
-        return report_of(self._work.result(), self._out)
+        return report_of(self._work.result(), self._report)
 
     def close(self) -> None:
         """Stop at the next step and wait for that."""
@@ -63,7 +65,7 @@ class Diagnosing:
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
         result = diagnose([record], self._rig, progress=self._tell)
-        write_diagnosis(result, record, self._out, write_overlay)
+        self._report = write_diagnosis(result, record, Place(self._out, fresh=True), write_overlay)
         return result
 
     def _tell(self, step: str, share: float) -> None:
@@ -86,7 +88,7 @@ class Waiting:
         return self._work.result()
 
 
-def report_of(diagnosis: Diagnosis, out: Path) -> Report:
+def report_of(diagnosis: Diagnosis, report: Path) -> Report:
     """Return verdict and causes with their sizes and gains as the values of a diagnostic."""
     values: dict[str, object] = {
         "verdict": diagnosis.verdict,
@@ -96,4 +98,4 @@ def report_of(diagnosis: Diagnosis, out: Path) -> Report:
         values |= {f"{cause.name}.{name}": f"{p.value:.6g} {p.unit}" for name, p in cause.parameters.items()}
         values[f"{cause.name}.gain"] = f"{cause.gain_holdout:.4f}"
     level = OK if diagnosis.verdict == "nothing_wrong" else WARN
-    return Report(level, diagnosis.sentence, {**values, "report": out / "report.html"})
+    return Report(level, diagnosis.sentence, {**values, "report": report})

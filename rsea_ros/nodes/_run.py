@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -16,11 +17,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.interrupts import STOPPING, Stopped
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import Parameter, declare, usage
+from rsea_ros.wording import printable
 
 NAMESPACE = "rsea"
-SUCCESS, BAD_INPUT, INTERRUPTED = 0, 2, 130
+SUCCESS, BAD_INPUT = 0, 2
+LOCAL = "ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"
+"""Who may find a node unless the user says otherwise: this machine. Whoever finds it may command torque."""
 TICK = 0.1
 """s between looks at whether to stop, and whether the program has finished."""
 
@@ -48,7 +53,7 @@ def run_node(
 ) -> int:
     """Run one node in this process and return the exit status.
 
-    endless: to be stopped is the regular end; else it is an interruption (status 130).
+    endless: to be stopped is the regular end; else it is an interruption (status 128 and the signal).
     Whatever the user can put right is one line in the log and status 2.
     """
     arguments = remove_ros_args(sys.argv)[1:]
@@ -58,43 +63,63 @@ def run_node(
     stop = _Stop()
     try:
         _initialise(arguments)
-        node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        if effects := os.environ.get("RSEA_EFFECTS"):
+            get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
+        node = _make(kind, name)
         done = _work(node, make(node, declare(node, table)), stop)
-        return SUCCESS if done or endless else INTERRUPTED
-    except KeyboardInterrupt:
-        return INTERRUPTED
+        return SUCCESS if done or endless else stop.status
+    except Stopped as stopped:
+        return stopped.status
     except (RseaError, OSError) as error:
-        get_logger(name).fatal(" ".join(str(error).split()))
+        get_logger(name).fatal(printable(" ".join(str(error).split())))
         return BAD_INPUT
     finally:
         rclpy.try_shutdown()
 
 
 class _Stop:
-    """SIGINT and SIGTERM only ask: the node publishes its zeros before it goes."""
+    """Signals only ask: the node publishes its zeros before it goes."""
 
     def __init__(self) -> None:
-        self.asked = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        self.status = 0
+        for number in STOPPING:
             signal.signal(number, self._ask)
 
+    @property
+    def asked(self) -> bool:
+        """Whether a signal has come."""
+        return self.status > 0
+
     def _ask(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
+        self.status = Stopped(number).status
 
     def interrupt(self) -> None:
-        """From now on SIGINT and SIGTERM raise KeyboardInterrupt."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.default_int_handler)
+        """From now on signals raise Stopped."""
+        for number in STOPPING:
+            signal.signal(number, _raise)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise Stopped(number)
 
 
 def _initialise(arguments: Sequence[str]) -> None:
     """Start ROS. Raises ParameterError for arguments that it cannot read."""
     if arguments:
         raise ParameterError(f"argument {arguments[0]!r}, expected --ros-args -p NAME:=VALUE (see --help)")
+    os.environ.setdefault(*LOCAL)
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         raise ParameterError(f"ROS arguments: {str(error).split(', at /')[0]}") from None
+
+
+def _make(kind: type[Node], name: str) -> Node:
+    """Make the node. Raises RseaError where the middleware cannot, as with security that it does not have."""
+    try:
+        return kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+    except RuntimeError as error:
+        raise RseaError(str(error).split(", at /")[0]) from None
 
 
 def _work(node: Node, program: Program, stop: _Stop) -> bool:

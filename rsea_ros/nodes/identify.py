@@ -19,6 +19,7 @@ from msg_adapters.ros import Trigger, message_type
 from msg_adapters.topics import ROLES, TYPES, TopicMap
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.new_files import check_free, unused
 from rsea_ros.nodes._diagnosing import Diagnosing
 from rsea_ros.nodes._health import OK, WARN, Health, Report
 from rsea_ros.nodes._parameters import AXIS, Parameter
@@ -27,9 +28,11 @@ from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.signals import Record
 
+DEFAULT = "out/identify"
+NAMES = ("identification.json", "model.yaml", "report.html")
 TABLE = (
     Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
-    Parameter("out", "out/identify", "directory of the results"),
+    Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
     AXIS,
     Parameter(
         "quiet", 1.0, "finish so long after the last command, once nobody publishes any", "s", 0.1, 1e3
@@ -57,7 +60,9 @@ class Identify:
         self._contents = Contents()
         self._commanded, self._asked, self._done = 0.0, False, False
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
-        self._diagnosing = Diagnosing(self._rig, Path(values["out"]) / "diagnosis")
+        self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
+        check_free(self._out / name for name in NAMES)
+        self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
         group = ReentrantCallbackGroup()
         self._diagnose = node.create_service(Trigger, "~/diagnose", self._on_diagnose, callback_group=group)
@@ -114,7 +119,7 @@ class Identify:
         log = self._node.get_logger()
         log.info(f"identifying from {self._gathered()}")
         result = identify([self._record()], self._rig, self._progress)
-        report = write_results(result, self._values["out"])
+        report = write_results(result, self._out)
         for p in result.parameters:
             log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -12,6 +13,7 @@ from rclpy.node import Node
 from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
 from msg_adapters.topics import JOINT_STATE, WRENCH
+from rsea_ros.new_files import unused
 from rsea_ros.nodes._health import OK, WARN, Health, Report
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
@@ -36,6 +38,7 @@ TABLE = (
     Parameter(
         "duration", 0.0, "length of the recording from the first message on; 0: until stopped", "s", 0.0, 1e6
     ),
+    Parameter("sync", 1.0, "what a power cut or a kill may cost: put on the disk so often", "s", 0.1, 60.0),
     Parameter("quiet", 0.0, "stop when torque_command has been silent for so long; 0: never", "s", 0.0, 1e4),
 )
 
@@ -47,8 +50,8 @@ class Record:
         self._node = node
         self._duration: float = values["duration"]
         self._quiet: float = values["quiet"]
-        path = values["out"] or f"runs/{time.strftime('%Y%m%d-%H%M%S')}"
-        self._bag = BagWriter(path, values["storage"]).__enter__()
+        path = values["out"] or unused(Path("runs") / time.strftime("%Y%m%d-%H%M%S"))
+        self._bag = BagWriter(path, values["storage"], interval=values["sync"]).__enter__()
         self._taps = {name: self._tap(name, kind) for name, kind in TOPICS.items()}
         self._begin = self._commanded = 0.0
         self._health = Health(node, self._report)
@@ -69,6 +72,7 @@ class Record:
 
     def finished(self) -> bool:
         """Tell whether the duration is over, or the commands have ceased."""
+        self._bag.keep_up()
         now = time.monotonic()
         ceased = self._commanded > 0.0 and now - self._commanded > self._quiet > 0.0
         return ceased or (self._begin > 0.0 and now - self._begin > self._duration > 0.0)

@@ -1,41 +1,32 @@
-"""Result files in a directory, each written aside and then renamed, so that none is ever half there."""
+"""The files of an identification: all of them or none."""
 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.model.rig_file import save_rig
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.identification_json import identification_json
 from rsea_ros.report.identification_page import identification_report
 
-
-def write_results(identification: Identification, out_dir: str | Path) -> Path:
-    """Write identification.json, model.yaml and report.html, and return the report's path."""
-    out = Path(out_dir)
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "identification.json", identification_json(identification))
-    save_rig(identification.rig, out / "model.yaml")
-    return write_text(out / "report.html", identification_report(identification))
+JSON, MODEL, REPORT = NAMES = ("identification.json", "model.yaml", "report.html")
 
 
-def write_json(path: Path, contents: Mapping[str, Any]) -> Path:
-    """Write a result file for programs."""
-    return write_text(path, json.dumps(contents, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+def write_results(identification: Identification, out: Place | str | Path) -> Path:
+    """Write identification.json, model.yaml and report.html, and return the report's path.
+
+    Raises OutputError for a name that is taken, OSError where something cannot be written.
+    """
+    with NewFiles(out) as new:
+        new.write(JSON, json_text(identification_json(identification)))
+        new.write(MODEL, rig_text(identification.rig))
+        return new.write(REPORT, identification_report(identification))
 
 
-def write_text(path: Path, text: str) -> Path:
-    """Write a file aside and rename it; what was begun is removed when it cannot be finished."""
-    aside = path.with_name(path.name + ".partial")
-    try:
-        aside.write_text(text, encoding="utf-8")
-        os.replace(aside, path)
-    except OSError as error:
-        aside.unlink(missing_ok=True)
-        error.filename = str(path)  # a failed write does not know it
-        raise
-    return path
+def json_text(contents: Mapping[str, Any]) -> str:
+    """Return a result file for programs."""
+    return json.dumps(contents, indent=1, allow_nan=False, ensure_ascii=False) + "\n"

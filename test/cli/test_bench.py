@@ -48,3 +48,11 @@ def test_a_request_that_it_does_not_know_is_answered_and_changes_nothing(tmp_pat
 def test_what_no_bench_can_have_is_refused(words, message):
     _, errors = (process := start(*words)).communicate(timeout=30)
     assert (process.returncode, errors) == (2, message)
+
+
+def test_a_file_in_the_place_of_the_port_stays(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    _, errors = (process := start("--port", tmp_path / "thesis.tex")).communicate(timeout=30)
+    assert (process.returncode, errors.count("\n")) == (2, 1)
+    assert "thesis.tex: exists already, expected a new name" in errors
+    assert (tmp_path / "thesis.tex").read_text() == "precious"

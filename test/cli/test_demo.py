@@ -6,13 +6,19 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from msg_adapters import write_record
+from rsea_ros.cli import demo
 from rsea_ros.cli._processes import Processes
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Fault, Record
 
 ROOT = Path(__file__).resolve().parents[2]
 DOMAIN = int(os.environ["ROS_DOMAIN_ID"])
@@ -62,17 +68,20 @@ def test_the_demo_finds_the_true_values_and_names_its_report(tmp_path):
     assert not _left_running(out)
 
 
-def test_ctrl_c_leaves_no_process_and_no_half_written_bag(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "line"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "stopped by SIGTERM")]
+)
+def test_a_signal_leaves_no_process_and_no_half_written_bag(tmp_path, number, line):
     out = tmp_path / "demo"
     process = _demo(out)
     deadline = time.monotonic() + 60.0
     while not (out / "log" / "excite.log").exists():
         assert time.monotonic() < deadline
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert errors.splitlines() == ["rsea demo: interrupted"]
+    assert process.returncode == 128 + number
+    assert errors.splitlines() == [f"rsea demo: {line}"]
     assert not _left_running(out)
     assert not list(out.glob("*.partial*"))
 
@@ -101,3 +110,52 @@ def test_a_used_directory_is_refused(tmp_path):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2
     assert re.fullmatch(r"rsea demo: --out .*/demo: holds a bag already, expected a new directory\n", errors)
+
+
+STARTS_A_NODE = """
+import sys, time
+from pathlib import Path
+from rsea_ros.cli._processes import Processes
+nodes = Processes(Path(sys.argv[1]), int(sys.argv[2]))
+nodes.start("replay", {"bag": sys.argv[3], "subscribers": 9})
+print("started", flush=True)
+time.sleep(60.0)
+"""
+
+
+def test_a_demo_that_is_killed_leaves_no_node(tmp_path):
+    command = [sys.executable, "-c", STARTS_A_NODE, str(tmp_path), str(DOMAIN), str(tmp_path / "bag")]
+    write_record(Record({"command": Channel(np.arange(9.0), np.zeros(9))}), tmp_path / "bag")
+    process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE)
+    process.stdout.readline()
+    assert _left_running(tmp_path)
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 30.0
+    while _left_running(tmp_path):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "bag", "lines"),
+    [
+        (["", ""], "bag", 0),
+        (["watchdog_trips", "outliers"], "bag-2", 1),
+        (["commands_left_out", "watchdog_trips"], "bag-2", 2),
+    ],
+)
+def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch, kinds, bag, lines):
+    played = []
+
+    def read(path, strict):
+        return Record({}, faults=(Fault(kinds[len(played) - 1], "command", 0.1),))
+
+    monkeypatch.setattr(demo, "source", lambda nodes, out, args: nullcontext("plant"))
+    monkeypatch.setattr(demo, "measure", lambda nodes, path, *rest: played.append(path))
+    monkeypatch.setattr(demo, "read_record", read)
+    assert demo.recorded(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
+    told = capsys.readouterr().out.splitlines()
+    assert len(told) == lines and all(line.startswith("this machine was too busy (") for line in told)
+    assert not told or told[0].endswith("once more")
+    assert lines < 2 or told[1].endswith("of a run that was disturbed")

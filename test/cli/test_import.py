@@ -78,7 +78,8 @@ def test_mistakes_are_one_line_and_status_2(inputs, capsys, change, text):
     [
         (["nothing.csv", "--map", "{map}", "--out", "{out}"], "nothing.csv: No such file"),
         (["{file}", "--map", "nothing.yaml", "--out", "{out}"], "nothing.yaml: No such file"),
-        (["{file}", "--map", "{map}", "--out", "{file}"], "run.csv: exists already, expected a new name"),
+        (["{file}", "--map", "{map}", "--out", "{map}"], "map.yaml: is the input"),
+        (["{file}", "--map", "{map}", "--out", "{file}", "--force"], "run.csv: is the input"),
         (["{file}", "--map", "{map}", "--out", "/proc/nothing/bag"], "/proc/nothing: cannot be made"),
         (
             ["{file}", "--map", "{map}", "--out", "{out}", "--topic", "a=b"],
@@ -102,4 +103,4 @@ def test_the_module_runs_as_a_program(inputs):
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
     again = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (again.returncode, again.stdout) == (2, "")
-    assert again.stderr == f"rsea import: {out}: exists already, expected a new name\n"
+    assert again.stderr == f"rsea import: {out}: exists already, expected a new name or --force\n"

@@ -5,16 +5,20 @@ from __future__ import annotations
 import argparse
 import errno
 import os
+import signal
 import subprocess
 import sys
+import time
 import types
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from numpy.linalg import LinAlgError
 
 from rsea_ros.cli import main as cli
 from rsea_ros.errors import BagError, DeviceError
+from rsea_ros.wording import printable
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -65,9 +69,106 @@ def test_an_expected_error_is_one_line_and_a_status(verb, capsys, error, status,
     assert capsys.readouterr() == ("", line + "\n")
 
 
-def test_a_bug_is_not_hidden(verb):
-    with pytest.raises(ZeroDivisionError):
-        verb(lambda args: 1 // 0)
+@pytest.mark.parametrize(
+    "error",
+    [ZeroDivisionError, OverflowError, MemoryError, RecursionError, KeyError, AssertionError, LinAlgError],
+)
+def test_an_error_that_nobody_expected_is_one_line_too(verb, capsys, monkeypatch, error):
+    assert verb(raising(error("7 pears"))) == 2
+    printed, line = capsys.readouterr()
+    assert (printed, line.count("\n")) == ("", 1)
+    assert line.startswith(f"rsea fake: {cli.FAULT}: {error.__name__} in test_main.py:") and "7 pears" in line
+    monkeypatch.setenv("RSEA_TRACEBACK", "1")
+    assert verb(raising(error("7 pears"))) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_an_interrupt_that_an_import_turns_into_another_error_is_an_interrupt(verb, capsys):
+    def run(args: argparse.Namespace) -> int:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("numpy.core.multiarray failed to import") from None
+        return 0
+
+    assert verb(run) == 130
+    assert capsys.readouterr() == ("", "rsea fake: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("number", "line"),
+    [
+        (signal.SIGINT, "interrupted"),
+        (signal.SIGTERM, "stopped by SIGTERM"),
+        (signal.SIGHUP, "stopped by SIGHUP"),
+    ],
+)
+def test_signals_are_one_line_and_their_status(verb, capsys, number, line):
+    before = signal.getsignal(number)
+    assert verb(lambda args: signal.raise_signal(number) or 0) == 128 + number
+    assert capsys.readouterr() == ("", f"rsea fake: {line}\n")
+    assert signal.getsignal(number) == before
+
+
+def test_a_stop_that_a_destructor_swallows_is_asked_for_again(verb, capsys):
+    class Deaf:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def run(args: argparse.Namespace) -> int:
+        Deaf()
+        time.sleep(60.0)
+        return 0
+
+    before = time.monotonic()
+    assert verb(run) == 130
+    assert time.monotonic() - before < 30.0
+    assert capsys.readouterr() == ("", "rsea fake: interrupted\n")
+
+
+HOSTILE = "ft\x1b]0;title\x07\x1b[2J\x9b1m\u202ecod\udce9\r"
+
+
+def test_control_characters_reach_no_terminal(verb, capsys):
+    assert verb(lambda args: sys.stdout.write(HOSTILE + "\n") and 0) == 0
+    assert verb(raising(BagError(HOSTILE))) == 2
+    told = capsys.readouterr()
+    shown = "ft\\u001b]0;title\\u0007\\u001b[2J\\u009b1m\\u202ecod\\udce9"
+    assert told == (f"{shown}\\u000d\n", f"rsea fake: {shown}\n")
+
+
+def test_colours_pass_on_a_terminal_only():
+    assert printable("\x1b[1;31mred\x1b[0m \x1b[2J", colours=True) == "\x1b[1;31mred\x1b[0m \\u001b[2J"
+    assert printable("\x1b[1mred", colours=False) == "\\u001b[1mred"
+
+
+def test_any_encoding_will_do():
+    code = (
+        "import sys, types; from pathlib import Path; from rsea_ros.cli import main as cli\n"
+        "from rsea_ros.errors import BagError\n"
+        "def run(args): print('3 N·m ± 1 µrad 数'); raise BagError('b\\xe4g')\n"
+        "fake = types.SimpleNamespace(HELP='', add_arguments=lambda parser: 0, run=run)\n"
+        "sys.modules['rsea_ros.cli.fake'] = fake\n"
+        "cli.verbs = lambda: {'fake': Path('fake.py')}; sys.exit(cli.main(['fake']))"
+    )
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=environment, capture_output=True)
+    assert done.returncode == 2
+    assert (done.stdout, done.stderr) == (b"3 N*m +- 1 urad \\u6570\n", b"rsea fake: b\\xe4g\n")
+
+
+def test_a_full_disk_under_stdout_is_one_line():
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "rsea_ros", "--help"]
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (2, "rsea: No space left on device\n")
+
+
+def test_code_from_outside_is_announced(verb, capsys, monkeypatch):
+    monkeypatch.setenv("RSEA_EFFECTS", "/mine")
+    assert verb(lambda args: 0) == 0
+    line = "rsea fake: RSEA_EFFECTS=/mine: code from there runs as part of this program\n"
+    assert capsys.readouterr() == ("", line)
 
 
 def test_the_verbs_status_is_the_exit_status(verb):
@@ -123,7 +224,7 @@ def test_only_the_chosen_verb_is_imported():
     code = ("import sys; from rsea_ros.cli.main import main, verbs\n"
             "try: main(['test', '--help'])\n"
             "except SystemExit: pass\n"
-            "print([m for m in sys.modules if m.startswith('rsea_ros.cli.')])")
+            "print([m for m in sys.modules if m.startswith('rsea_ros.cli.') and '._' not in m])")
     assert run_python("-c", code).stdout.splitlines()[-1] == "['rsea_ros.cli.main', 'rsea_ros.cli.test']"
 
 

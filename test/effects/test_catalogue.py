@@ -180,6 +180,14 @@ def test_a_file_without_an_effect_is_refused(tmp_path: Path, monkeypatch: pytest
         catalogue()
 
 
+@pytest.mark.parametrize("source", ["1 / 0", "def", "import no_such_module", "raise MemoryError"])
+def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, source: str):
+    (tmp_path / "broken.py").write_text(source)
+    monkeypatch.setenv("RSEA_EFFECTS", str(tmp_path))
+    with pytest.raises(ParameterError, match=r"RSEA_EFFECTS: .*broken\.py: \w+Error"):
+        catalogue()
+
+
 def test_measured_current_shows_what_is_done_to_the_command_only():
     driven = drive(duration=1.0)
     nominal = simulate(driven)["motor_torque"]

@@ -76,7 +76,6 @@ def test_several_records_in_one_file(tmp_path, record):
     maps = TopicMap(), TopicMap(namespace="/simulated")
     path = tmp_path / "overlay.mcap"
     write_records([(record, maps[0]), (other, maps[1])], path)
-    write_records([(record, maps[0]), (other, maps[1])], path)
     assert_same(read_record(path, topics=maps[0]), record)
     assert_same(read_record(path, topics=maps[1]), other)
 
@@ -147,6 +146,36 @@ def test_a_taken_name_is_refused_before_anything_is_written(tmp_path, record):
     with pytest.raises(BagError, match="storage 'tape', expected one of mcap, sqlite3"):
         write_record(record, tmp_path / "other", storage="tape")
     assert [entry.name for entry in tmp_path.iterdir()] == ["bag"]
+
+
+@pytest.mark.parametrize("target", ["run.mcap", "run.db3", "run"])
+def test_a_bag_is_replaced_only_by_force_and_only_by_a_complete_one(tmp_path, record, target):
+    path = tmp_path / target
+    write_record(record, path)
+    with pytest.raises(BagError, match=f"{target}: exists already, expected a new name"):
+        write_record(record.between(0.0, 1.0), path)
+    with pytest.raises(ZeroDivisionError), BagWriter(path, recording=False, force=True):
+        raise ZeroDivisionError
+    assert_same(read_record(path), record)
+    write_record(record.between(0.0, 1.0), path, force=True)
+    assert_same(read_record(path), record.between(0.0, 1.0))
+    assert [entry.name for entry in tmp_path.iterdir()] == [target]
+
+
+def test_a_name_that_is_taken_while_the_bag_is_written_is_not_replaced(tmp_path):
+    for name in ("run.mcap", "run"):
+        with pytest.raises(BagError, match="exists already"), BagWriter(tmp_path / name) as bag:
+            bag.write("/a", "std_msgs/msg/Bool", 5, BOOL)
+            (tmp_path / name).write_text("another's")
+        assert (tmp_path / name).read_text() == "another's"
+        assert len(list(iterate(bag.partial))) == 1
+
+
+def test_a_folder_that_holds_more_than_a_bag_is_never_replaced(tmp_path, record):
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "thesis.tex").touch()
+    with pytest.raises(BagError, match="bag: holds more than a bag, expected a new name"):
+        write_record(record, tmp_path / "bag", force=True)
 
 
 @pytest.mark.parametrize("recording", [True, False])

@@ -58,5 +58,5 @@ def test_table_escapes_and_aligns():
 def test_figures_of_the_derivation_are_what_the_program_draws(name):
     path = Path(__file__).parents[2] / "docs" / "figures" / name
     made = documentation_figures()[name]
-    assert path.read_text(encoding="utf-8") == made, f"rsea paper --figures docs/figures makes {name} anew"
+    assert path.read_text(encoding="utf-8") == made, f"rsea paper --figures docs/figures --force makes {name}"
     assert f"figures/{name}" in (path.parents[1] / "derivation.md").read_text(encoding="utf-8")

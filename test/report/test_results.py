@@ -38,10 +38,10 @@ def test_json_holds_no_infinity_and_all_that_others_rely_on(identification: Iden
     assert {"residual_rms", "noise_rms", "fit_percent", "statements", "data"} <= set(document)
 
 
-def test_a_write_that_fails_leaves_nothing(tmp_path: Path) -> None:
+def test_a_write_that_fails_leaves_nothing(identification: Identification, tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(OSError, match=r"report\.html"):
-        results.write_text(tmp_path / "report.html", "text")
+        results.write_results(identification, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 

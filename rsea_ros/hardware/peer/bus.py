@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import secrets
 import tty
 from contextlib import suppress
 from pathlib import Path
 
+from rsea_ros.files import PREFIX
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.motor import LENGTH, UNKNOWN, Motor
 from rsea_ros.hardware.peer.protocol2 import Listener, Request, checksum, status
@@ -43,8 +45,7 @@ class Bus:
         self.descriptor, self._far = os.openpty()
         tty.setraw(self._far)
         os.set_blocking(self.descriptor, False)
-        aside = self._path.with_name(self._path.name + ".new")
-        aside.unlink(missing_ok=True)
+        aside = self._path.with_name(f"{PREFIX}{secrets.token_hex(4)}")
         aside.symlink_to(os.ttyname(self._far))
         aside.replace(self._path)
 

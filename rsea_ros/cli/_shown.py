@@ -1,0 +1,56 @@
+"""What verbs print, made fit for any terminal and any encoding."""
+
+from __future__ import annotations
+
+import codecs
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import TextIOWrapper
+from typing import Any, TextIO
+
+from rsea_ros.wording import printable
+
+_ASCII = {
+    "·": "*", "×": "x", "±": "+-", "−": "-", "–": "-", "…": "...", "²": "^2", "³": "^3", "µ": "u",
+    "°": " deg", "→": "->", "≤": "<=", "≥": ">=", "∞": "inf", "“": '"', "”": '"', "’": "'",
+}  # fmt: skip
+
+
+class Shown:
+    """A text stream that shows control characters in what is written; on a terminal colours pass."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._colours = stream.isatty()
+
+    def write(self, text: str) -> int:
+        """Write text."""
+        self._stream.write(printable(text, colours=self._colours))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def shown() -> Iterator[None]:
+    """In this block stdout shows control characters, and no encoding makes stdout or stderr fail."""
+    codecs.register_error("rsea", _instead)
+    before = sys.stdout
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="rsea")
+    sys.stdout = Shown(before)
+    try:
+        yield
+    finally:
+        sys.stdout = before
+
+
+def _instead(error: UnicodeError) -> tuple[str, int]:
+    """Return what stands for characters that an encoding lacks."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    part = error.object[error.start : error.end]
+    return "".join(_ASCII.get(c) or c.encode("ascii", "backslashreplace").decode() for c in part), error.end

@@ -1,0 +1,188 @@
+"""Files on the disk: written new, synchronised, and named together or not at all.
+
+A file gets its name by a hard link, which fails where the name is taken: two runs at once cannot take the
+same name, no file is replaced unless that is asked for, and no symbolic link is followed.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from itertools import chain
+from pathlib import Path
+
+from rsea_ros.errors import OutputError
+from rsea_ros.interrupts import undisturbed
+
+PREFIX = ".rsea-"
+"""Of names that last only while something is written."""
+NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS}
+"""What a file system without hard links says (FAT, some network mounts)."""
+NO_SYNC = {errno.EINVAL, errno.ENOTSUP}
+"""What a file system says that has no fsync for folders."""
+Undo = list[Callable[[], object]]
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make a folder with its parents, as far as they are missing; return what was made, the deepest first."""
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(made):
+        path.mkdir(exist_ok=True)
+    return made
+
+
+def create(path: Path) -> int:
+    """Return the descriptor of a new file; whatever has the name, a symbolic link included, is an error."""
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+
+
+def write_at(descriptor: int, data: bytes, offset: int = 0) -> None:
+    """Write all of the data."""
+    rest = memoryview(data)
+    while rest:
+        done = os.pwrite(descriptor, rest, offset)
+        rest, offset = rest[done:], offset + done
+
+
+def write_new(path: Path, text: str) -> None:
+    """Write a new file as UTF-8; bytes of a file name that are no UTF-8 are escaped."""
+    with naming(path):
+        descriptor = create(path)
+        try:
+            write_at(descriptor, text.encode("utf-8", "backslashreplace"))
+        finally:
+            os.close(descriptor)
+
+
+def sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
+    with naming(path):
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        except OSError as error:
+            if error.errno not in NO_SYNC:
+                raise
+        finally:
+            os.close(descriptor)
+
+
+def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> None:
+    """Give complete files, or folders of files, their names (source, target): all or, on an error, none.
+
+    Both of a pair are on one file system. force: what has a name is replaced, a file by a file, a folder by a
+    folder. Raises OutputError for a name that is taken, OSError where the system refuses.
+    """
+    for source, _ in pairs:
+        for path in chain(source.iterdir() if source.is_dir() else (), [source]):
+            sync(path)
+    undo: Undo = []
+    with undisturbed():
+        try:
+            replaced = []
+            for source, target in pairs:
+                with naming(target):
+                    replaced.append(_take(source, target, force, undo))
+            for folder in {target.parent for _, target in pairs}:
+                sync(folder)
+        except BaseException:
+            for step in reversed(undo):
+                with suppress(OSError):
+                    step()
+            raise
+        for path in filter(None, replaced):
+            remove(path)
+
+
+def taken(path: Path) -> OutputError:
+    """Return the error of a name that is taken."""
+    return OutputError(f"{path}: exists already, expected a new name")
+
+
+def check_replaceable(path: Path) -> None:
+    """Refuse what nobody may replace: a device, a pipe, a symbolic link. Raises OutputError."""
+    if path.is_symlink() or not (path.is_file() or path.is_dir()):
+        raise OutputError(f"{path}: is no regular file, expected a new name")
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder, if it can be removed."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    with suppress(OSError):
+        path.unlink()
+
+
+def _take(source: Path, target: Path, force: bool, undo: Undo) -> Path | None:
+    """Give one file or folder its name; return where what it replaced is now."""
+    if force and os.path.lexists(target):
+        check_replaceable(target)
+        if source.is_dir() != target.is_dir():
+            kind = "folder" if source.is_dir() else "file"
+            raise OutputError(f"{target}: is no {kind}, expected a new name")
+        return _exchange(source, target, undo)
+    try:
+        _take_free(source, target, undo)
+    except FileExistsError:
+        raise taken(target) from None
+    return None
+
+
+def _take_free(source: Path, target: Path, undo: Undo) -> None:
+    """Give a file or folder its name, or raise FileExistsError."""
+    if source.is_dir():
+        target.mkdir()  # takes the name, or fails; a rename may replace this empty folder
+        undo.append(target.rmdir)
+        os.rename(source, target)
+        undo[-1] = lambda: os.rename(target, source)
+    elif _linked(source, target):
+        undo.append(target.unlink)
+    else:
+        os.close(create(target))  # takes the name, or fails
+        undo.append(target.unlink)
+        os.rename(source, target)
+
+
+def _exchange(source: Path, target: Path, undo: Undo) -> Path:
+    """Put a file or folder in the place of another; return the new name of the other."""
+    aside = target.with_name(f"{PREFIX}{secrets.token_hex(4)}")
+    if source.is_dir():
+        os.rename(target, aside)
+        undo.append(lambda: os.rename(aside, target))
+        os.rename(source, target)
+        undo.append(lambda: os.rename(target, source))
+        return aside
+    if _linked(target, aside):
+        undo.append(aside.unlink)
+    else:
+        os.rename(target, aside)
+        undo.append(lambda: os.rename(aside, target))
+    os.rename(source, target)
+    undo[-1] = lambda: os.rename(aside, target)
+    return aside
+
+
+def _linked(source: Path, target: Path) -> bool:
+    """Give a file one more name; return whether the file system can. Raises FileExistsError."""
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError as error:
+        if error.errno in NO_LINKS:
+            return False
+        raise
+    return True
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put the path into an error of the system, which does not know it once the file is open."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None:  # else it is an error of ours, with its whole message
+            error.filename = str(path)
+        raise

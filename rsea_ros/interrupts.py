@@ -1,0 +1,80 @@
+"""Signals that ask a process to stop: SIGINT, SIGTERM and SIGHUP alike, as exceptions."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+AGAIN = 0.1
+"""s after which a stop is asked for again that code which cannot pass on an exception has swallowed."""
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal asks this process to stop; whatever handles Ctrl-C handles it. status: 128 and the number."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number, self.status = number, 128 + number
+
+
+class Stops:
+    """In this block a signal of STOPPING raises Stopped in the main thread, unless it is ignored (nohup).
+
+    last: the one that came, which an import may have turned into another error.
+    """
+
+    def __init__(self) -> None:
+        self.last: Stopped | None = None
+
+    def __enter__(self) -> Stops:
+        self._handlers = {}
+        self._hook = sys.unraisablehook
+        if threading.current_thread() is threading.main_thread():
+            sys.unraisablehook = self._swallowed
+            for number in STOPPING:
+                if (handler := signal.getsignal(number)) is not signal.SIG_IGN:
+                    self._handlers[number] = handler
+                    signal.signal(number, self._raise)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        sys.unraisablehook = self._hook
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+
+    def _raise(self, number: int, frame: FrameType | None) -> None:
+        self.last = Stopped(number)
+        raise self.last
+
+    def _swallowed(self, report: sys.UnraisableHookArgs) -> None:
+        if not isinstance(report.exc_value, Stopped):
+            self._hook(report)
+            return
+        main = threading.main_thread().ident
+        again = threading.Timer(AGAIN, signal.pthread_kill, [main, report.exc_value.number])
+        again.daemon = True
+        again.start()
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Hold signals back until the block is over; the first of them counts then."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread hears signals
+        return
+    held: list[int] = []
+    before = {n: handler for n in STOPPING if (handler := signal.getsignal(n)) is not None}
+    for number in before:
+        signal.signal(number, lambda number, frame: held.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if held:
+            signal.raise_signal(held[0])

@@ -1,0 +1,169 @@
+"""Results: files of one folder that appear together, complete, and not over what is there.
+
+They are written into a folder of a random name beside their destination, made for this process alone (0700),
+and get their names when all are complete and on the disk. An error or a signal before leaves all as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from types import TracebackType
+
+from rsea_ros.errors import OutputError, RseaError
+from rsea_ros.files import (
+    PREFIX,
+    check_replaceable,
+    give_names,
+    make_folder,
+    naming,
+    remove,
+    taken,
+    write_new,
+)
+from rsea_ros.interrupts import undisturbed
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where results go.
+
+    force: files that exist may be replaced. fresh: the first of NAME, NAME-2, NAME-3, … that does not exist.
+    """
+
+    folder: Path
+    force: bool = False
+    fresh: bool = False
+
+
+class NewFiles:
+    """Files of one folder that get their names together at the end of the block; on an error none does.
+
+    folder: where they will be; of a fresh place it is known from the beginning of the block on.
+    Raises OutputError for a name that is taken, OSError where the system refuses; both name the final file.
+    """
+
+    def __init__(self, place: Place | str | Path) -> None:
+        self._place = place if isinstance(place, Place) else Place(Path(place))
+        self.folder = self._place.folder
+        self._names: list[str] = []
+        self._made: list[Path] = []
+        self._stage: Path | None = None
+
+    def __enter__(self) -> NewFiles:
+        try:
+            with undisturbed():
+                self.folder = self._make_folder()
+                with naming(self.folder):
+                    self._stage = Path(tempfile.mkdtemp(prefix=PREFIX, dir=self.folder))
+        except BaseException:
+            self._clear(complete=False)
+            raise
+        return self
+
+    def staged(self, name: str) -> Path:
+        """Return where another writer puts the file that will have this name."""
+        assert self._stage is not None
+        self._names.append(name)
+        return self._stage / name
+
+    def write(self, name: str, text: str) -> Path:
+        """Write a file, and return the path that it will have."""
+        write_new(self.staged(name), text)
+        return self.folder / name
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._stage is not None
+        complete = False
+        with undisturbed():
+            try:
+                if error is None:
+                    pairs = [(self._stage / name, self.folder / name) for name in self._names]
+                    give_names(pairs, force=self._place.force)
+                    complete = True
+            except (OSError, RseaError) as failure:
+                error = failure
+                raise
+            finally:
+                _name_finally(error, self._stage, self.folder)
+                self._clear(complete)
+
+    def _make_folder(self) -> Path:
+        """Make the folder, as far as it is missing, and return it."""
+        first, fresh = self._place.folder, self._place.fresh
+        if first.exists() and not first.is_dir() and not fresh:
+            raise OutputError(f"{first}: is a file, expected a directory or a new name")
+        self._made = make_folder(first.parent if fresh else first)
+        for folder in siblings(first) if fresh else ():
+            with suppress(FileExistsError):
+                folder.mkdir()
+                self._made.insert(0, folder)
+                return folder
+        return first
+
+    def _clear(self, complete: bool) -> None:
+        """Remove what was only for the writing, and where nothing was written the folders as well."""
+        with undisturbed():
+            if self._stage is not None:
+                remove(self._stage)
+            for folder in () if complete else self._made:
+                with suppress(OSError):
+                    folder.rmdir()
+
+
+def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
+    """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
+    with naming(Path(path)):
+        Path(path).parent.stat()
+    with NewFiles(Place(Path(path).parent, force)) as new:
+        return new.write(Path(path).name, text)
+
+
+def siblings(path: Path) -> Iterator[Path]:
+    """Yield NAME, NAME-2, NAME-3, …"""
+    yield path
+    yield from (path.with_name(f"{path.name}-{number}") for number in count(2))
+
+
+def unused(path: Path) -> Path:
+    """Return the first of NAME, NAME-2, NAME-3, … that does not exist."""
+    return next(one for one in siblings(path) if not os.path.lexists(one))
+
+
+def check_free(
+    paths: Iterable[Path], *, force: bool | None = None, inputs: Collection[str | Path] = ()
+) -> None:
+    """Refuse, before any work, a name that is taken (unless `force`) and one of the inputs (always).
+
+    force: --force of a verb; None where nothing offers it. Raises OutputError.
+    """
+    for path in paths:
+        for one in map(Path, inputs):
+            if one.exists() and _touches(path, one):
+                raise OutputError(f"{path}: is the input {one} or lies in it, expected another name")
+        if os.path.lexists(path):
+            if not force:
+                raise OutputError(f"{taken(path)}{'' if force is None else ' or --force'}")
+            check_replaceable(path)
+
+
+def _touches(path: Path, one: Path) -> bool:
+    """Tell whether a path is an input, by whatever name, or lies directly in it."""
+    whole = one.resolve()
+    return whole in (path.resolve(), path.resolve().parent) or (path.exists() and path.samefile(one))
+
+
+def _name_finally(error: BaseException | None, stage: Path, folder: Path) -> None:
+    """Let an error name the file as it would be named in the end."""
+    if isinstance(error, (OSError, RseaError)):
+        change = str(stage), str(folder)
+        error.args = tuple(a.replace(*change) if isinstance(a, str) else a for a in error.args)
+        if isinstance(error, OSError) and isinstance(error.filename, str):
+            error.filename = error.filename.replace(*change)

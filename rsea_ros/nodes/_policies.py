@@ -1,0 +1,115 @@
+"""SROS 2 policies of the nodes, read from the nodes themselves: python -m rsea_ros.nodes._policies > FILE.
+
+Each node is made in this process with its defaults and asked for its topics and services. `operator` stands
+for a person, who may listen to everything, call every service, and publish nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+from unittest.mock import patch
+from xml.etree import ElementTree as XML
+
+import rclpy
+from rclpy.node import Node
+
+from msg_adapters import BagWriter
+from rsea_ros.nodes._parameters import declare
+from rsea_ros.nodes._run import NAMESPACE
+from rsea_ros.nodes.record import TOPICS
+
+NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+PARAMETERS: Mapping[str, Mapping[str, object]] = {
+    "driver": {"autostart": True},
+    "record": {"out": "bag"},
+    "replay": {"bag": "every topic"},
+}
+"""What a node needs so that it has all its topics."""
+OPERATOR = "operator"
+Interfaces = dict[tuple[str, str], set[str]]
+"""Names by what is done with them: topics publish or subscribe, services reply or request."""
+
+
+def main() -> int:
+    """Print the policies."""
+    sys.stdout.write(policies())
+    return 0
+
+
+def policies() -> str:
+    """Return the XML of the policies of all nodes and of the operator."""
+    before = os.getcwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            with BagWriter("every topic") as bag:
+                for name, kind in TOPICS.items():
+                    bag.write(name if name.startswith("/") else f"/{NAMESPACE}/{name}", kind, 1, bytes(8))
+            nodes = {name: interfaces(name) for name in NODES}
+        finally:
+            os.chdir(before)
+    heard = {name for each in nodes.values() for name in each["topics", "publish"]}
+    served = {name for each in nodes.values() for name in each["services", "reply"]}
+    person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
+    return document({**nodes, OPERATOR: person})
+
+
+def interfaces(name: str) -> Interfaces:
+    """Make a node and return the full names of its topics and services."""
+    module = importlib.import_module(f"rsea_ros.nodes.{name}")
+    with patch.object(module, "run_node") as run:
+        module.main()
+    (_, table, make), options = run.call_args
+    words = [w for key, value in PARAMETERS.get(name, {}).items() for w in ("-p", f"{key}:={value}")]
+    with rclpy.init(args=["--ros-args", *words]):
+        kind = options.get("kind", Node)
+        node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
+        program = make(node, declare(node, table))
+        try:
+            return _asked(node, name)
+        finally:
+            program.close()
+            node.destroy_node()
+
+
+def document(profiles: Mapping[str, Interfaces]) -> str:
+    """Return the XML (version 0.2.0 of the schema of sros2) with an enclave for each profile."""
+    policy = XML.Element("policy", version="0.2.0")
+    enclaves = XML.SubElement(policy, "enclaves")
+    for name, each in profiles.items():
+        enclave = XML.SubElement(enclaves, "enclave", path=f"/{NAMESPACE}/{name}")
+        profile = XML.SubElement(
+            XML.SubElement(enclave, "profiles"), "profile", ns=f"/{NAMESPACE}", node=name
+        )
+        for (plural, verb), names in each.items():
+            _list(profile, plural, verb, names)
+    XML.indent(policy)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{XML.tostring(policy, encoding="unicode")}\n'
+
+
+def _asked(node: Any, name: str) -> Interfaces:
+    def names(ask: Callable[[str, str], Iterable[tuple[str, Any]]]) -> set[str]:
+        return {found for found, _ in ask(name, f"/{NAMESPACE}")}
+
+    return {
+        ("topics", "publish"): names(node.get_publisher_names_and_types_by_node),
+        ("topics", "subscribe"): names(node.get_subscriber_names_and_types_by_node),
+        ("services", "reply"): names(node.get_service_names_and_types_by_node),
+        ("services", "request"): names(node.get_client_names_and_types_by_node),
+    }
+
+
+def _list(profile: XML.Element, plural: str, verb: str, names: Iterable[str]) -> None:
+    parent = XML.SubElement(profile, plural, {verb: "ALLOW"}) if names else None
+    for name in sorted(names):
+        assert parent is not None
+        XML.SubElement(parent, plural.removesuffix("s")).text = name
+
+
+if __name__ == "__main__":
+    sys.exit(main())

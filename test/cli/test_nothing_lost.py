@@ -1,0 +1,284 @@
+"""Whatever fails while results are written, at whatever step: old files stay, and nothing is half there."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import rsea_ros.files as files
+from msg_adapters import read_record, write_record
+from rsea_ros.cli import paper
+from rsea_ros.cli.main import main
+from rsea_ros.control import study
+from rsea_ros.design import judge, margins
+from rsea_ros.diagnosis import diagnose, usable
+from rsea_ros.errors import OutputError
+from rsea_ros.identification import identify
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.report import (
+    control_json,
+    control_page,
+    design_json,
+    design_page,
+    diagnosis_files,
+    paper_json,
+    paper_page,
+    results,
+)
+from rsea_ros.signals import Channel, Record
+
+RIG = "paper_high_impedance"
+STEPS = ("open", "pwrite", "fsync", "link", "rename")
+MAP = "time: {column: t, unit: s}\nchannels:\n  command: {column: u, unit: N m}\n"
+OLD, JSON = b"old", {"all": 1}
+
+
+class Disk:
+    """The calls of the system with which files.py writes; the n-th of them misfires."""
+
+    def __init__(self, n: int, misfire: Callable[[str], None]) -> None:
+        self.left, self._misfire = n, misfire
+
+    def __getattr__(self, name: str):
+        call = getattr(os, name)
+        if name not in STEPS:
+            return call
+
+        def counted(*arguments, **options):
+            self.left -= 1
+            if self.left == 0:
+                self._misfire(name)
+            return call(*arguments, **options)
+
+        return counted
+
+
+def full(name: str) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def stop(name: str) -> None:
+    signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    u = excitation("white_noise", Settings(duration=2.0))
+    return synthesize(load_rig(RIG), Channel(np.arange(len(u)) / 280.0, u))
+
+
+@pytest.fixture
+def folder(record, tmp_path, monkeypatch) -> Path:
+    """Return a working directory with inputs, where what verbs compute is there at once."""
+    write_record(record, tmp_path / "run.mcap")
+    (tmp_path / "map.yaml").write_text(MAP)
+    (tmp_path / "run.csv").write_text("t,u\n0,1\n1,2\n2,3\n")
+    monkeypatch.chdir(tmp_path)
+    found = SimpleNamespace(rig=None, extended_rig=None, rates=(), verdict="", feasible=True)
+    for module, names, value in (
+        (identify, "identify", found), (diagnose, "diagnose", found), (study, "study", found),
+        (judge, "judge", found), (judge, "least_stiffness", 1.0), (margins, "robust_stiffness", np.inf),
+        (usable, "check_diagnosable", None),
+        (results, "identification_json", JSON), (results, "identification_report", "page"),
+        (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
+        (diagnosis_files, "overlay_records", {"/rsea": record}),
+        (results, "rig_text", "rig"), (diagnosis_files, "rig_text", "rig"),
+        (control_json, "control_json", JSON), (control_page, "control_report", "page"),
+        (design_json, "design_json", JSON), (design_page, "design_report", "page"),
+        (paper_json, "paper_json", JSON), (paper_page, "paper_report", "page"),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
+    monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.staged("one.mcap")))
+    return tmp_path
+
+
+WRITERS = {
+    "simulate": (["simulate", RIG, "--duration", "1", "--out", "out/new.mcap"], ["new.mcap"]),
+    "simulate to a directory": (["simulate", RIG, "--duration", "1", "--out", "out/new"], ["new"]),
+    "import": (["import", "run.csv", "--map", "map.yaml", "--out", "out/new.mcap"], ["new.mcap"]),
+    "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
+    "export": (["export", "--mjcf", RIG, "--out", "out/new.xml"], ["new.xml"]),
+    "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
+    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(results.NAMES)),
+    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(diagnosis_files.NAMES)),
+    "control": (["control", "--json", "--out", "out"], ["control.json", "report.html"]),
+    "paper": (["paper", "--json", "--out", "out"], ["one.mcap", "paper.json", "report.html"]),
+}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in folder.rglob("*")}
+
+
+def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> Iterator[int]:
+    """Run a verb again and again, each time with a later step that misfires, until none does."""
+    for n in range(1, 200):
+        disk = Disk(n, misfire)
+        with monkeypatch.context() as patch:
+            patch.setattr(files, "os", disk)
+            status = main(words)
+        yield status
+        if disk.left > 0:
+            assert n > 6
+            return
+
+
+@pytest.mark.parametrize("verb", WRITERS)
+def test_an_error_at_any_step_leaves_what_was_there(folder, monkeypatch, capsys, verb):
+    words, names = WRITERS[verb]
+    (folder / "out").mkdir()
+    before = contents(folder)
+    for status in misfires(monkeypatch, words, full):
+        printed, line = capsys.readouterr()
+        if status == 0:
+            break
+        assert (status, printed, line.count("\n")) == (2, "", 1), line
+        assert "No space left on device" in line and ".rsea-" not in line and "out" in line, line
+        assert contents(folder) == before
+    assert sorted(p.name for p in (folder / "out").iterdir()) == sorted(names)
+
+
+@pytest.mark.parametrize("verb", WRITERS)
+def test_an_error_at_any_step_of_a_replacement_leaves_the_old(folder, monkeypatch, capsys, verb):
+    words, names = WRITERS[verb]
+    (folder / "out").mkdir()
+    for name in names:
+        old = folder / "out" / name / "new.mcap" if name == "new" else folder / "out" / name
+        old.parent.mkdir(exist_ok=True)
+        old.write_bytes(OLD)
+    before = contents(folder)
+    assert main(words) == 2
+    assert "exists already, expected a new name or --force" in capsys.readouterr().err
+    for status in misfires(monkeypatch, [*words, "--force"], full):
+        if status == 0:
+            break
+        assert contents(folder) == before
+    assert OLD not in contents(folder / "out").values()
+    assert sorted(p.name for p in (folder / "out").iterdir()) == sorted(names)
+
+
+@pytest.mark.parametrize("verb", ["simulate to a directory", "predict", "identify"])
+def test_a_signal_at_any_step_leaves_all_or_nothing(folder, monkeypatch, capsys, verb):
+    words, names = WRITERS[verb]
+    outcomes = set()
+    (folder / "out").mkdir()
+    for status in misfires(monkeypatch, words, stop):
+        left = sorted(p.name for p in (folder / "out").iterdir())
+        outcomes.add((status, len(left)))
+        assert left in ([], sorted(names))
+        for name in left:
+            files.remove(folder / "out" / name)
+        if status == 143:
+            assert capsys.readouterr().err == f"rsea {words[0]}: stopped by SIGTERM\n"
+    assert (143, 0) in outcomes and (0, len(names)) in outcomes
+
+
+@pytest.mark.parametrize("verb", ["predict", "export", "identify", "design"])
+def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
+    words, names = WRITERS[verb]
+    (folder / "out").mkdir()
+    (folder / "precious").write_bytes(OLD)
+    (folder / "out" / names[0]).symlink_to(folder / "precious")
+    assert main(words) == 2
+    assert main([*words, "--force"]) == 2
+    assert "is no regular file, expected a new name" in capsys.readouterr().err
+    assert (folder / "precious").read_bytes() == OLD
+    assert [p.name for p in (folder / "out").iterdir()] == [names[0]]
+
+
+@pytest.mark.parametrize("verb", ["predict", "simulate", "export", "identify", "simulate to a directory"])
+def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
+    """A pipe stands for devices: to replace /dev/null takes a system down."""
+    words, names = WRITERS[verb]
+    (folder / "out").mkdir()
+    os.mkfifo(folder / "out" / names[0])
+    assert main([*words, "--force"]) == 2
+    line = capsys.readouterr().err
+    assert "is no regular file, expected a new name" in line and line.count("\n") == 1
+    assert (folder / "out" / names[0]).is_fifo()
+    with pytest.raises(OutputError, match="is no regular file"):
+        files.give_names([(folder / "run.csv", folder / "out" / names[0])], force=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["predict", RIG, "run.mcap", "--out", "run.mcap"],
+        ["predict", "rig.yaml", "run.mcap", "--out", "./rig.yaml"],
+        ["predict", RIG, "bag", "--out", "bag/bag.mcap"],
+        ["predict", RIG, "run.mcap", "--out", "other.mcap"],
+        ["simulate", "rig.yaml", "--out", "rig.yaml"],
+        ["export", "--mjcf", "rig.yaml", "--out", "rig.yaml"],
+        ["import", "run.csv", "--map", "map.yaml", "--out", "map.yaml"],
+        ["identify", "run.mcap", "--rig", "model.yaml", "--out", "."],
+        ["diagnose", "bag", "--out", "bag"],
+    ],
+)
+def test_an_input_is_never_replaced(folder, record, capsys, words):
+    write_record(record, folder / "bag")
+    rig = Path(__file__).parents[2] / "config" / "rigs" / f"{RIG}.yaml"
+    for name in ("rig.yaml", "model.yaml"):
+        (folder / name).write_text(rig.read_text())
+    os.link(folder / "run.mcap", folder / "other.mcap")
+    before = contents(folder)
+    assert main([*words, "--force"]) == 2
+    line = capsys.readouterr().err
+    assert "is the input" in line and line.count("\n") == 1
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("verb", ["design", "identify", "diagnose", "control", "paper"])
+def test_a_second_call_without_out_goes_beside_the_first(folder, capsys, verb):
+    words = WRITERS[verb][0][:-2]
+    assert [main(words) for _ in range(3)] == [0, 0, 0]
+    name = f"{verb}-run" if verb in ("identify", "diagnose") else verb
+    assert sorted(p.name for p in (folder / "out").iterdir()) == [name, f"{name}-2", f"{name}-3"]
+
+
+def test_two_runs_at_once_do_not_take_one_name(folder, monkeypatch, capsys):
+    """The other run ends first, between the check and the naming."""
+
+    def other(name: str) -> None:
+        if name == "link":
+            (folder / "out" / "new.csv").write_bytes(OLD)
+
+    (folder / "out").mkdir()
+    words = WRITERS["predict"][0]
+    statuses = []
+    for status in misfires(monkeypatch, words, other):
+        statuses.append(status)
+        if status == 2:
+            assert (folder / "out" / "new.csv").read_bytes() == OLD
+            assert "exists already" in capsys.readouterr().err
+        (folder / "out" / "new.csv").unlink()
+    assert sorted(set(statuses)) == [0, 2]
+
+
+@pytest.mark.parametrize("name", ["it's \"two\" words", "line\nbreak", "esc\x1b[2J", "\udce9\udcff", "ж 数"])
+def test_any_name_of_an_output_works(folder, capsys, name):
+    for out in (f"{name}.mcap", f"{name}.db3", name):
+        assert main(["simulate", RIG, "--duration", "1", "--out", out]) == 0
+        assert len(read_record(out)["command"]) == 280
+    assert main(["predict", RIG, name, "--out", f"{name}.csv"]) == 0
+    assert main(["identify", name, "--json", "--out", f"{name} results"]) == 0
+    told = capsys.readouterr()
+    assert told.err == "" and "\x1b" not in told.out and "\udce9" not in told.out
+
+
+@pytest.mark.parametrize("option", ["--namespace", "--joint", "--topic"])
+@pytest.mark.parametrize("name", ["\udcff", "a\x1b[2J", "a\nb"])
+def test_a_name_of_ros_that_cannot_be_written_is_refused(folder, capsys, option, name):
+    words = [*WRITERS["simulate"][0], option, f"ft={name}" if option == "--topic" else name]
+    assert main(words) == 2
+    line = capsys.readouterr().err
+    assert "expected a name of ROS" in line and line.count("\n") == 1 and "\x1b" not in line
+    assert not (folder / "out").exists()

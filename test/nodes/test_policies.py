@@ -1,0 +1,61 @@
+"""SROS 2 policies: they are what the nodes do, and only those that must may command torque."""
+
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as XML
+
+import pytest
+
+from rsea_ros.nodes import _policies, _run
+
+FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
+
+
+def test_the_committed_policies_are_those_of_the_nodes():
+    again = f"python -m rsea_ros.nodes._policies > {FILE} makes it anew"
+    assert FILE.read_text(encoding="utf-8") == _policies.policies(), again
+
+
+@pytest.mark.parametrize(
+    ("plural", "verb", "name", "allowed"),
+    [
+        ("topics", "publish", "/rsea/torque_command", {"controller", "excite", "replay"}),
+        ("topics", "publish", "/rsea/desired_torque", {"replay"}),
+        ("topics", "publish", "/rsea/joint_states", {"driver", "plant", "replay"}),
+        ("services", "request", "/rsea/driver/change_state", {"operator"}),
+    ],
+)
+def test_who_may_move_the_machine(plural, verb, name, allowed):
+    profiles = {p.get("node"): p for p in XML.parse(FILE).iter("profile")}
+    assert set(profiles) == {*_policies.NODES, _policies.OPERATOR}
+
+    def named(profile):
+        return [e.text for e in profile.iterfind(f"{plural}[@{verb}='ALLOW']/*")]
+
+    assert {node for node, profile in profiles.items() if name in named(profile)} == allowed
+
+
+@pytest.mark.parametrize(("given", "range_"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
+def test_nodes_are_found_from_this_machine_unless_the_user_opens_it(monkeypatch, given, range_):
+    variable = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    monkeypatch.delenv(variable) if given is None else monkeypatch.setenv(variable, given)
+    monkeypatch.setattr(_run.rclpy, "init", lambda **options: None)
+    _run._initialise([])
+    assert _run.os.environ[variable] == range_
+
+
+def test_a_node_that_cannot_be_secured_as_asked_does_not_start(tmp_path, monkeypatch):
+    """Whether the middleware lacks security (the wheels') or the keys are empty: no node in the open."""
+    for name in ("identity_ca.cert.pem", "cert.pem", "key.pem", "permissions_ca.cert.pem", "governance.p7s",
+                 "permissions.p7s"):  # fmt: skip
+        (tmp_path / "enclaves" / "rsea" / "plant").mkdir(parents=True, exist_ok=True)
+        (tmp_path / "enclaves" / "rsea" / "plant" / name).touch()
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
+    monkeypatch.setenv("ROS_SECURITY_KEYSTORE", str(tmp_path))
+    command = [sys.executable, "-m", "rsea_ros.nodes.plant", "--ros-args", "--enclave", "/rsea/plant"]
+    done = subprocess.run(command, cwd=FILE.parents[2], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    told = (done.stdout + done.stderr).splitlines()  # rcl says before where it found the keys
+    assert "FATAL" in told[-1] and "error creating node" in told[-1] and "Traceback" not in "".join(told)
