@@ -12,13 +12,17 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress", "wording"}
+BASE = {"errors", "signals", "progress", "wording", "units", "decimal_number", "checked", "strict_yaml"}
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors"},
     "progress": set(),
     "wording": set(),
+    "units": set(),
+    "decimal_number": set(),
+    "checked": {"errors", "units", "wording"},
+    "strict_yaml": {"errors", "decimal_number", "wording"},
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},
@@ -43,12 +47,13 @@ MESSAGES = {
     "rosgraph_msgs", "rosidl_runtime_py", "sensor_msgs", "std_msgs", "std_srvs",
 }
 FOREIGN = {
+    "strict_yaml": {"yaml"},
     "effects": NUMERIC,
     "model": NUMERIC | {"yaml"},
     "identification": NUMERIC | {"threadpoolctl"},
     "diagnosis": NUMERIC,
     "control": NUMERIC,
-    "design": NUMERIC | {"yaml"},
+    "design": NUMERIC,
     "signals": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,

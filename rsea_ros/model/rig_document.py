@@ -10,8 +10,8 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from rsea_ros.errors import RigError
-from rsea_ros.model.checked import mapping, number, only_keys, switch, text
+from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
+from rsea_ros.errors import FieldError, RigError
 from rsea_ros.model.rig import (
     END_NAMES,
     FIELDS,
@@ -24,6 +24,7 @@ from rsea_ros.model.rig import (
     check_value,
 )
 from rsea_ros.signals import UNITS
+from rsea_ros.wording import shown
 
 _GROUPS = sorted({name.split(".")[0] for name in FIELDS})
 _TOP = {
@@ -45,6 +46,13 @@ _SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
     """Build a rig from the parsed YAML. Raises RigError naming the field."""
+    try:
+        return _rig(document, default_name)
+    except FieldError as error:
+        raise RigError(str(error), error.field) from None
+
+
+def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
     only_keys(document, _TOP, "rig")
     groups = {g: mapping(document.get(g, {}), g) for g in _GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
@@ -134,21 +142,20 @@ def _quantity(name: str, item: Any) -> Quantity:
     field: Field = FIELDS[name]
     body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
     only_keys(body, {"value", "unit", "spread", "source", "ci95"}, name)
-    if body.get("unit") != field.unit:
-        raise RigError(f"{name}.unit = {body.get('unit')!r}, expected {field.unit!r}")
+    unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
     check_value(name, value, where="value")
     spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
     if not 0.0 <= spread < 10.0:
-        raise RigError(f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10")
+        raise RigError(f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread")
     ci95 = _interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
     return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
 
 
-def _interval(item: Any, name: str, unit: str) -> tuple[float, float]:
+def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {item!r}, expected [low, high] in {unit}")
-    low, high = (number(v, name, unit) for v in item)
+        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {unit_name}", name)
+    low, high = (number(v, name, unit_name) for v in item)
     return low, high
 
 
@@ -157,11 +164,10 @@ def _clock(fields: Mapping[str, Any], name: str) -> float:
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
     only_keys(item, {"value", "unit"}, field)
-    if item.get("unit") != "s":
-        raise RigError(f"{field}.unit = {item.get('unit')!r}, expected 's'")
+    unit(item.get("unit"), f"{field}.unit", "s")
     value = number(item.get("value"), f"{field}.value", "s")
     if not abs(value) < _LATEST:
-        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way")
+        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
     return value
 
 
@@ -171,14 +177,14 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")
         only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown", "clock"}, f"sensors.{name}")
-        if fields.get("unit") != UNITS[name]:
-            raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
+        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
         noise, quantum = (
             number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
         )
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
             raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
+                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
+                f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
         sensors[name] = Sensor(noise, quantum, floating, clock)
@@ -187,10 +193,12 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
 
 def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
     if not isinstance(items, list):
-        raise RigError(f"known = {items!r}, expected a list of field names")
-    for item in items:
+        raise RigError(f"known = {items!r}, expected a list of field names", "known")
+    for i, item in enumerate(items):
         if item not in stated:
-            raise RigError(f"known: {item!r}, expected a value that this rig states: {', '.join(stated)}")
+            raise RigError(
+                f"known: {shown(item)}, expected a value that this rig states: {', '.join(stated)}", f"known[{i}]"
+            )
     return frozenset(items)
 
 
@@ -202,17 +210,17 @@ def _controller(item: Any) -> Controller | None:
     k_p = number(body.get("k_p"), "controller.k_p", "1/s")
     k_v = number(body.get("k_v"), "controller.k_v", "N m s/rad")
     limit = number(body.get("limit", math.inf), "controller.limit", "N m")
-    for key, value, unit in (("k_p", k_p, "1/s"), ("k_v", k_v, "N m s/rad")):
+    for name, value, symbol in (("controller.k_p", k_p, "1/s"), ("controller.k_v", k_v, "N m s/rad")):
         if not 0.0 <= value < math.inf:
-            raise RigError(f"controller.{key} = {value:g} {unit}, expected a finite value >= 0 {unit}")
+            raise RigError(f"{name} = {value:g} {symbol}, expected a finite value >= 0 {symbol}", name)
     if limit <= 0.0:
-        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m")
+        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m", "controller.limit")
     return Controller(k_p, k_v, limit)
 
 
 def _effects(items: Any) -> tuple[EffectSetting, ...]:
     if not isinstance(items, list):
-        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}")
+        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}", "effects")
     settings = []
     for i, item in enumerate(items):
         body = mapping(item, f"effects[{i}]")
