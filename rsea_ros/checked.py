@@ -50,7 +50,9 @@ def only_keys(body: Mapping[str, Any], allowed: set[str], where: str) -> None:
     for key in body:
         if key not in allowed:
             expected = ", ".join(sorted(allowed))
-            raise FieldError(f"{where}: unknown key {shown(key)}, expected one of {expected}", f"{where}.{key}")
+            raise FieldError(
+                f"{where}: unknown key {shown(key)}, expected one of {expected}", f"{where}.{key}"
+            )
 
 
 def unit(value: Any, name: str, expected: str) -> None:

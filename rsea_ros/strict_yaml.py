@@ -26,7 +26,8 @@ DEEPEST = 16
 _CONSTANTS: dict[str, Any] = dict.fromkeys(("", "~", "null", "Null", "NULL"))
 _CONSTANTS |= {
     spelling: value
-    for word, value in (("true", True), ("yes", True), ("on", True), ("false", False), ("no", False), ("off", False))
+    for words, value in ((("true", "yes", "on"), True), (("false", "no", "off"), False))
+    for word in words
     for spelling in (word, word.capitalize(), word.upper())
 }  # fmt: skip
 _CONSTANTS |= {
@@ -59,6 +60,7 @@ class Document:
     def where(self, field: str) -> str:
         """Return `line 7: ` of a dotted field such as `effects[0].name`, or of the nearest one above it."""
         way = tuple(re.findall(r"[^.\[\]]+", field))
+        way = way if way[:1] in self.lines else way[1:]  # `rig.colour` is the key `colour` of a whole rig
         while way and way not in self.lines:
             way = way[:-1]
         line = self.lines.get((*way, "value"), self.lines.get(way))
@@ -67,9 +69,9 @@ class Document:
 
 def read(path: Path) -> Document:
     """Read a file. Raises OSError, and FieldError with line, key, value and what was expected."""
+    if stat.S_ISFIFO(path.stat().st_mode):
+        raise FieldError("is a pipe, expected a file")
     with path.open("rb") as file:
-        if stat.S_ISFIFO(path.stat().st_mode):
-            raise FieldError("is a pipe, expected a file")
         data = file.read(LARGEST + 1)
     if len(data) > LARGEST:
         raise FieldError(f"more than {LARGEST} bytes, expected a file that a person wrote")
@@ -93,14 +95,34 @@ def parse(text: str) -> Document:
     return Document(content, lines)
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes every text that would not be read as the text that it is."""
+
+
+def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+    doubtful = any(pattern.fullmatch(text) for pattern in _DOUBTFUL.values())
+    style = "'" if doubtful or is_decimal(text) or text in _CONSTANTS else None
+    style = '"' if any(mark in text for mark in "\x85\u2028\u2029") else style  # line breaks, to YAML
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _quoted)
+
+
+def dump(document: Mapping[str, Any]) -> str:
+    """Return the text that `parse` reads as the document."""
+    return str(yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True))
+
+
 def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
     """Yield the events that carry content; refuse what the module does not read."""
     depth = 0
     for event in events:
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
             raise _refusal(event, "an anchor or alias (& or *), expected the value written out")
-        if getattr(event, "tag", None) not in (None, "!"):
-            raise FieldError(f"not YAML: line {event.start_mark.line + 1}: tag {shown(event.tag)}, expected none")
+        tag = getattr(event, "tag", None)
+        if tag not in (None, "!"):
+            raise FieldError(f"not YAML: line {_line(event)}: tag {shown(tag)}, expected none")
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > DEEPEST:
@@ -111,7 +133,7 @@ def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
 
 def _value(event: yaml.Event, events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> Any:
     """Return the value that begins with an event, taking what belongs to it from the events after it."""
-    lines.setdefault(way, event.start_mark.line + 1)
+    lines.setdefault(way, _line(event))
     if isinstance(event, yaml.ScalarEvent):
         return _scalar(event, ".".join(way) or "value")
     if isinstance(event, yaml.MappingStartEvent):
@@ -131,7 +153,7 @@ def _mapping(events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> d
         name = (*way, str(key))
         if name in lines:
             raise _refusal(event, f"key {shown(key)} stands twice, first in line {lines[name]}")
-        lines[name] = event.start_mark.line + 1
+        lines[name] = _line(event)
         body[key] = _value(next(events), events, name, lines)
     return body
 
@@ -161,4 +183,8 @@ def _scalar(event: yaml.ScalarEvent, key: str) -> Any:
 
 
 def _refusal(event: yaml.Event, what: str) -> FieldError:
-    return FieldError(f"line {event.start_mark.line + 1}: {what}")
+    return FieldError(f"line {_line(event)}: {what}")
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1 if event.start_mark else 0

@@ -13,6 +13,7 @@ _SAME = {
     "μm": "um",
     "rev/min": "rpm",
     "N m/(rad/s)": "N m s/rad",
+    "Nm/(rad/s)": "N m s/rad",
     "-": "1",
     "1/1": "1",
 }

@@ -43,13 +43,21 @@ OWN = {
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
-    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "rcl_interfaces",
-    "rosgraph_msgs", "rosidl_runtime_py", "sensor_msgs", "std_msgs", "std_srvs",
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "lifecycle_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "rosidl_runtime_py",
+    "sensor_msgs",
+    "std_msgs",
+    "std_srvs",
 }
 FOREIGN = {
     "strict_yaml": {"yaml"},
     "effects": NUMERIC,
-    "model": NUMERIC | {"yaml"},
+    "model": NUMERIC,
     "identification": NUMERIC | {"threadpoolctl"},
     "diagnosis": NUMERIC,
     "control": NUMERIC,

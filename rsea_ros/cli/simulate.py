@@ -8,9 +8,11 @@ import numpy as np
 
 from msg_adapters import write_record
 from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.decimal_number import is_decimal
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
+from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -70,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the bag."""
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
+    check_effects(rig.effects)
     settings = Settings(
         rate=args.rate,
         duration=args.duration,
@@ -96,14 +99,17 @@ def parse_effect(text: str) -> EffectSetting:
     """Return the setting of `NAME:param=value,…`. Raises ParameterError for what is not of that form."""
     name, _, rest = text.partition(":")
     effect = effect_named(name)
-    values = dict(effect.typical)
+    values: dict[str, float] = {}
     for item in filter(None, rest.split(",")):
-        key, _, value = item.partition("=")
-        try:
-            values[key.strip()] = float(value)
-        except ValueError:
+        key, _, value = (part.strip() for part in item.partition("="))
+        if not is_decimal(value):
+            bounds = "".join(f" ({p.name}: {p.bounds})" for p in effect.parameters if p.name == key)
             raise ParameterError(
-                f"--effect {text}: {key.strip()} = {value!r}, expected NAME:param=value with a number in SI"
-            ) from None
-    effect.vector(values)
-    return EffectSetting(name, values)
+                f"--effect {text}: {key} = {value!r}, expected NAME:param=value with a number in SI{bounds}"
+            )
+        if key in values:
+            raise ParameterError(f"--effect {text}: {key} is given twice, expected once")
+        values[key] = float(value)
+    complete = effect.typical | values
+    effect.check(complete)
+    return EffectSetting(name, complete)

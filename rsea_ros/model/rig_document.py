@@ -12,6 +12,7 @@ from typing import Any
 
 from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
 from rsea_ros.errors import FieldError, RigError
+from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
     END_NAMES,
     FIELDS,
@@ -147,7 +148,9 @@ def _quantity(name: str, item: Any) -> Quantity:
     check_value(name, value, where="value")
     spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
     if not 0.0 <= spread < 10.0:
-        raise RigError(f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread")
+        raise RigError(
+            f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
+        )
     ci95 = _interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
     return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
 
@@ -197,7 +200,8 @@ def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
     for i, item in enumerate(items):
         if item not in stated:
             raise RigError(
-                f"known: {shown(item)}, expected a value that this rig states: {', '.join(stated)}", f"known[{i}]"
+                f"known: {shown(item)}, expected a value that this rig states: {', '.join(stated)}",
+                f"known[{i}]",
             )
     return frozenset(items)
 
@@ -228,4 +232,5 @@ def _effects(items: Any) -> tuple[EffectSetting, ...]:
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
         settings.append(EffectSetting(text(body.get("name", ""), f"effects[{i}].name"), values))
+    check_effects(settings)
     return tuple(settings)

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-import yaml
-
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, RigError
 from rsea_ros.model.rig import Rig
@@ -69,7 +67,7 @@ def save_rig(rig: Rig, path: str | Path) -> None:
     """
     path = Path(path)
     aside = path.with_name(path.name + ".partial")
-    text = yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True)
+    text = strict_yaml.dump(rig_to_document(rig))
     try:
         aside.write_text(text, encoding="utf-8")
         os.replace(aside, path)
