@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress", "wording", "units", "decimal_number", "checked", "strict_yaml"}
+YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
+BASE = {"errors", "signals", "progress", "wording"} | YAML
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
@@ -21,6 +22,7 @@ OWN = {
     "wording": set(),
     "units": set(),
     "decimal_number": set(),
+    "keys": set(),
     "checked": {"errors", "units", "wording"},
     "strict_yaml": {"errors", "decimal_number", "wording"},
     "effects": BASE,

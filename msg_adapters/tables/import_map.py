@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from msg_adapters.tables.keys import CHANNEL, MAP, NEEDED, RATES, TERM, TIME, WHERE, Key
+from msg_adapters.tables.keys import CHANNEL, MAP, RATES, TERM, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
+from rsea_ros.keys import NEEDED, Key
 from rsea_ros.wording import shown
 
 LARGEST = 1e300

@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from msg_adapters.tables.units import CHANNELS, FACTORS
+from rsea_ros.keys import NEEDED, Key, table
 
-NEEDED = "needed"
 RATES = (1e-3, 1e6)
 """Hz, of a file without stamps."""
-
-
-@dataclass(frozen=True)
-class Key:
-    """A key of a mapping: what it expects, what holds where it is left out, what it means."""
-
-    name: str
-    expects: str
-    default: str
-    meaning: str
-
 
 MAP = (
     Key("about", "text", "empty", "one line that goes into the bag's notes"),
@@ -52,7 +40,7 @@ TERM = (
     Key("scale", "number", "1", "SI unit of the channel for each SI unit of the column"),
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
 )
-CHANNEL = tuple(Key(name, dimension, "not measured", "") for name, dimension in CHANNELS.items())
+CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())
 SECTIONS: Mapping[str, Sequence[Key]] = {
     "map": MAP,
     "time": TIME,
@@ -64,18 +52,6 @@ SECTIONS: Mapping[str, Sequence[Key]] = {
 
 def tables() -> str:
     """Return the tables of docs/import.md in Markdown: all keys, then all units."""
-    parts = []
-    for section, keys in SECTIONS.items():
-        rows = [
-            f"| `{k.name}` | {k.expects.replace('|', chr(92) + '|')} | {k.default} | {k.meaning} |"
-            for k in keys
-        ]
-        parts.append(
-            "\n".join(
-                [f"`{section}`:", "", "| key | expects | without it | meaning |", "|---|---|---|---|", *rows]
-            )
-        )
-    units = [
-        f"| {name} | {', '.join(f'`{unit}`' for unit in factors)} |" for name, factors in FACTORS.items()
-    ]
-    return "\n\n".join([*parts, "\n".join(["| dimension | units |", "|---|---|", *units])]) + "\n"
+    rows = [f"| {name} | {', '.join(f'`{unit}`' for unit in factors)} |" for name, factors in FACTORS.items()]
+    units = "\n".join(["| dimension | units |", "|---|---|", *rows])
+    return "\n".join([*(table(section, keys) for section, keys in SECTIONS.items()), units]) + "\n"

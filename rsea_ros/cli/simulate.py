@@ -17,6 +17,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
+from rsea_ros.wording import shown
 
 HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
 
@@ -100,15 +101,16 @@ def parse_effect(text: str) -> EffectSetting:
     name, _, rest = text.partition(":")
     effect = effect_named(name)
     values: dict[str, float] = {}
+    cut = shown(text)[1:-1]
     for item in filter(None, rest.split(",")):
         key, _, value = (part.strip() for part in item.partition("="))
         if not is_decimal(value):
             bounds = "".join(f" ({p.name}: {p.bounds})" for p in effect.parameters if p.name == key)
             raise ParameterError(
-                f"--effect {text}: {key} = {value!r}, expected NAME:param=value with a number in SI{bounds}"
+                f"--effect {cut}: {key[:40]} = {shown(value)}, expected NAME:param=value with a number in SI{bounds}"
             )
         if key in values:
-            raise ParameterError(f"--effect {text}: {key} is given twice, expected once")
+            raise ParameterError(f"--effect {cut}: {key} is given twice, expected once")
         values[key] = float(value)
     complete = effect.typical | values
     effect.check(complete)

@@ -15,6 +15,7 @@ from numba import cfunc, types
 
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
+from rsea_ros.wording import shown
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
@@ -127,7 +128,7 @@ class Effect:
         expected = f"expected {', '.join(names)}"
         for name in parameters:
             if name not in names:
-                raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, {expected}")
+                raise ParameterError(f"effect {self.name}: unknown parameter {shown(name)}, {expected}")
         full = self.complete(parameters)
         for name in names:
             if name not in full:

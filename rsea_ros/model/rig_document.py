@@ -12,6 +12,7 @@ from typing import Any
 
 from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
 from rsea_ros.errors import FieldError, RigError
+from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
     END_NAMES,
@@ -24,25 +25,12 @@ from rsea_ros.model.rig import (
     Sensor,
     check_value,
 )
+from rsea_ros.model.rig_keys import CLOCK, CONTROLLER, EFFECT, GROUPS, QUANTITY, SENSOR, SWITCHES, TOP
 from rsea_ros.signals import UNITS
 from rsea_ros.wording import shown
 
-_GROUPS = sorted({name.split(".")[0] for name in FIELDS})
-_TOP = {
-    "name",
-    "about",
-    "source",
-    "known",
-    "proximal",
-    "ft_end",
-    "sensors",
-    "controller",
-    "effects",
-    *_GROUPS,
-}
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
-_SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -54,8 +42,8 @@ def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") ->
 
 
 def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
-    only_keys(document, _TOP, "rig")
-    groups = {g: mapping(document.get(g, {}), g) for g in _GROUPS}
+    only_keys(document, names(TOP), "rig")
+    groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
     clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
@@ -129,7 +117,7 @@ def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
 
 
 def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
-    switches = _SWITCHES.get(group, set())
+    switches = names(SWITCHES.get(group, ()))
     allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
     only_keys(body, allowed | switches, group)
     return [
@@ -142,7 +130,7 @@ def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity
 def _quantity(name: str, item: Any) -> Quantity:
     field: Field = FIELDS[name]
     body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
-    only_keys(body, {"value", "unit", "spread", "source", "ci95"}, name)
+    only_keys(body, names(QUANTITY), name)
     unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
     check_value(name, value, where="value")
@@ -166,7 +154,7 @@ def _clock(fields: Mapping[str, Any], name: str) -> float:
     """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, {"value", "unit"}, field)
+    only_keys(item, names(CLOCK), field)
     unit(item.get("unit"), f"{field}.unit", "s")
     value = number(item.get("value"), f"{field}.value", "s")
     if not abs(value) < _LATEST:
@@ -179,7 +167,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     sensors = {}
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown", "clock"}, f"sensors.{name}")
+        only_keys(fields, names(SENSOR), f"sensors.{name}")
         unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
         noise, quantum = (
             number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
@@ -210,7 +198,7 @@ def _controller(item: Any) -> Controller | None:
     if item is None:
         return None
     body = mapping(item, "controller")
-    only_keys(body, {"k_p", "k_v", "limit", "source"}, "controller")
+    only_keys(body, names(CONTROLLER), "controller")
     k_p = number(body.get("k_p"), "controller.k_p", "1/s")
     k_v = number(body.get("k_v"), "controller.k_v", "N m s/rad")
     limit = number(body.get("limit", math.inf), "controller.limit", "N m")
@@ -228,7 +216,7 @@ def _effects(items: Any) -> tuple[EffectSetting, ...]:
     settings = []
     for i, item in enumerate(items):
         body = mapping(item, f"effects[{i}]")
-        only_keys(body, {"name", "parameters", "ci95"}, f"effects[{i}]")
+        only_keys(body, names(EFFECT), f"effects[{i}]")
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
         settings.append(EffectSetting(text(body.get("name", ""), f"effects[{i}].name"), values))
