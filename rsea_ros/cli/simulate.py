@@ -106,9 +106,8 @@ def parse_effect(text: str) -> EffectSetting:
         key, _, value = (part.strip() for part in item.partition("="))
         if not is_decimal(value):
             bounds = "".join(f" ({p.name}: {p.bounds})" for p in effect.parameters if p.name == key)
-            raise ParameterError(
-                f"--effect {cut}: {key[:40]} = {shown(value)}, expected NAME:param=value with a number in SI{bounds}"
-            )
+            expected = f"expected NAME:param=value with a number in SI{bounds}"
+            raise ParameterError(f"--effect {cut}: {key[:40]} = {shown(value)}, {expected}")
         if key in values:
             raise ParameterError(f"--effect {cut}: {key} is given twice, expected once")
         values[key] = float(value)

@@ -40,7 +40,8 @@ def effect_named(name: str) -> Effect:
         return importlib.import_module(f"rsea_ros.effects.{name}").EFFECT  # type: ignore[no-any-return]
     effects = catalogue()
     if name not in effects:
-        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {', '.join(effects)}")
+        known = ", ".join(effects)
+        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}")
     return effects[name]
 
 
