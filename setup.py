@@ -1,5 +1,10 @@
-"""The ament_python package; what package.xml says stands only there."""
+"""The ament_python package, and the wheel for those who have only Python.
 
+What package.xml says stands only there. A colcon workspace gets the nodes as executables for `ros2 run`; a
+wheel gets `rsea` alone: names such as `driver` belong to nobody's PATH.
+"""
+
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -9,12 +14,19 @@ NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME
+IS_WHEEL = not {"bdist_wheel", "dist_info"}.isdisjoint(sys.argv)
 
 
 def tree(top: str) -> list[tuple[str, list[str]]]:
     """Return the files under a directory as data files of the package's share."""
     files = sorted(path for path in Path(top).rglob("*") if path.is_file() and path.suffix != ".pyc")
     return [(str(SHARE / path.parent), [str(path)]) for path in files]
+
+
+def requirements() -> list[str]:
+    """Return what runs, the first part of requirements.in; what tests and checks stands after it."""
+    running = Path("requirements.in").read_text(encoding="utf-8").partition("# What tests")[0]
+    return [line for line in running.splitlines() if line and not line.startswith("#")]
 
 
 setup(
@@ -26,20 +38,20 @@ setup(
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["rsea_ros*", "msg_adapters*"]),
     python_requires=">=3.10",
-    install_requires=["setuptools"],
+    install_requires=requirements(),
     zip_safe=False,
-    package_data={"rsea_ros.report": ["*.css", "*.js"]},
+    package_data={"": ["py.typed"], "rsea_ros.report": ["*.css", "*.js"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (str(SHARE), ["package.xml"]),
-        ("bin", ["launcher/installed/rsea"]),
+        *([] if IS_WHEEL else [("bin", ["launcher/installed/rsea"])]),
         *tree("config"),
         *tree("launch"),
     ],
     entry_points={
         "console_scripts": [
             "rsea = rsea_ros.cli.main:main",
-            *(f"{node} = rsea_ros.nodes.{node}:main" for node in NODES),
+            *(f"{node} = rsea_ros.nodes.{node}:main" for node in NODES if not IS_WHEEL),
         ]
     },
 )

@@ -12,6 +12,7 @@ from independent.hidden import MAIN_PARAMETER
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -94,7 +95,8 @@ def run_case(case: Case, rig_name: str = "paper_high_impedance") -> Outcome:
     """Diagnose a case and set the result beside the truth; an exception is an outcome too."""
     start = time.perf_counter()
     try:
-        diagnosis = diagnose([case.record], load_rig(rig_name), without=case.without)
+        settings = DiagnosisSettings(without=case.without)
+        diagnosis = diagnose([case.record], load_rig(rig_name), settings=settings)
     except Exception:
         told = traceback.format_exc(limit=-3)
         named = ()

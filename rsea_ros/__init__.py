@@ -1,11 +1,67 @@
-"""Torque control of rotary series elastic actuators: model, identification, diagnosis, nodes."""
+"""Torque control of rotary series elastic actuators: model, identification, diagnosis, nodes.
 
-import os
+    import rsea_ros as rsea
+
+    data = rsea.Record.from_arrays(t, command=u, ft=tau, position=q)
+    fit = rsea.identify(data, rsea.load_rig("paper_high_impedance"))
+    print(fit.summary())
+
+Every name of the door is imported when it is first used; none of them needs ROS.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from rsea_ros.compiler_cache import choose_cache
 
-# Matrices here are small and the program's own threads use the cores: a second pool only gets in the way.
-for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
+if TYPE_CHECKING:
+    from rsea_ros import effects
+    from rsea_ros.control.controller import TorqueController
+    from rsea_ros.diagnosis.settings import DiagnosisSettings
+    from rsea_ros.errors import RseaError
+    from rsea_ros.library.bags import read_bag
+    from rsea_ros.library.diagnosed import diagnose
+    from rsea_ros.library.fit import identify
+    from rsea_ros.library.simulating import simulate
+    from rsea_ros.model.observer.observer import Observer
+    from rsea_ros.model.prediction import predict
+    from rsea_ros.model.rig import Rig
+    from rsea_ros.model.rig_file import load_rig
+    from rsea_ros.signals import Record
+
+DOOR = {
+    "DiagnosisSettings": "diagnosis.settings",
+    "Observer": "model.observer.observer",
+    "Record": "signals",
+    "Rig": "model.rig",
+    "RseaError": "errors",
+    "TorqueController": "control.controller",
+    "diagnose": "library.diagnosed",
+    "effects": "effects",
+    "identify": "library.fit",
+    "load_rig": "model.rig_file",
+    "predict": "model.prediction",
+    "read_bag": "library.bags",
+    "simulate": "library.simulating",
+}
+"""The names that `import rsea_ros` offers, and the module of each."""
+
+__all__ = [
+    "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "diagnose", "effects",
+    "identify", "load_rig", "predict", "read_bag", "simulate",
+]  # fmt: skip
 
 choose_cache()
+
+
+def __getattr__(name: str) -> Any:
+    if name not in DOOR:
+        raise AttributeError(f"module 'rsea_ros' has no attribute {name!r}; it offers {', '.join(DOOR)}")
+    module = import_module(f"rsea_ros.{DOOR[name]}")
+    value = module if name == "effects" else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(DOOR)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -54,8 +55,10 @@ class Channel:
             raise ChannelError(
                 f"stamps of shape {self.t.shape} for values of shape {self.y.shape}, expected equal (n,)"
             )
-        for array in (self.t, self.y):
-            array.setflags(write=False)
+        for name in ("t", "y"):
+            frozen = getattr(self, name).view()
+            frozen.flags.writeable = False
+            object.__setattr__(self, name, frozen)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -111,6 +114,36 @@ class Record:
                 f"{self.source}: unknown channel {sorted(unknown)[0]!r}, expected one of {', '.join(UNITS)}"
             )
         object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+
+    @classmethod
+    def from_arrays(cls, t: npt.ArrayLike, *, source: str = "arrays", **channels: npt.ArrayLike) -> Record:
+        """Return a record of channels that share their stamps; the values are copied.
+
+        t: stamps, s, shape (n,), rising. channels: values by name of UNITS (or an alias such as `q`, `u`,
+        `tau`), in SI, shape (n,): arrays, lists or columns of a table.
+        Raises ChannelError for an unknown name, another shape, or stamps that do not rise.
+        """
+        from rsea_ros.arrays import record_from_arrays
+
+        return record_from_arrays(t, source, channels)
+
+    @classmethod
+    def from_dataframe(
+        cls, table: Any, columns: Mapping[str, str], *, time: str = "t", source: str = "table"
+    ) -> Record:
+        """Return a record of a table's columns (pandas, Polars, or any mapping of columns).
+
+        columns: the column of each channel, `{"command": "tau_cmd", "ft": "tau_ft"}`. time: the column of
+        the stamps, s. Raises ChannelError as from_arrays does, and for a column that the table lacks.
+        """
+        from rsea_ros.arrays import record_from_table
+
+        return record_from_table(table, columns, time, source)
+
+    def __repr__(self) -> str:
+        """Return source, duration and the rate of each channel in one line."""
+        rates = ", ".join(f"{name} {channel.rate:.4g} Hz" for name, channel in self.channels.items())
+        return f"Record({self.source!r}, {self.stop - self.start:.4g} s: {rates})"
 
     def __contains__(self, name: str) -> bool:
         return name in self.channels

@@ -12,7 +12,7 @@ import hypothesis
 import pytest
 from xdist.scheduler import LoadFileScheduling
 
-import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")

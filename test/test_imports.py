@@ -17,7 +17,7 @@ BASE = {"errors", "signals", "progress", "wording"} | YAML
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
-    "signals": {"errors"},
+    "signals": {"errors", "arrays"},
     "progress": set(),
     "wording": set(),
     "units": set(),
@@ -34,11 +34,14 @@ OWN = {
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
+    "arrays": {"errors", "signals"},
+    "one_thread": set(),
     "report": CORE,
-    "nodes": CORE | {"hardware", "report", "msg_adapters"},
-    "cli": CORE | {"hardware", "report", "msg_adapters", "nodes"},
+    "library": CORE | {"report", "msg_adapters"},
+    "nodes": CORE | {"hardware", "report", "msg_adapters", "one_thread"},
+    "cli": CORE | {"hardware", "report", "msg_adapters", "nodes", "one_thread"},
     "__main__": {"cli"},
-    "__init__": {"compiler_cache"},
+    "__init__": CORE | {"compiler_cache", "library"},
     "compiler_cache": set(),
 }
 """Layers of this project that a layer may import beside itself."""
@@ -65,6 +68,8 @@ FOREIGN = {
     "control": NUMERIC,
     "design": NUMERIC,
     "signals": {"numpy"},
+    "arrays": {"numpy"},
+    "library": {"numpy", "plotly", "rich"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},

@@ -11,6 +11,7 @@ from msg_adapters.overlay import write_overlay
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
+from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.errors import ParameterError
 from rsea_ros.signals import Record
 
@@ -30,6 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
     add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG)")
     add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help="effects not to try")
+    most = "causes at most (default %(default)s)"
+    add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
     add("--json", action="store_true", help="print diagnosis.json to stdout and nothing else")
     add(
         "--fail-on",
@@ -57,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
-        without = [effect_named(name).name for name in args.without]
-        result = diagnose(records, rig, holdout, tell, without)
+        without = tuple(effect_named(name).name for name in args.without)
+        result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
         report = write_diagnosis(result, records[0], out, write_overlay)
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")

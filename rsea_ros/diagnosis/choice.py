@@ -77,6 +77,13 @@ def is_near(model: Model, best: Model) -> bool:
     return float(model.choose.loss(best.choose).sum()) < room**2 * float(best.choose.loss(best.choose).sum())
 
 
+def as_well(model: Model, other: Model) -> bool:
+    """Tell whether a model loses no more than another on the blocks that choose, within a tenth."""
+    return float(model.choose.loss(other.choose).sum()) < (1.0 + _ROOM) * float(
+        other.choose.loss(other.choose).sum()
+    )
+
+
 def is_far(model: Model) -> bool:
     """Tell whether a model is far from the floor in its worst channel."""
     return worst(model) >= _FAR

@@ -15,7 +15,7 @@ from rsea_ros.diagnosis.faults import Checked
 from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.sentences import coherence_lost, evidence_of, verdict_sentence
+from rsea_ros.diagnosis.sentences import coherence_lost, evidence_of, on_measured_angle, verdict_sentence
 from rsea_ros.diagnosis.split import JUDGE, Score, score_on
 from rsea_ros.diagnosis.stages import Stage
 from rsea_ros.diagnosis.trial import Trial
@@ -93,6 +93,7 @@ def conclusion(
         statements=(
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
             *coherence_lost(lost_above(case, channel), channel),
+            *on_measured_angle(last.solution.problem),
         ),
     )
 

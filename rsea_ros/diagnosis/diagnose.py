@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from rsea_ros.diagnosis.conclusion import conclusion
 from rsea_ros.diagnosis.faults import check
 from rsea_ros.diagnosis.pruning import pruned
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.search import search
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stages import judged
 from rsea_ros.diagnosis.workers import workers
 from rsea_ros.effects.catalogue import catalogue
@@ -24,14 +25,15 @@ def diagnose(
     rig: Rig,
     holdout: Record | None = None,
     progress: Progress | None = None,
-    without: Collection[str] = (),
+    settings: DiagnosisSettings | None = None,
 ) -> Diagnosis:
     """Say where a rig's simulation and the records part, why, and what extending the model gains.
 
     holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
-    without: effects of the catalogue that are not to be tried.
+    settings: what is tried, DiagnosisSettings() by default.
     Raises IdentificationError when the records do not hold what the rig needs.
     """
+    settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
     rig = nominal_rig(rig)
@@ -39,9 +41,9 @@ def diagnose(
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
-    effects = [e for name, e in catalogue().items() if name not in without]
+    effects = [e for name, e in catalogue().items() if name not in settings.without]
     with workers() as at_work:
-        found = search(cases, nominal, effects, at_work, tell)
+        found = search(cases, nominal, effects, at_work, tell, settings.max_causes)
         tell("looking for a simpler model", 0.9)
         found = pruned(found, effects, at_work)
         tell("judging", 0.95)

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import at_bound, choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.choice import as_well, at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, quicker, refitted
 from rsea_ros.diagnosis.hints import Seen, Start, starts_of
 from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
-from rsea_ros.diagnosis.split import FIT
+from rsea_ros.diagnosis.judge import compare
+from rsea_ros.diagnosis.split import CHOOSE, FIT, score_on
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers
@@ -72,6 +73,10 @@ class Round:
         finalists = self._finalists(screened)
         models = list(self.at_work.fits.map(self._fit_all, finalists))
         better = [m for m in models if is_progress(m, self.present)]
+        if not better:
+            finalists += self._hopeful(screened, finalists)
+            models += self.at_work.fits.map(self._fit_all, finalists[len(models) :])
+            better = [m for m in models if is_progress(m, self.present)]
         if not better and len(self.present.causes) <= _BESIDE_A_PAIR and is_far(self.present):
             better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
         chosen, equals = choose(better, self.present.choose)
@@ -79,6 +84,24 @@ class Round:
         trials = [self._far_behind(h) for h in screened if h.name not in final]
         trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
         return Played(chosen, trials, equals)
+
+    def _hopeful(self, screened: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return the effects that were left out but surely help, unfitted, on blocks that took no part.
+
+        The pieces are few: where an effect is small, which of them it shows in is chance.
+        """
+        names = {h.name for h in tried}
+        left_out = [h for h in screened if h.name not in names]
+        helps = self.at_work.fits.map(self._surely_helps, left_out)
+        return [h for h, is_sure in zip(left_out, helps, strict=True) if is_sure]
+
+    def _surely_helps(self, h: Hypothesis) -> bool:
+        """Tell whether an effect as it was fitted to the pieces does better on the blocks that choose."""
+        problem, theta = self._with_clocks(h)
+        outputs = [problem.outputs(start) for start in self._starts_of_all(theta)]
+        scores = [score_on(problem, self.cases, CHOOSE, simulated) for simulated in outputs]
+        extra = len(theta) - self.present.parameters
+        return any(compare(score, self.present.choose, extra).sure for score in scores)
 
     def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
         """Return models with two more effects, for where none helps alone: each of some with every other."""
@@ -156,9 +179,13 @@ class Round:
         masked = on_places(problem, self.cases, FIT, weights)
         masked = quicker(masked) if far else masked
         start = min(self._starts_of_all(theta), key=lambda t: power(masked.residual(t)))
-        first = fitted(
-            self.cases, problem, start, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
+        fit = partial(
+            fitted, self.cases, iterations=_FULL_ITERATIONS, weights=weights, run=run, quick=far
         )
+        first = fit(problem, start)
+        if problem.ride:
+            free = fit(replace(problem, ride=False), first.solution.theta)
+            first = free if as_well(free, first) else first
         return refitted(self.cases, first, run, quick=is_far(first)) if self._has_moved(first) else first
 
     def _starts_of_all(self, theta: FloatArray) -> list[FloatArray]:

@@ -18,7 +18,7 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.progress import Progress
 
 _FIRST_ITERATIONS = 25
-_MOST_CAUSES, _MOST_EXCHANGES = 4, 2
+_MOST_EXCHANGES = 2
 
 
 @dataclass(frozen=True)
@@ -44,19 +44,24 @@ class Search:
 
 
 def search(
-    cases: tuple[Case, ...], nominal: Problem, effects: Sequence[Effect], at_work: Workers, tell: Progress
+    cases: tuple[Case, ...],
+    nominal: Problem,
+    effects: Sequence[Effect],
+    at_work: Workers,
+    tell: Progress,
+    max_causes: int,
 ) -> Search:
-    """Find the causes among some effects, most telling first."""
+    """Find up to max_causes causes among some effects, most telling first."""
     models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS, run=at_work.run)]
     cases = requieted(cases, models[0])
     models = [refitted(cases, models[0], at_work.run)]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
-    for number in range(_MOST_CAUSES + _MOST_EXCHANGES):
+    for number in range(max_causes + _MOST_EXCHANGES):
         present, played = models[-1], NOTHING
         if at_floor(present, cases):
             break
-        if len(present.causes) < _MOST_CAUSES:
+        if len(present.causes) < max_causes:
             played = Round(cases, effects, present, number, at_work, tell).play()
             trials += played.trials
         if played.accepted is None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.problem import Problem
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
@@ -57,6 +58,16 @@ def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
     return (
         f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
         "most of it is noise there, and what these data say of those frequencies is said by chance.",
+    )
+
+
+def on_measured_angle(problem: Problem) -> tuple[str, ...]:
+    """Return what a reader must know of a model that was simulated on the measured rotor angle."""
+    if not problem.ride:
+        return ()
+    return (
+        "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "
+        "settles in other detents, so `rsea predict` will show a larger residual than the gain here.",
     )
 
 

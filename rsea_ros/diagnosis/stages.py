@@ -49,6 +49,5 @@ def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig, run:
     case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
     moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
     moved = in_phase(moved, judging.record)
-    return Stage(
-        model.solution, model.outputs, train, score(problem, (case,), simulated((case,), moved, offsets))
-    )
+    outputs = simulated((case,), moved, offsets, ride=problem.ride)
+    return Stage(model.solution, model.outputs, train, score(problem, (case,), outputs))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -51,8 +52,8 @@ def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length:
 
 
 def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
-    """Return the part of a case between two times since its start, s."""
-    first, last = int(begin / drive.step), int(end / drive.step)
+    """Return the part of a case between two times since its start, s; it begins with a whole hold."""
+    first, last = int(begin / drive.step) // drive.hold * drive.hold, math.ceil(end / drive.step)
     start = drive.start + first * drive.step
     compared = start + _RUN_UP
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicHermiteSpline
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.step import OUTPUTS
@@ -34,8 +35,9 @@ class Drive:
     N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
     each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
-    initial: position (rad) and velocity (rad/s) at the start. origin, whole: when the drive begins in its
-    record and how long that is, s; they differ from 0 and `duration` when the drive is a piece of one.
+    initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
+    origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
+    `duration` when the drive is a piece of one.
     """
 
     step: float
@@ -46,6 +48,7 @@ class Drive:
     reference: FloatArray
     angle: FloatArray
     initial: tuple[float, float]
+    hold: int = 1
     origin: float = 0.0
     whole: float = math.nan
 
@@ -80,7 +83,8 @@ def drive_from(
             f"{record.source}: command has {len(command)} samples, expected at least 10"
         )
     period = _period(command.t)
-    step = period / (steps_per_sample(period) * refine)
+    hold = steps_per_sample(period) * refine
+    step = period / hold
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
     count = math.ceil((stop - start) / step - 1e-6)
@@ -90,7 +94,7 @@ def drive_from(
         torque = torque - np.interp(command.t, *_ty(record[made]))
     held = _mean_of_held(knots, torque, count)
     at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
-    ends = start + step * np.arange(1, count + 1)
+    ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step,
         start=start,
@@ -98,19 +102,21 @@ def drive_from(
         at=MappingProxyType(at),
         impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
-        angle=np.interp(ends, *_ty(record["position"])) if "position" in record else np.empty(0),
+        angle=_angle(record, ends),
         initial=(0.0, 0.0) if from_rest else _initial(record),
+        hold=hold,
     )
 
 
 def coarser(drive: Drive) -> Drive:
     """Return a drive on steps twice as long, for a first look: at half the cost four times the error.
 
-    One whose command mostly changes within such steps is returned as it is.
+    One whose command changes within such a step is returned as it is: the motor torque that is read there
+    would miss by the change.
     """
     steps = len(drive.command) // 2 * 2
     pairs = drive.command[:steps].reshape(-1, 2)
-    if np.mean(pairs[:, 0] == pairs[:, 1]) < 0.5:
+    if drive.hold % 2 or not np.array_equal(pairs[:, 0], pairs[:, 1]):
         return drive
     brought = np.concatenate([[0.0], np.cumsum(drive.command[:steps])])
 
@@ -127,6 +133,7 @@ def coarser(drive: Drive) -> Drive:
         impulse={n: i + beside(drive.at[n]) for n, i in drive.impulse.items()},
         reference=drive.reference[:steps:2],
         angle=drive.angle[1:steps:2],
+        hold=drive.hold // 2,
     )
 
 
@@ -155,6 +162,17 @@ def _initial(record: Record) -> tuple[float, float]:
     position, velocity = (record[n].y if n in record else np.zeros(2) for n in ("position", "velocity"))
     moved = _moved(position) or _moved(velocity)
     return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
+
+
+def _angle(record: Record, ends: FloatArray) -> FloatArray:
+    """Return the measured position at some times (s), by cubics where its speed is measured with it."""
+    if "position" not in record:
+        return np.empty(0)
+    t, q = _ty(record["position"])
+    if "velocity" in record and np.array_equal(record["velocity"].t, t):
+        spline = CubicHermiteSpline(t, q, record["velocity"].y)
+        return np.asarray(spline(np.clip(ends, t[0], t[-1])))
+    return np.interp(ends, t, q)
 
 
 def _moved(y: FloatArray) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal, get_args
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 
 Train = Literal["planetary", "star", "lumped"]
@@ -149,6 +150,16 @@ class Rig:
     def with_effects(self, *effects: EffectSetting) -> Rig:
         """Return the rig with exactly these effects acting."""
         return replace(self, effects=effects)
+
+    def with_effect(self, name: str, **parameters: float) -> Rig:
+        """Return the rig with one more effect of the catalogue acting, parameters in SI (see its file).
+
+        Parameters that are left out have their typical size. Raises ParameterError for an unknown one.
+        """
+        effect = effect_named(name)
+        setting = EffectSetting(name, {**effect.typical, **parameters})
+        effect.vector(setting.parameters)
+        return self.with_effects(*self.effects, setting)
 
     def free(self) -> tuple[str, ...]:
         """Return the names that a fit may move: stated with a spread, and not listed as known."""

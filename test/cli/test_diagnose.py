@@ -128,8 +128,8 @@ def test_bags_rig_and_holdout_reach_the_engine(quick, bag, record, tmp_path):
     other = str(tmp_path / "other.mcap")
     options = ["--holdout", other, "--rig", "pendulum", "--without", "backlash", "ft_bias"]
     main(["diagnose", run, other, *options, "--out", str(tmp_path / "out")])
-    ((records, rig, holdout, without),) = quick
-    assert without == ["backlash", "ft_bias"]
+    ((records, rig, holdout, settings),) = quick
+    assert settings.without == ("backlash", "ft_bias")
     assert [r.source for r in records] == [run, other] and holdout.source == other
     assert rig.name == "pendulum"
 

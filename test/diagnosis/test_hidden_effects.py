@@ -16,6 +16,7 @@ from independent.hidden import MAIN_PARAMETER, hide
 from independent.severities import SIZES, drawn_parameters
 
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
@@ -72,6 +73,6 @@ def test_what_the_catalogue_lacks_gets_no_name():
     concealed = conceal(36)
     claims = effect_named(concealed.effect).claims
     alike = {n for n, e in catalogue().items() if concealed.effect in e.claims.confusable_with}
-    without = {concealed.effect, *alike, *claims.confusable_with}
-    diagnosis = diagnose([concealed.record], load_rig("paper_high_impedance"), without=without)
+    settings = DiagnosisSettings(without=(concealed.effect, *alike, *claims.confusable_with))
+    diagnosis = diagnose([concealed.record], load_rig("paper_high_impedance"), settings=settings)
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())

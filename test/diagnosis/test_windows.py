@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rsea_ros.diagnosis.fitting import quicker
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.identify import CHANNELS
@@ -33,3 +37,23 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
             left = (piece.measured[name] - values)[mask] / piece.noise[name]
             assert mask.sum() > 100
             assert np.abs(left).max() < 6.0, (piece.start, name)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
+@pytest.mark.parametrize("rate", [250.0, 280.0, 500.0, 1000.0])
+def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_too(rate, jitter):
+    """Pieces that began within a hold gave the motor torque a whole command change: 2.5e7 for 2.5e4."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation("white_noise", Settings(rate=rate, duration=32.0, seed=5))
+    stamps = np.arange(len(command)) / rate
+    stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
+    record = synthesize(rig, Channel(stamps, command), seed=5)
+    case = case_from(record, rig)
+    sensors = {n: rig.sensors[n] for n in case.noise}
+    noise = {n: math.hypot(s.noise, s.quantum / math.sqrt(12.0)) for n, s in sensors.items()}
+    case = replace(case, noise=noise)
+    pieces = windows_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
+    assert len(pieces) > 5
+    for problem in (Problem(pieces, rig, (), CHANNELS), quicker(Problem(pieces, rig, (), CHANNELS))):
+        residual = problem.residual(np.zeros(0))
+        assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)

@@ -1,0 +1,78 @@
+"""An effect as its reader sees it: what it is, its equation, its parameters and its source."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+from rsea_ros.effects.effect import Effect, Parameter
+
+
+@dataclass(frozen=True)
+class EffectPage:
+    """An effect of the catalogue, shown as text, or as a table in a notebook."""
+
+    effect: Effect
+
+    @property
+    def name(self) -> str:
+        """The name in the contract."""
+        return self.effect.name
+
+    @property
+    def about(self) -> str:
+        """What it is, in a few words."""
+        return self.effect.about
+
+    @property
+    def equation(self) -> str:
+        """The equation in plain text."""
+        return self.effect.equation
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Parameters by name, with unit, bounds, typical size and the value at which the effect vanishes."""
+        return {p.name: p for p in self.effect.parameters}
+
+    @property
+    def description(self) -> str:
+        """The docstring of the effect's file: equation, meaning and source."""
+        return (sys.modules[_module(self.effect)].__doc__ or "").strip()
+
+    def __repr__(self) -> str:
+        """Return name, meaning, equation and parameters as text."""
+        rows = [
+            f"  {p.name} ({p.unit}): typical {p.typical:g}, vanishes at {p.null:g}, "
+            f"fitted within {p.low:g} to {p.high:g}"
+            for p in self.effect.parameters
+        ]
+        return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows])
+
+    def _repr_html_(self) -> str:
+        head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th></tr>"
+        rows = "".join(
+            f"<tr><td>{escape(p.name)}</td><td>{escape(p.unit)}</td><td>{p.typical:g}</td><td>{p.null:g}</td>"
+            f"<td>{p.low:g} to {p.high:g}</td></tr>"
+            for p in self.effect.parameters
+        )
+        description = escape(self.description)
+        return f"<h4>{escape(self.name)}</h4><table>{head}{rows}</table><pre>{description}</pre>"
+
+
+def catalogue_table(pages: Sequence[EffectPage]) -> str:
+    """Return an HTML table of effects: name, meaning, equation."""
+    head = "<tr><th>effect</th><th>what it is</th><th>equation</th></tr>"
+    rows = "".join(
+        f"<tr><td><b>{escape(p.name)}</b></td><td>{escape(p.about)}</td><td>{escape(p.equation)}</td></tr>"
+        for p in pages
+    )
+    return f"<table>{head}{rows}</table>"
+
+
+def _module(effect: Effect) -> str:
+    """Return the module of an effect: the file that holds its constant."""
+    packaged = f"rsea_ros.effects.{effect.name}"
+    holders = (name for name, module in sys.modules.items() if getattr(module, "EFFECT", None) is effect)
+    return packaged if packaged in sys.modules else next(holders, "rsea_ros.effects")

@@ -1,0 +1,101 @@
+"""`rsea.diagnose`: what a rig's simulation gets wrong, the causes, and the extended rig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rsea_ros.diagnosis.result import Cause, Diagnosis
+from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
+from rsea_ros.signals import Record
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+    from rsea_ros.diagnosis.settings import DiagnosisSettings
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis of records. `result` holds every value that the report shows; `record` is the first one."""
+
+    result: Diagnosis
+    record: Record
+
+    @property
+    def rig(self) -> Rig:
+        """The rig with its fitted values and with the causes as effects: the extended model."""
+        return self.result.extended_rig
+
+    @property
+    def verdict(self) -> str:
+        """`nothing_wrong`, `explained`, `partly_explained` or `unexplained`."""
+        return self.result.verdict
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The causes in the order in which they were accepted, each with `name`, `parameters` and gains."""
+        return self.result.causes
+
+    def summary(self) -> str:
+        """Return the verdict and what it rests on, as plain text."""
+        from rsea_ros.report.diagnosis_terminal import terminal_lines
+
+        return "\n".join(line.plain for line in terminal_lines(self.result))
+
+    def to_frame(self) -> Any:
+        """Return the parameters of the re-fitted rig as a DataFrame. Raises ParameterError without pandas."""
+        from rsea_ros.library.frames import parameter_frame
+
+        return parameter_frame(self.result.baseline)
+
+    def plot(self) -> Figure:
+        """Return each channel as measured, as simulated before, and with the causes, by plotly."""
+        from rsea_ros.library.figures import overlay_figure
+
+        return overlay_figure(self.result.before, self.result.after)
+
+    def write_report(self, directory: str | Path) -> Path:
+        """Write diagnosis.json, model.yaml, overlay.mcap and report.html; return the report's path."""
+        from msg_adapters.overlay import write_overlay
+        from rsea_ros.report.diagnosis_files import write_diagnosis
+
+        return write_diagnosis(self.result, self.record, directory, write_overlay)
+
+    def __repr__(self) -> str:
+        """Return the verdict and the causes in one line."""
+        causes = ", ".join(cause.name for cause in self.causes) or "none"
+        return f"Diagnosed({self.result.rig_name}: {self.verdict}, causes: {causes})"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<pre>{escape(self.summary())}</pre>"
+
+
+def diagnose(
+    data: Record | Sequence[Record],
+    rig: Rig | str,
+    *,
+    holdout: Record | None = None,
+    settings: DiagnosisSettings | None = None,
+    progress: Progress | None = None,
+) -> Diagnosed:
+    """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
+
+    holdout: a record that takes part in no fit and no choice; without it, every fourth second of the records.
+    progress: hears a step's name and the share done. Raises IdentificationError for records that cannot be
+    diagnosed, RigError for the rig. Not to be confused with identify, which trusts the rig's structure.
+    """
+    from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
+    from rsea_ros.diagnosis.usable import check_diagnosable
+    from rsea_ros.library.inputs import records_of, rig_of
+
+    records = records_of(data)
+    for record in [*records, *([holdout] if holdout is not None else [])]:
+        check_diagnosable(record)
+    result = diagnose_records(records, rig_of(rig), holdout, progress, settings=settings)
+    return Diagnosed(result, records[0])

@@ -1,0 +1,86 @@
+"""`rsea.identify`: parameters with confidence from records, as an object that prints, tabulates and plots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.library.frames import parameter_frame, plain
+from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
+from rsea_ros.signals import Record
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A rig fitted to records. `result` holds every value that the report shows.
+
+    Not to be confused with a diagnosis: a fit moves the rig's values and assumes that its structure is right.
+    """
+
+    result: Identification
+
+    @property
+    def rig(self) -> Rig:
+        """The rig with the identified values and their intervals."""
+        return self.result.rig
+
+    @property
+    def parameters(self) -> dict[str, ParameterEstimate]:
+        """Estimates by name, SI, each with `value`, `ci95` and `unit`."""
+        return {p.name: p for p in self.result.parameters}
+
+    def summary(self) -> str:
+        """Return the table of parameters and what the data cannot determine, as plain text."""
+        from rsea_ros.report.terminal import terminal_table
+
+        return "\n".join([plain(terminal_table(self.result)), *self.result.statements])
+
+    def to_frame(self) -> Any:
+        """Return the parameters as a pandas DataFrame, one row each. Raises ParameterError without pandas."""
+        return parameter_frame(self.result.parameters)
+
+    def plot(self, response: int = 0) -> Figure:
+        """Return the measured and fitted frequency response, or the record where there is none, by plotly."""
+        from rsea_ros.library.figures import fit_figure
+
+        return fit_figure(self.result, response)
+
+    def write_report(self, directory: str | Path) -> Path:
+        """Write identification.json, model.yaml and report.html; return the report's path."""
+        from rsea_ros.report.results import write_results
+
+        return write_results(self.result, directory)
+
+    def __repr__(self) -> str:
+        """Return rig, fit and parameters in one line."""
+        fits = ", ".join(f"{n} {v:.2f} %" for n, v in self.result.fit_percent.items())
+        values = ", ".join(
+            f"{p.name} {p.value:.5g} {p.unit}"
+            for p in self.result.parameters
+            if not p.name.startswith("clock.")
+        )
+        return f"Fit({self.rig.name}: {values}; fit {fits})"
+
+    def _repr_html_(self) -> str:
+        from rsea_ros.report.parameters import parameter_table
+
+        return parameter_table(self.result.parameters)
+
+
+def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress | None = None) -> Fit:
+    """Fit a rig's free values to one record, or to several of the same bench.
+
+    rig: a rig, its file, or the name of one in config/rigs. progress: hears a step's name and the share done.
+    Raises IdentificationError for records from which the rig cannot be identified, RigError for the rig.
+    """
+    from rsea_ros.identification.identify import identify as identify_records
+    from rsea_ros.library.inputs import records_of, rig_of
+
+    return Fit(identify_records(records_of(data), rig_of(rig), progress))

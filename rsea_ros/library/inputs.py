@@ -1,0 +1,27 @@
+"""Arguments as people pass them: one record or several, a rig or its name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Record
+
+
+def records_of(data: Record | Sequence[Record]) -> list[Record]:
+    """Return one or several records as a list. Raises ParameterError for anything else."""
+    items: list[object] = [data] if isinstance(data, Record) else list(data)
+    records = [item for item in items if isinstance(item, Record)]
+    if len(records) < len(items):
+        kind = next(type(item).__name__ for item in items if not isinstance(item, Record))
+        raise ParameterError(f"data: {kind}, expected a Record (Record.from_arrays, rsea.read_bag)")
+    if not records:
+        raise ParameterError("data: no record, expected one or more")
+    return records
+
+
+def rig_of(rig: Rig | str) -> Rig:
+    """Return a rig given as such, by file or by name."""
+    return rig if isinstance(rig, Rig) else load_rig(rig)

@@ -1,0 +1,32 @@
+"""`rsea.simulate`: the record that a bench would log, from commands held at a rate."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.library.inputs import rig_of
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel, Record
+
+
+def simulate(
+    rig: Rig | str, command: npt.ArrayLike, rate: float = 280.0, *, seed: int = 0, noise: bool = True
+) -> Record:
+    """Return the record that a bench would have logged while it held each command for 1 / rate.
+
+    command: motor torque at the gear output, N m, shape (n,). rate: Hz. seed: of the sensors' noise; noise:
+    False for perfect sensors. Raises ParameterError for commands or a rate that make no sense.
+    """
+    values = np.array(command, dtype=np.float64)
+    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
+        raise ParameterError(
+            f"command: shape {values.shape}, expected (n,) finite torques in N m with n >= 2 samples"
+        )
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")
+    return synthesize(rig_of(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)

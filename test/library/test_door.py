@@ -1,0 +1,168 @@
+"""The door: `import rsea_ros as rsea` from arrays to a diagnosis, without ROS and without side effects."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import rsea_ros as rsea
+from rsea_ros import DOOR
+from rsea_ros.errors import ChannelError, ParameterError
+
+RATE = 280.0
+SECONDS = 12.0
+
+
+@pytest.fixture(scope="module")
+def commands() -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return 15.0 * rng.standard_normal(int(SECONDS * RATE))
+
+
+@pytest.fixture(scope="module")
+def record(commands) -> rsea.Record:
+    rig = rsea.load_rig("paper_high_impedance").with_values({"spring.stiffness": 1480.0})
+    return rsea.simulate(rig, commands, RATE, seed=1)
+
+
+@pytest.fixture(scope="module")
+def fit(record):
+    return rsea.identify(record, "paper_high_impedance")
+
+
+def in_a_fresh_interpreter(code: str) -> dict[str, object]:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    return json.loads(done.stdout)
+
+
+def test_importing_changes_no_variable_and_brings_neither_ros_nor_numerics():
+    seen = in_a_fresh_interpreter(
+        "import json, os, sys\n"
+        "before = dict(os.environ)\n"
+        "import rsea_ros as rsea\n"
+        "heavy = [m for m in ('rclpy', 'numpy', 'scipy', 'numba', 'control', 'plotly') if m in sys.modules]\n"
+        "changed = sorted(k for k in os.environ if before.get(k) != os.environ[k])\n"
+        "print(json.dumps({'heavy': heavy, 'changed': changed, 'names': dir(rsea)}))"
+    )
+    assert seen == {"heavy": [], "changed": [], "names": sorted(DOOR)}
+
+
+def test_every_name_of_the_door_opens_without_ros():
+    seen = in_a_fresh_interpreter(
+        "import json, sys\n"
+        "import rsea_ros as rsea\n"
+        "opened = [getattr(rsea, name) is not None for name in dir(rsea)]\n"
+        "print(json.dumps({'all': all(opened), 'ros': 'rclpy' in sys.modules}))"
+    )
+    assert seen == {"all": True, "ros": False}
+    assert set(rsea.__all__) == set(DOOR)
+
+
+def test_a_name_that_is_not_offered_is_refused_with_those_that_are():
+    with pytest.raises(AttributeError, match=r"no attribute 'simulat'; it offers .*simulate"):
+        _ = rsea.simulat
+
+
+def test_arrays_lists_and_aliases_make_the_same_record():
+    t, u = np.arange(4) / RATE, np.array([1.0, -2.0, 3.0, -4.0])
+    record = rsea.Record.from_arrays(t, command=u, ft=0.5 * u)
+    other = rsea.Record.from_arrays(list(t), u=list(u), tau=list(0.5 * u))
+    for name in ("command", "ft"):
+        np.testing.assert_array_equal(record[name].y, other[name].y)
+    assert repr(record) == "Record('arrays', 0.01071 s: command 280 Hz, ft 280 Hz)"
+
+
+def test_the_callers_arrays_stay_writable_and_are_not_shared():
+    t, u = np.arange(3) / RATE, np.ones(3)
+    record = rsea.Record.from_arrays(t, command=u)
+    u[0] = 7.0
+    assert record["command"].y[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        record["command"].y[0] = 7.0
+
+
+def test_stamps_may_count_from_any_epoch():
+    t = 1.7e9 + np.arange(1000) / RATE
+    record = rsea.Record.from_arrays(t, command=np.ones(1000))
+    assert record.start == 0.0
+    assert record["command"].rate == pytest.approx(RATE, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("t", "channels", "says"),
+    [
+        ([0.0, 1.0], {"torq": [1.0, 2.0]}, "unknown channel 'torq', expected one of command"),
+        ([0.0, 1.0], {"command": [1.0]}, "command has shape"),
+        ([0.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "command has 3 values for 2 stamps"),
+        ([0.0, 1.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "t[2] = 1 s after 1 s, expected stamps that rise"),
+        ([0.0, 1.0], {"command": ["a", "b"]}, "command is not an array of numbers"),
+        ([0.0, 1.0], {"command": [1, 2], "u": [1, 2]}, "name a channel twice"),
+        ([0.0, 1.0], {}, "no channel, expected one or more of command"),
+    ],
+)
+def test_arrays_that_make_no_record_are_refused(t, channels, says):
+    with pytest.raises(ChannelError) as error:
+        rsea.Record.from_arrays(t, **channels)
+    assert says in str(error.value)
+
+
+def test_a_table_gives_its_columns():
+    table = {"time": [0.0, 0.1, 0.2], "tau cmd": [1.0, 2.0, 3.0]}
+    record = rsea.Record.from_dataframe(table, {"command": "tau cmd"}, time="time")
+    np.testing.assert_array_equal(record["command"].y, [1.0, 2.0, 3.0])
+    with pytest.raises(ChannelError, match="no column 'torque'"):
+        rsea.Record.from_dataframe(table, {"command": "torque"}, time="time")
+
+
+def test_a_fit_recovers_the_stiffness_and_shows_itself(fit):
+    assert fit.parameters["spring.stiffness"].value == pytest.approx(1480.0, rel=0.01)
+    assert fit.rig["spring.stiffness"] == fit.parameters["spring.stiffness"].value
+    assert "spring.stiffness" in fit.summary() and "spring.stiffness" in repr(fit)
+    assert "<table>" in fit._repr_html_()
+    figure = fit.plot()
+    figure.update_layout(title="mine")
+    assert len(figure.data) > 3
+    with pytest.raises(ParameterError, match="response = 9"):
+        fit.plot(9)
+
+
+def test_a_diagnosis_names_the_effect_that_was_added(fit, commands, tmp_path):
+    worn = rsea.simulate(fit.rig.with_effect("backlash", gap=4e-3), commands, RATE, seed=2)
+    dx = rsea.diagnose(worn, fit.rig, settings=rsea.DiagnosisSettings(max_causes=1))
+    assert [cause.name for cause in dx.causes] == ["backlash"]
+    assert dx.causes[0].parameters["gap"].value == pytest.approx(4e-3, rel=0.05)
+    assert "backlash" in dx.summary().lower() and "backlash" in repr(dx)
+    assert [effect.name for effect in dx.rig.effects] == ["backlash"]
+    assert dx.write_report(tmp_path / "out").is_file()
+    assert len(dx.plot().data) >= 3
+
+
+@pytest.mark.parametrize("most", [0, -1])
+def test_a_diagnosis_may_have_no_fewer_than_one_cause(most):
+    with pytest.raises(ParameterError, match="max_causes"):
+        rsea.DiagnosisSettings(max_causes=most)
+
+
+def test_arguments_of_the_wrong_kind_are_named(record):
+    with pytest.raises(ParameterError, match="data: ndarray, expected a Record"):
+        rsea.identify([np.ones(3)], "paper_high_impedance")
+    with pytest.raises(ParameterError, match="command: shape"):
+        rsea.simulate("paper_high_impedance", [[1.0]])
+    with pytest.raises(ParameterError, match="rate = nan Hz"):
+        rsea.simulate("paper_high_impedance", [1.0, 2.0], rate=float("nan"))
+
+
+def test_the_catalogue_shows_equation_parameters_and_source():
+    page = rsea.effects["backlash"]
+    assert page.equation and "Nordin" in page.description
+    assert page.parameters["gap"].unit == "rad"
+    assert "backlash" in rsea.effects and len(rsea.effects) == len(list(rsea.effects))
+    assert "gap" in page._repr_html_() and "gap" in repr(page)
+    for name in rsea.effects:
+        assert name in rsea.effects._repr_html_()
