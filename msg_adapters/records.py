@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from msg_adapters.writing import BagWriter
 from rsea_ros.signals import FloatArray, IntArray, Record
 
 JOINT = "joint"
+BATCH = 100_000
+"""Messages of a topic that are held at a time, 10 MB of them."""
 
 
 def write_record(
@@ -33,21 +36,50 @@ def write_records(
     the samples in the order in which they stand in the record.
     Raises BagError where the bag cannot be written.
     """
-    rows: list[tuple[int, str, str, bytes]] = []
-    for record, topics in records:
-        for role, stamps, messages in _messages(record, topics):
-            name, msgtype = topics.topic(role), TYPES[role]
-            log_times = np.maximum.accumulate(stamps).tolist()
-            rows += [(at, name, msgtype, raw) for at, raw in zip(log_times, messages, strict=True)]
-    rows.sort(key=lambda row: row[0])
+    series = [one for record, topics in records for one in _series(record, topics)]
     notes = [note for record, _ in records for note in record.notes]
     with BagWriter(path, storage, recording=False, notes=notes, force=force) as bag:
-        for log_time, name, msgtype, raw in rows:
+        for log_time, name, msgtype, raw in _in_order(series):
             bag.write(name, msgtype, log_time, raw)
 
 
-def _messages(record: Record, topics: TopicMap) -> Iterator[tuple[str, IntArray, list[bytes]]]:
-    """Yield role, stamps (ns) and messages; channels of a role that share their stamps share messages."""
+@dataclass(frozen=True)
+class _Series:
+    """Messages to come of one topic. stamps, log_times: ns, shape (n,); values: by field, shape (n,)."""
+
+    topics: TopicMap
+    role: str
+    stamps: IntArray
+    log_times: IntArray
+    values: Mapping[str, FloatArray]
+
+    def rows(self, part: slice) -> Iterator[tuple[int, str, str, bytes]]:
+        """Yield log time, topic, type and content of some messages."""
+        values = {field: column[part] for field, column in self.values.items()}
+        messages = _encoded(self.stamps[part], values, self.topics)
+        name, msgtype = self.topics.topic(self.role), TYPES[self.role]
+        for log_time, raw in zip(self.log_times[part].tolist(), messages, strict=True):
+            yield log_time, name, msgtype, raw
+
+
+def _in_order(series: Sequence[_Series]) -> Iterator[tuple[int, str, str, bytes]]:
+    """Yield the messages of all series by log time, made BATCH of the longest at a time."""
+    if not series:
+        return
+    longest = max((one.log_times for one in series), key=len)
+    done = [0] * len(series)
+    for stop in [*longest[BATCH::BATCH].tolist(), None]:
+        rows: list[tuple[int, str, str, bytes]] = []
+        for i, one in enumerate(series):
+            end = len(one.log_times) if stop is None else int(np.searchsorted(one.log_times, stop))
+            rows += one.rows(slice(done[i], end))
+            done[i] = end
+        rows.sort(key=lambda row: row[0])
+        yield from rows
+
+
+def _series(record: Record, topics: TopicMap) -> Iterator[_Series]:
+    """Yield the messages of a record; channels of a role that share their stamps share messages."""
     for role, fields in FIELDS.items():
         there = [channel for channel in fields if channel in record and len(record[channel])]
         while there:
@@ -56,7 +88,7 @@ def _messages(record: Record, topics: TopicMap) -> Iterator[tuple[str, IntArray,
             there = [channel for channel in there if channel not in together]
             stamps = record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
             values = {fields[channel]: record[channel].y for channel in together}
-            yield role, stamps, _encoded(stamps, values, topics)
+            yield _Series(topics, role, stamps, np.maximum.accumulate(stamps), values)
 
 
 def _encoded(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:

@@ -2,12 +2,16 @@
 
 Numba keeps machine code beside the source and makes it anew when the file of the function changes. It does
 not see that a function of another file was compiled into it, and it cannot write into an installed package.
+
+What lies in the folder is run. So it is used only where nobody but this user (or root) can have put it there.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import stat
+from contextlib import suppress
 from pathlib import Path
 
 SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "model/call.py", "model/drive.py",
@@ -19,7 +23,7 @@ SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "mode
 def choose_cache() -> None:
     """Name the folder in NUMBA_CACHE_DIR, unless the user has. Must run before numba is imported."""
     if "NUMBA_CACHE_DIR" not in os.environ:
-        os.environ["NUMBA_CACHE_DIR"] = str(user_cache() / shared_key(Path(__file__).parent))
+        os.environ["NUMBA_CACHE_DIR"] = str(trusted_cache(shared_key(Path(__file__).parent)))
 
 
 def shared_key(package: Path) -> str:
@@ -31,12 +35,46 @@ def shared_key(package: Path) -> str:
     return digest.hexdigest()
 
 
-def user_cache() -> Path:
-    """Return a folder that this user can write to: the cache of the home, else one for temporary files."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    there = next((folder for folder in (home, *home.parents) if folder.exists()), Path("/"))
-    if home.is_absolute() and os.access(there, os.W_OK):
-        return home / "rsea_ros"
-    from tempfile import gettempdir  # 9 ms that hardly anyone needs
+def trusted_cache(name: str) -> Path:
+    """Return a folder of a name that only this user can enter, made where it is missing.
 
-    return Path(gettempdir()) / f"rsea_ros-{os.getuid()}"
+    The first that can be trusted: in the cache of the home, in that for temporary files, else a fresh one
+    that ends with this process.
+    """
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    if home.is_absolute() and private(home / "rsea_ros") and private(home / "rsea_ros" / name, 0o077):
+        return home / "rsea_ros" / name
+    import atexit  # with the others 9 ms that hardly anyone needs
+    import shutil
+    import tempfile
+
+    temporary = Path(tempfile.gettempdir()) / f"rsea_ros-{os.geteuid()}"
+    if private(temporary) and private(temporary / name, 0o077):
+        return temporary / name
+    fresh = tempfile.mkdtemp(prefix="rsea_ros-")
+    atexit.register(shutil.rmtree, fresh, ignore_errors=True)
+    return Path(fresh)
+
+
+def private(folder: Path, forbidden: int = 0o022) -> bool:
+    """Tell whether a folder is this user's alone, and its parent no stranger's; make it where it is missing.
+
+    forbidden: mode bits that it may not have.
+    """
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if _strangers(folder.parent.stat()):
+            return False
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        at = folder.lstat()
+    except OSError:
+        return False
+    alone = stat.S_ISDIR(at.st_mode) and at.st_uid == os.geteuid() and not at.st_mode & forbidden
+    return alone and os.access(folder, os.W_OK)
+
+
+def _strangers(parent: os.stat_result) -> bool:
+    """Tell whether another user could put a folder of his in the place of one in here."""
+    sticky = parent.st_mode & stat.S_ISVTX
+    return parent.st_uid not in (0, os.geteuid()) or bool(parent.st_mode & 0o002 and not sticky)

@@ -20,7 +20,18 @@ class ChannelError(RseaError, KeyError):
         return str(self.args[0]) if self.args else ""
 
 
-class RigError(RseaError, ValueError):
+class FieldError(RseaError, ValueError):
+    """A value of a document that is not what was expected.
+
+    field: where it stands, such as `effects[0].name`; empty where no single field is to blame.
+    """
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+
+class RigError(FieldError):
     """A rig file with a missing, unknown or impossible value."""
 
 
@@ -28,7 +39,7 @@ class ParameterError(RseaError, ValueError):
     """A parameter outside its range or of the wrong type."""
 
 
-class ImportMapError(RseaError, ValueError):
+class ImportMapError(FieldError):
     """An import map that does not fit its data file."""
 
 

@@ -1,4 +1,4 @@
-"""Names in a sentence, and text from outside on a terminal."""
+"""Names and values in a sentence, and text from outside on a terminal."""
 
 from __future__ import annotations
 
@@ -23,3 +23,9 @@ def printable(text: str, *, colours: bool = False) -> str:
     """
     pattern = _COLOURED if colours else _PLAIN
     return pattern.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """Return a value as it stands in a message: quoted, and cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"

@@ -7,11 +7,12 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from rsea_ros.compiler_cache import SHARED, shared_key, user_cache
+from rsea_ros.compiler_cache import SHARED, choose_cache, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
@@ -95,17 +96,90 @@ def test_the_key_follows_the_contents(tmp_path):
     assert shared_key(copy) != shared_key(PACKAGE)
 
 
-@pytest.mark.parametrize(
-    ("home", "expected"),
-    [
-        ("{tmp}/new/cache", "{tmp}/new/cache/rsea_ros"),
-        ("/proc/nothing", "{temporary}"),
-        ("relative", "{temporary}"),
-    ],
-)
-def test_a_home_that_cannot_be_written_gives_way(tmp_path, monkeypatch, home, expected):
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "temporary"))
-    monkeypatch.setenv("XDG_CACHE_HOME", home.format(tmp=tmp_path))
-    monkeypatch.setattr(os, "access", lambda path, mode: not str(path).startswith("/proc"))
-    temporary = tmp_path / "temporary" / f"rsea_ros-{os.getuid()}"
-    assert user_cache() == Path(expected.format(tmp=tmp_path, temporary=temporary))
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Return the folder for temporary files, open to everyone like /tmp; the home's cache is {tmp}/home."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    folder.chmod(0o1777)
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    return folder
+
+
+@pytest.mark.parametrize("home", ["/proc/nothing", "relative", "/dev/null"])
+def test_a_home_that_cannot_be_written_gives_way(temporary, monkeypatch, home):
+    monkeypatch.setenv("XDG_CACHE_HOME", home)
+    assert trusted_cache("key") == temporary / f"rsea_ros-{os.geteuid()}" / "key"
+
+
+def test_the_cache_of_the_home_is_made_for_its_user_alone(temporary, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
+    before = os.umask(0)
+    try:
+        folder = trusted_cache("key")
+    finally:
+        os.umask(before)
+    assert folder == tmp_path / "new" / "cache" / "rsea_ros" / "key"
+    assert [path.stat().st_mode & 0o777 for path in (folder, folder.parent)] == [0o700, 0o700]
+    assert trusted_cache("key") == folder
+    folder.chmod(0o755)  # others may have reached what lies in it
+    assert trusted_cache("key").parent.parent == temporary
+
+
+def plant(folder: Path, how: str) -> None:
+    """Make a folder that another user can fill."""
+    if how == "a link":
+        (folder.parent / "elsewhere").mkdir()
+        folder.symlink_to(folder.parent / "elsewhere")
+        return
+    folder.mkdir()
+    folder.chmod({"open to the group": 0o770, "open to all": 0o777}.get(how, 0o700))
+
+
+PLANTED = ["a link", "open to the group", "open to all", "another's"]
+
+
+@pytest.mark.parametrize("how", PLANTED)
+def test_a_planted_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
+    home, usual = tmp_path / "home" / "rsea_ros", temporary / f"rsea_ros-{os.geteuid()}"
+    home.parent.mkdir()
+    plant(home, how)
+    others = {home} if how == "another's" else set()
+    of_others(monkeypatch, others)
+    assert trusted_cache("key") == usual / "key"
+    shutil.rmtree(usual)
+    plant(usual, how)
+    others |= {usual} if how == "another's" else set()
+    fresh = trusted_cache("key")
+    assert fresh.parent == temporary and fresh not in (home, usual)
+    assert fresh.stat().st_mode & 0o777 == 0o700 and not list(fresh.iterdir())
+
+
+@pytest.mark.parametrize("how", ["open to all", "another's"])
+def test_a_folder_in_another_ones_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
+    plant(tmp_path / "home", how)
+    of_others(monkeypatch, {tmp_path / "home"} if how == "another's" else set())
+    assert trusted_cache("key").parent.parent == temporary
+
+
+def of_others(monkeypatch, folders: set[Path]) -> None:
+    """Make some folders another user's."""
+    true = {name: getattr(Path, name) for name in ("stat", "lstat")}
+
+    def changed(name):
+        def look(path, **options):
+            seen = true[name](path, **options)
+            owner = os.geteuid() + 1 if path in folders else seen.st_uid
+            return os.stat_result((*seen[:4], owner, *seen[5:]))
+
+        return look
+
+    for name in true:
+        monkeypatch.setattr(Path, name, changed(name))
+
+
+def test_a_cache_that_the_user_names_is_his(monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "/somewhere")
+    choose_cache()
+    assert os.environ["NUMBA_CACHE_DIR"] == "/somewhere"

@@ -12,7 +12,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress", "wording", "interrupts", "files", "new_files"}
+YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
+BASE = {"errors", "signals", "progress", "wording", "interrupts", "files", "new_files"} | YAML
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
@@ -22,6 +23,11 @@ OWN = {
     "interrupts": set(),
     "files": {"errors", "interrupts"},
     "new_files": {"errors", "files", "interrupts"},
+    "units": set(),
+    "decimal_number": set(),
+    "keys": set(),
+    "checked": {"errors", "units", "wording"},
+    "strict_yaml": {"errors", "decimal_number", "wording"},
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},
@@ -45,16 +51,25 @@ OWN = {
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
-    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs", "rcl_interfaces",
-    "rosgraph_msgs", "rosidl_runtime_py", "sensor_msgs", "std_msgs", "std_srvs",
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "lifecycle_msgs",
+    "rcl_interfaces",
+    "rosgraph_msgs",
+    "rosidl_runtime_py",
+    "sensor_msgs",
+    "std_msgs",
+    "std_srvs",
 }
 FOREIGN = {
+    "strict_yaml": {"yaml"},
     "effects": NUMERIC,
-    "model": NUMERIC | {"yaml"},
+    "model": NUMERIC,
     "identification": NUMERIC | {"threadpoolctl"},
     "diagnosis": NUMERIC,
     "control": NUMERIC,
-    "design": NUMERIC | {"yaml"},
+    "design": NUMERIC,
     "signals": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},

@@ -3,7 +3,7 @@
 about: one line that goes into the bag's notes
 time: {column: t, unit: s}                    # or {rate: 1000} (Hz) where the file has no time
 where: {column: test_nr, below: 100}          # optional: only these rows; also from:, equals:
-delimiter: ";"                                # optional: text files only, else by the file's name
+delimiter: ";"                                # optional: text files only, else seen from the first line
 channels:
   position: {column: phi, unit: deg, sign: -1}
   command:                                    # a list is summed
@@ -13,15 +13,21 @@ channels:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from msg_adapters.tables.keys import CHANNEL, MAP, RATES, TERM, TIME, WHERE
+from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
-from rsea_ros.errors import ImportMapError
+from rsea_ros import strict_yaml
+from rsea_ros.errors import FieldError, ImportMapError
+from rsea_ros.keys import NEEDED, Key
+from rsea_ros.wording import shown
+
+LARGEST = 1e300
+"""Of the numbers in a map: products of two of them and a unit stay finite."""
 
 
 @dataclass(frozen=True)
@@ -64,99 +70,131 @@ class ImportMap:
 
 
 def load_map(path: str | Path) -> ImportMap:
-    """Read an import map. Raises ImportMapError with file, field, value and expectation."""
+    """Read an import map. Raises ImportMapError with file, line, field, value and expectation."""
     try:
-        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        document = strict_yaml.read(Path(path))
     except OSError as error:
         raise ImportMapError(f"{path}: {error.strerror}, expected an import map in YAML") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ImportMapError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-    try:
-        return _map(Path(path), document)
-    except ValueError as error:
+    except FieldError as error:
         raise ImportMapError(f"{path}: {error}") from None
+    try:
+        return _map(Path(path), document.content)
+    except FieldError as error:
+        raise ImportMapError(f"{path}: {document.where(error.field)}{error}", error.field) from None
 
 
 def _map(path: Path, document: object) -> ImportMap:
-    body = _keys(document, "map", {"about", "time", "where", "delimiter", "channels"}, {"time", "channels"})
-    time = _keys(body["time"], "time", {"column", "unit", "rate"}, set())
+    body = _keys(document, "map", MAP)
+    time = _keys(body["time"], "time", TIME)
     if ("rate" in time) == ("column" in time):
-        raise ValueError("time: expected either a column with its unit, or a rate in Hz")
-    rate = _number(time["rate"], "time.rate") if "rate" in time else None
-    if rate is not None and rate <= 0:
-        raise ValueError(f"time.rate is {rate}, expected more than 0 Hz")
-    channels = _keys(body["channels"], "channels", set(CHANNELS), set())
+        raise FieldError("time: expected either a column with its unit, or a rate in Hz", "time")
+    rate = _rate(time["rate"]) if "rate" in time else None
+    channels = _keys(body["channels"], "channels", CHANNEL)
     return ImportMap(
         path=path,
         channels=_one_kind({name: _terms(name, value) for name, value in channels.items()}),
         time=None if rate else _term("time", time, "time"),
         rate=rate,
         where=_rows(body["where"]) if "where" in body else None,
-        delimiter=str(body["delimiter"]) if "delimiter" in body else None,
+        delimiter=_delimiter(body.get("delimiter")),
         about=" ".join(str(body.get("about", "")).split()),
     )
 
 
+def _rate(value: object) -> float:
+    rate = _number(value, "time.rate")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise FieldError(
+            f"time.rate is {rate}, expected more than 0 Hz: {RATES[0]:g} to {RATES[1]:g} Hz", "time.rate"
+        )
+    return rate
+
+
 def _terms(channel: str, value: object) -> tuple[Term, ...]:
     parts = value if isinstance(value, list) else [value]
+    if not parts:
+        raise FieldError(
+            f"channels.{channel} is an empty list, expected a column or more", f"channels.{channel}"
+        )
     fields = [f"channels.{channel}" + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
     return tuple(_term(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
 
 
 def _term(field: str, value: object, dimension: str) -> Term:
     """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
-    body = _keys(value, field, {"column", "unit", "sign", "scale", "constant"}, {"column", "unit"})
-    found, factor = unit(body["unit"])
+    body = _keys(value, field, TERM)
+    try:
+        found, factor = unit(body["unit"])
+    except ValueError as error:
+        raise FieldError(f"{field}: {error}", f"{field}.unit") from None
     if LINEAR.get(found, found) != dimension and "scale" not in body:
-        raise ValueError(
-            f"{field}: unit {body['unit']!r} is a {found}, expected a {dimension}, or a scale to it"
+        raise FieldError(
+            f"{field}: unit {body['unit']!r} is a {found}, expected a {dimension}, or a scale to it",
+            f"{field}.unit",
         )
     sign = _number(body.get("sign", 1), f"{field}.sign")
     if sign not in (1, -1):
-        raise ValueError(f"{field}.sign is {sign}, expected 1 or -1")
+        raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
     gain = sign * factor * _number(body.get("scale", 1), f"{field}.scale")
-    return Term(
-        str(body["column"]), str(body["unit"]), gain, _number(body.get("constant", 0), f"{field}.constant")
-    )
+    column, constant = _column(body["column"], f"{field}.column"), body.get("constant", 0)
+    return Term(column, str(body["unit"]), gain, _number(constant, f"{field}.constant"))
 
 
 def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ...]]:
     """Refuse a map without channels, and one that mixes a linear with a rotary machine."""
     if not channels:
-        raise ValueError(f"channels is empty, expected some of {', '.join(CHANNELS)}")
+        raise FieldError(f"channels is empty, expected some of {', '.join(CHANNELS)}", "channels")
     terms = [term for terms in channels.values() for term in terms]
     dimensions = {unit(term.unit)[0]: term.unit for term in terms}
     linear = [name for dimension, name in dimensions.items() if dimension in LINEAR]
     rotary = [name for dimension, name in dimensions.items() if dimension in LINEAR.values()]
     if linear and rotary:
-        raise ValueError(
-            f"channels mix {linear[0]!r} and {rotary[0]!r}, expected a linear or a rotary machine"
+        raise FieldError(
+            f"channels mix {linear[0]!r} and {rotary[0]!r}, expected a linear or a rotary machine", "channels"
         )
     return channels
 
 
 def _rows(value: object) -> Rows:
-    body = _keys(value, "where", {"column", "from", "below", "equals"}, {"column"})
+    body = _keys(value, "where", WHERE)
     limits = {key: _number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
     if not limits:
-        raise ValueError("where: expected one of from, below, equals")
-    return Rows(str(body["column"]), limits.get("from"), limits.get("below"), limits.get("equals"))
-
-
-def _keys(value: object, field: str, allowed: set[str], needed: set[str]) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ValueError(f"{field} is {value!r}, expected a mapping with {', '.join(sorted(allowed))}")
-    unknown = [str(key) for key in value if key not in allowed]
-    if unknown:
-        raise ValueError(f"{field}: unknown key {unknown[0]!r}, expected {', '.join(sorted(allowed))}")
-    missing = sorted(needed - set(value))
-    if missing:
-        raise ValueError(f"{field}: no {missing[0]!r}, expected {', '.join(sorted(needed))}")
-    return value
+        raise FieldError("where: expected one of from, below, equals", "where")
+    return Rows(
+        _column(body["column"], "where.column"), limits.get("from"), limits.get("below"), limits.get("equals")
+    )
 
 
 def _number(value: object, field: str) -> float:
-    try:
-        return float(str(value))
-    except ValueError:
-        raise ValueError(f"{field} is {value!r}, expected a number") from None
+    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
+        return float(value)
+    raise FieldError(f"{field} is {shown(value)}, expected a number", field)
+
+
+def _column(value: object, field: str) -> str:
+    """Return the name of a column, or its number."""
+    if isinstance(value, (str, int)) and not isinstance(value, bool):
+        return str(value).strip()
+    raise FieldError(f"{field} is {shown(value)}, expected a name; put quotes around it", field)
+
+
+def _delimiter(value: object) -> str | None:
+    if value is None or (isinstance(value, str) and value in DELIMITERS):
+        return None if value is None else DELIMITERS[value]
+    known = ", ".join(repr(key) for key in DELIMITERS)
+    raise FieldError(f"delimiter is {shown(value)}, expected one of {known}", "delimiter")
+
+
+def _keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
+    """Return a mapping that has only these keys, and all of them that are needed."""
+    allowed = ", ".join(sorted(key.name for key in keys))
+    if not isinstance(value, Mapping):
+        raise FieldError(f"{field} is {shown(value)}, expected a mapping with {allowed}", field)
+    for name in value:
+        if name not in [key.name for key in keys]:
+            raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")
+    needed = sorted(key.name for key in keys if key.default == NEEDED)
+    for name in needed:
+        if name not in value:
+            raise FieldError(f"{field}: no {name!r}, expected {', '.join(needed)}", field)
+    return value

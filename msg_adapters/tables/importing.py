@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from msg_adapters.tables.clock import repaired
 from msg_adapters.tables.files import read_columns
 from msg_adapters.tables.import_map import ImportMap, Rows, Term
+from msg_adapters.tables.table import Table
 from rsea_ros.errors import ImportMapError
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 
 UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""
 START_NS = 1_000_000_000
 """Where an undated record starts: a stamp of zero would mean `not set`."""
+LATEST = 2.0**31
+"""s. The seconds of a message's stamp are a signed integer of 32 bits."""
 
 
 def import_record(path: str | Path, mapping: ImportMap) -> Record:
@@ -26,15 +28,30 @@ def import_record(path: str | Path, mapping: ImportMap) -> Record:
     Raises ImportMapError with file, row, column, value and expectation.
     """
     table = read_columns(Path(path), mapping.columns(), mapping.delimiter)
-    keep = _rows(path, table, mapping.where)
-    stamps, note = _stamps(path, table, mapping)
-    stamps = stamps[keep]
+    try:
+        return _record(path, table, mapping)
+    except ImportMapError as error:
+        raise ImportMapError(f"{path}: {error}") from None
+
+
+def _record(path: str | Path, table: Table, mapping: ImportMap) -> Record:
+    keep, undated = _rows_kept(table, mapping)
+    stamps, note = _stamps(table, mapping, keep)
     start = float(stamps[0])
-    t = stamps - start
-    channels = {name: Channel(t, _values(table, terms)[keep]) for name, terms in mapping.channels.items()}
     epoch = round(start * 1e9) if start > UNDATED else START_NS
-    notes = (f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "), note)
-    return Record(channels, str(path), epoch, tuple(filter(None, notes)))
+    _check_range(start, float(stamps[-1]), epoch)
+    t = stamps - start
+    channels, faults = {}, list(_rows_left_out(path, table, undated))
+    for name, terms in mapping.channels.items():
+        channels[name], lost = _channel(name, t, _values(table, terms)[keep], terms)
+        faults += lost
+    told = [f"{fault.channel}: {fault.detail}" for fault in faults]
+    notes = (
+        f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
+        note,
+        *told,
+    )
+    return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))
 
 
 def summary(record: Record, mapping: ImportMap) -> list[str]:
@@ -47,43 +64,92 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     return lines
 
 
-def _rows(path: str | Path, table: Mapping[str, FloatArray], where: Rows | None) -> npt.NDArray[np.bool_]:
-    """Return which rows count."""
-    count = len(next(iter(table.values())))
-    if where is None:
-        return np.ones(count, np.bool_)
-    values = table[where.column]
-    keep = np.ones(count, np.bool_)
-    if where.start is not None:
-        keep &= values >= where.start
-    if where.stop is not None:
-        keep &= values < where.stop
-    if where.equals is not None:
-        keep &= values == where.equals
+def _rows_kept(table: Table, mapping: ImportMap) -> tuple[BoolArray, int]:
+    """Return which rows count, and how many are left out for want of a stamp or of what `where` asks."""
+    keep = np.ones(len(next(iter(table.columns.values()))), np.bool_)
+    for part in (mapping.time, mapping.where):
+        if part is not None:
+            keep &= ~np.isnan(table[part.column])
+    undated = int(np.count_nonzero(~keep))
+    where = mapping.where
+    if where is not None:
+        values = table[where.column]
+        keep &= values >= where.start if where.start is not None else True
+        keep &= values < where.stop if where.stop is not None else True
+        keep &= values == where.equals if where.equals is not None else True
     if np.count_nonzero(keep) < 2:
-        spread = f"{where.column} goes from {values.min():g} to {values.max():g}"
-        raise ImportMapError(f"{path}: fewer than two rows left by where ({spread})")
-    return keep
+        raise ImportMapError(f"fewer than two rows{_spread(table, where)}, expected a record")
+    return keep, undated
 
 
-def _stamps(path: str | Path, table: Mapping[str, FloatArray], mapping: ImportMap) -> tuple[FloatArray, str]:
-    """Return the stamp of each row, s, increasing, and what was repaired."""
+def _spread(table: Table, where: Rows | None) -> str:
+    if where is None:
+        return ""
+    values = table[where.column]
+    if np.isnan(values).all():
+        return f" left by where ({where.column} is empty)"
+    low, high = np.nanmin(values), np.nanmax(values)
+    return f" left by where ({where.column} goes from {low:g} to {high:g})"
+
+
+def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
+    """Yield what is missing of the whole table."""
+    name = Path(path).name
+    if table.left_out:
+        detail = f"{table.left_out} of {table.rows} rows left out: {table.first}"
+        yield Fault("rows_left_out", name, table.left_out / table.rows, detail)
+    if undated:
+        detail = f"{undated} of {table.rows} rows left out: no stamp, or no value to choose rows by"
+        yield Fault("rows_left_out", name, undated / table.rows, detail)
+
+
+def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> tuple[Channel, list[Fault]]:
+    """Return a channel without its missing values, and what is missing."""
+    columns = " + ".join(term.column for term in terms)
+    if np.isinf(y).any():
+        raise ImportMapError(f"{name}: {columns} is too large for its unit, expected a number below 1e308")
+    missing = np.isnan(y)
+    count = int(np.count_nonzero(missing))
+    if not count:
+        return Channel(t, y), []
+    if len(y) - count < 2:
+        raise ImportMapError(f"{name}: {columns} has {len(y) - count} values, expected a number in most rows")
+    first = float(t[np.argmax(missing)])
+    detail = f"{count} of {len(y)} values of {columns} are missing, the first at {first:.6g} s"
+    return Channel(t[~missing], y[~missing]), [Fault("missing_values", name, count / len(y), detail)]
+
+
+def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:
+    """Return the stamp of each row that counts, s, increasing, and what was repaired."""
     if mapping.time is None:
-        count = len(next(iter(table.values())))
-        return np.arange(count) / float(mapping.rate or 1.0), ""
-    t = _values(table, (mapping.time,))
+        return np.flatnonzero(keep) / float(mapping.rate or 1.0), ""
+    stamps = _values(table, (mapping.time,))
+    dated = np.flatnonzero(~np.isnan(stamps))
+    t = stamps[dated]
     back = np.flatnonzero(np.diff(t) < 0)
     if back.size:
         at = back[0] + 1
         steps = f"{t[at]:.6f} s after {t[at - 1]:.6f} s"
-        raise ImportMapError(f"{path}: {mapping.time.column} of row {at + 1} goes back ({steps})")
+        raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
     if t[-1] == t[0]:
+        raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
+    stamps[dated], note = repaired(t)
+    return stamps[keep], note
+
+
+def _check_range(start: float, stop: float, epoch_ns: int) -> None:
+    """Raise ImportMapError for stamps that no message can hold."""
+    last = epoch_ns * 1e-9 + stop - start
+    if not last < LATEST:
         raise ImportMapError(
-            f"{path}: {mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs"
+            f"stamps from {start:g} s to {stop:g} s, expected less than {LATEST:g} s:"
+            " is it another unit of time?"
         )
-    return repaired(t)
 
 
-def _values(table: Mapping[str, FloatArray], terms: Sequence[Term]) -> FloatArray:
-    parts = [term.gain * table[term.column] + term.constant for term in terms]
-    return np.asarray(np.sum(parts, axis=0), np.float64)
+def _values(table: Table, terms: Sequence[Term]) -> FloatArray:
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = terms[0].gain * table[terms[0].column] + terms[0].constant
+        for term in terms[1:]:
+            values += term.gain * table[term.column] + term.constant
+    return np.asarray(values, np.float64)

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from rsea_ros.units import same_unit
+from rsea_ros.wording import shown
+
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "angle": {
@@ -45,13 +48,13 @@ CHANNELS: Mapping[str, str] = {
 
 
 def unit(text: object) -> tuple[str, float]:
-    """Return dimension and SI factor of a unit; `N*m` and `N·m` are `N m`.
+    """Return dimension and SI factor of a unit, however it is written: `Nm`, `N*m` and `N·m` are `N m`.
 
     Raises ValueError for an unknown one.
     """
-    name = " ".join(str(text).replace("·", " ").replace("*", " ").split())
     for dimension, factors in FACTORS.items():
-        if name in factors:
-            return dimension, factors[name]
+        for name, factor in factors.items():
+            if same_unit(text, name):
+                return dimension, factor
     known = ", ".join(name for factors in FACTORS.values() for name in factors)
-    raise ValueError(f"unit {text!r} unknown, expected one of {known}")
+    raise ValueError(f"unit {shown(text)} unknown, expected one of {known}")

@@ -10,14 +10,17 @@ import numpy as np
 from msg_adapters import write_record
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.decimal_number import is_decimal
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
+from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.new_files import check_free
 from rsea_ros.signals import Channel
+from rsea_ros.wording import shown
 
 HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
 
@@ -75,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
     check_free([Path(args.out)], force=args.force, inputs=[args.rig])
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
+    check_effects(rig.effects)
     settings = Settings(
         rate=args.rate,
         duration=args.duration,
@@ -101,14 +105,17 @@ def parse_effect(text: str) -> EffectSetting:
     """Return the setting of `NAME:param=value,…`. Raises ParameterError for what is not of that form."""
     name, _, rest = text.partition(":")
     effect = effect_named(name)
-    values = dict(effect.typical)
+    values: dict[str, float] = {}
+    cut = shown(text)[1:-1]
     for item in filter(None, rest.split(",")):
-        key, _, value = item.partition("=")
-        try:
-            values[key.strip()] = float(value)
-        except ValueError:
-            raise ParameterError(
-                f"--effect {text}: {key.strip()} = {value!r}, expected NAME:param=value with a number in SI"
-            ) from None
-    effect.vector(values)
-    return EffectSetting(name, values)
+        key, _, value = (part.strip() for part in item.partition("="))
+        if not is_decimal(value):
+            bounds = "".join(f" ({p.name}: {p.bounds})" for p in effect.parameters if p.name == key)
+            expected = f"expected NAME:param=value with a number in SI{bounds}"
+            raise ParameterError(f"--effect {cut}: {key[:40]} = {shown(value)}, {expected}")
+        if key in values:
+            raise ParameterError(f"--effect {cut}: {key} is given twice, expected once")
+        values[key] = float(value)
+    complete = effect.typical | values
+    effect.check(complete)
+    return EffectSetting(name, complete)

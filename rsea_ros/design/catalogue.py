@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from rsea_ros.errors import ParameterError
-from rsea_ros.model.checked import mapping, number, only_keys, text
+from rsea_ros import strict_yaml
+from rsea_ros.checked import mapping, number, only_keys, text, unit
+from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
 
 FILE = "motor_gear_units.yaml"
@@ -54,15 +54,15 @@ def catalogue(path: Path | None = None) -> dict[str, MotorGear]:
     """Return the units by name. Raises ParameterError naming file, field, value and what was expected."""
     path = path or _default_path()
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = strict_yaml.read(path)
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror}, expected a catalogue in YAML") from None
-    except yaml.YAMLError as error:
-        raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-    try:
-        return {str(n): _unit(str(n), body) for n, body in mapping(document, "catalogue").items()}
-    except ValueError as error:
+    except FieldError as error:
         raise ParameterError(f"{path}: {error}") from None
+    try:
+        return {str(n): _unit(str(n), body) for n, body in mapping(document.content, "catalogue").items()}
+    except FieldError as error:
+        raise ParameterError(f"{path}: {document.where(error.field)}{error}") from None
 
 
 def unit_named(name: str, path: Path | None = None) -> MotorGear:
@@ -84,21 +84,20 @@ def _unit(name: str, item: Any) -> MotorGear:
     only_keys(body, set(UNITS), name)
     for key in REQUIRED:
         if key not in body:
-            raise ParameterError(f"{name}.{key} is missing, expected a value in {UNITS[key]}")
+            raise FieldError(f"{name}.{key} is missing, expected a value in {UNITS[key]}", name)
     entries = {key: _entry(f"{name}.{key}", UNITS[key], entry) for key, entry in body.items()}
     return MotorGear(
         name, about, {k: e[0] for k, e in entries.items()}, {k: e[1] for k, e in entries.items()}
     )
 
 
-def _entry(name: str, unit: str, item: Any) -> tuple[float, str]:
-    body = mapping(item, name, expected=f"{{value: …, unit: {unit}, source: …}}")
+def _entry(name: str, symbol: str, item: Any) -> tuple[float, str]:
+    body = mapping(item, name, expected=f"{{value: …, unit: {symbol}, source: …}}")
     only_keys(body, {"value", "unit", "source"}, name)
-    if body.get("unit") != unit:
-        raise ParameterError(f"{name}.unit = {body.get('unit')!r}, expected {unit!r}")
-    value, source = number(body.get("value"), name, unit), text(body.get("source", ""), f"{name}.source")
-    if not value > 0.0 or not source:
-        raise ParameterError(
-            f"{name} = {value:g} {unit}, source {source!r}, expected a value > 0 and a source"
+    unit(body.get("unit"), f"{name}.unit", symbol)
+    value, source = number(body.get("value"), name, symbol), text(body.get("source", ""), f"{name}.source")
+    if not 0.0 < value < math.inf or not source:
+        raise FieldError(
+            f"{name} = {value:g} {symbol}, source {source!r}, expected a value > 0 and a source", name
         )
     return value, source

@@ -14,6 +14,7 @@ from types import MappingProxyType, ModuleType
 import rsea_ros.effects as package
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
+from rsea_ros.wording import shown
 
 _NOT_EFFECTS = {"effect", "catalogue", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
@@ -39,7 +40,8 @@ def effect_named(name: str) -> Effect:
         return importlib.import_module(f"rsea_ros.effects.{name}").EFFECT  # type: ignore[no-any-return]
     effects = catalogue()
     if name not in effects:
-        raise ParameterError(f"effect {name!r}: not in the catalogue, expected one of {', '.join(effects)}")
+        known = ", ".join(effects)
+        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}")
     return effects[name]
 
 

@@ -15,10 +15,16 @@ from numba import cfunc, types
 
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
+from rsea_ros.wording import shown
 
 _POINTER = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
 _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
 
+_ROUNDING = 1e-9
+"""Of the wider bound: what a fitted value may lie beyond it through logarithms and decimal digits."""
+_SIZED = {"N m", "N m/rad", "N m s/rad", "rad/s"}
+_OTHER_MACHINES = 1e3
+"""How many times larger or smaller a machine may be than those that the bounds of the fits suit."""
 Parity = Literal["odd", "even", "neither"]
 
 
@@ -49,6 +55,18 @@ class Parameter:
     logarithmic: bool = False
     optional: bool = False
     per_record: bool = False
+
+    @property
+    def possible(self) -> tuple[float, float]:
+        """Return what a person may state: the bounds of a fit, wider where they go with a machine's size."""
+        width = _OTHER_MACHINES if self.unit in _SIZED else 1.0
+        return self.low * width if self.low < 0.0 else self.low / width, self.high * width
+
+    @property
+    def bounds(self) -> str:
+        """Return the possible values for people."""
+        low, high = self.possible
+        return f"{low:g} to {high:g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -110,7 +128,7 @@ class Effect:
         expected = f"expected {', '.join(names)}"
         for name in parameters:
             if name not in names:
-                raise ParameterError(f"effect {self.name}: unknown parameter {name!r}, {expected}")
+                raise ParameterError(f"effect {self.name}: unknown parameter {shown(name)}, {expected}")
         full = self.complete(parameters)
         for name in names:
             if name not in full:
@@ -120,6 +138,17 @@ class Effect:
             if math.isnan(full[name]):
                 raise ParameterError(f"effect {self.name}: {name} = nan, expected a number")
         return tuple(float(full[name]) for name in names)
+
+    def check(self, parameters: Mapping[str, float]) -> None:
+        """Raise ParameterError as `vector` does, and for a value out of its bounds; null always is one."""
+        values = self.vector(parameters)
+        for p, value in zip(self.parameters, values, strict=True):
+            low, high = p.possible
+            margin = _ROUNDING * max(abs(low), abs(high))
+            if not (low - margin <= value <= high + margin or value == p.null):
+                raise ParameterError(
+                    f"effect {self.name}: {p.name} = {value:g} {p.unit}, expected {p.bounds}"
+                )
 
     def complete(self, parameters: Mapping[str, float]) -> dict[str, float]:
         """Return parameters with the optional ones that were left out at their null value."""

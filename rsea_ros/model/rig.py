@@ -135,7 +135,7 @@ class Rig:
             return self.quantities[name].value
         default = FIELDS[name].default if name in FIELDS else None
         if default is None:
-            raise RigError(f"rig {self.name}: {name} is missing, expected a value in {unit_of(name)}")
+            raise RigError(f"rig {self.name}: {name} is missing, expected a value in {unit_of(name)}", name)
         return default
 
     def values(self) -> dict[str, float]:
@@ -201,7 +201,7 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
     if not possible:
         bound = f">= {low:g}" if allowed else f"> {low:g}"
-        raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}")
+        raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}", name)
 
 
 def _check_structure(rig: Rig) -> None:
@@ -209,11 +209,12 @@ def _check_structure(rig: Rig) -> None:
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
     if rig.train not in get_args(Train):
         raise RigError(
-            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}"
+            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}",
+            "gear.train",
         )
     for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
         if end not in END_NAMES:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}")
+            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)
     if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
         raise RigError(
             f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "

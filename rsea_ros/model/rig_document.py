@@ -10,8 +10,10 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from rsea_ros.errors import RigError
-from rsea_ros.model.checked import mapping, number, only_keys, switch, text
+from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
+from rsea_ros.errors import FieldError, RigError
+from rsea_ros.keys import names
+from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
     END_NAMES,
     FIELDS,
@@ -23,30 +25,25 @@ from rsea_ros.model.rig import (
     Sensor,
     check_value,
 )
+from rsea_ros.model.rig_keys import CLOCK, CONTROLLER, EFFECT, GROUPS, QUANTITY, SENSOR, SWITCHES, TOP
 from rsea_ros.signals import UNITS
+from rsea_ros.wording import shown
 
-_GROUPS = sorted({name.split(".")[0] for name in FIELDS})
-_TOP = {
-    "name",
-    "about",
-    "source",
-    "known",
-    "proximal",
-    "ft_end",
-    "sensors",
-    "controller",
-    "effects",
-    *_GROUPS,
-}
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
-_SWITCHES = {"gear": {"train"}, "spring": {"rigid"}, **{end: {"clamped"} for end in END_NAMES}}
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
     """Build a rig from the parsed YAML. Raises RigError naming the field."""
-    only_keys(document, _TOP, "rig")
-    groups = {g: mapping(document.get(g, {}), g) for g in _GROUPS}
+    try:
+        return _rig(document, default_name)
+    except FieldError as error:
+        raise RigError(str(error), error.field) from None
+
+
+def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
+    only_keys(document, names(TOP), "rig")
+    groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
     clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
@@ -120,7 +117,7 @@ def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
 
 
 def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
-    switches = _SWITCHES.get(group, set())
+    switches = names(SWITCHES.get(group, ()))
     allowed = {name.split(".")[1] for name in FIELDS if name.startswith(group + ".")}
     only_keys(body, allowed | switches, group)
     return [
@@ -133,22 +130,23 @@ def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity
 def _quantity(name: str, item: Any) -> Quantity:
     field: Field = FIELDS[name]
     body = mapping(item, name, expected=f"{{value: …, unit: {field.unit}}}")
-    only_keys(body, {"value", "unit", "spread", "source", "ci95"}, name)
-    if body.get("unit") != field.unit:
-        raise RigError(f"{name}.unit = {body.get('unit')!r}, expected {field.unit!r}")
+    only_keys(body, names(QUANTITY), name)
+    unit(body.get("unit"), f"{name}.unit", field.unit)
     value = number(body.get("value"), name, field.unit)
     check_value(name, value, where="value")
     spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
     if not 0.0 <= spread < 10.0:
-        raise RigError(f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10")
+        raise RigError(
+            f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
+        )
     ci95 = _interval(body["ci95"], f"{name}.ci95", field.unit) if "ci95" in body else None
     return Quantity(value, spread, text(body.get("source", ""), f"{name}.source"), ci95)
 
 
-def _interval(item: Any, name: str, unit: str) -> tuple[float, float]:
+def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     if not isinstance(item, list) or len(item) != 2:
-        raise RigError(f"{name} = {item!r}, expected [low, high] in {unit}")
-    low, high = (number(v, name, unit) for v in item)
+        raise RigError(f"{name} = {shown(item)}, expected [low, high] in {unit_name}", name)
+    low, high = (number(v, name, unit_name) for v in item)
     return low, high
 
 
@@ -156,12 +154,11 @@ def _clock(fields: Mapping[str, Any], name: str) -> float:
     """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, {"value", "unit"}, field)
-    if item.get("unit") != "s":
-        raise RigError(f"{field}.unit = {item.get('unit')!r}, expected 's'")
+    only_keys(item, names(CLOCK), field)
+    unit(item.get("unit"), f"{field}.unit", "s")
     value = number(item.get("value"), f"{field}.value", "s")
     if not abs(value) < _LATEST:
-        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way")
+        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
     return value
 
 
@@ -170,15 +167,15 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     sensors = {}
     for name, item in body.items():
         fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, {"noise", "quantum", "unit", "source", "zero_unknown", "clock"}, f"sensors.{name}")
-        if fields.get("unit") != UNITS[name]:
-            raise RigError(f"sensors.{name}.unit = {fields.get('unit')!r}, expected {UNITS[name]!r}")
+        only_keys(fields, names(SENSOR), f"sensors.{name}")
+        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
         noise, quantum = (
             number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
         )
         if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
             raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0"
+                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
+                f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
         sensors[name] = Sensor(noise, quantum, floating, clock)
@@ -187,10 +184,13 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
 
 def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
     if not isinstance(items, list):
-        raise RigError(f"known = {items!r}, expected a list of field names")
-    for item in items:
+        raise RigError(f"known = {items!r}, expected a list of field names", "known")
+    for i, item in enumerate(items):
         if item not in stated:
-            raise RigError(f"known: {item!r}, expected a value that this rig states: {', '.join(stated)}")
+            raise RigError(
+                f"known: {shown(item)}, expected a value that this rig states: {', '.join(stated)}",
+                f"known[{i}]",
+            )
     return frozenset(items)
 
 
@@ -198,26 +198,27 @@ def _controller(item: Any) -> Controller | None:
     if item is None:
         return None
     body = mapping(item, "controller")
-    only_keys(body, {"k_p", "k_v", "limit", "source"}, "controller")
+    only_keys(body, names(CONTROLLER), "controller")
     k_p = number(body.get("k_p"), "controller.k_p", "1/s")
     k_v = number(body.get("k_v"), "controller.k_v", "N m s/rad")
     limit = number(body.get("limit", math.inf), "controller.limit", "N m")
-    for key, value, unit in (("k_p", k_p, "1/s"), ("k_v", k_v, "N m s/rad")):
+    for name, value, symbol in (("controller.k_p", k_p, "1/s"), ("controller.k_v", k_v, "N m s/rad")):
         if not 0.0 <= value < math.inf:
-            raise RigError(f"controller.{key} = {value:g} {unit}, expected a finite value >= 0 {unit}")
+            raise RigError(f"{name} = {value:g} {symbol}, expected a finite value >= 0 {symbol}", name)
     if limit <= 0.0:
-        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m")
+        raise RigError(f"controller.limit = {limit:g} N m, expected a value > 0 N m", "controller.limit")
     return Controller(k_p, k_v, limit)
 
 
 def _effects(items: Any) -> tuple[EffectSetting, ...]:
     if not isinstance(items, list):
-        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}")
+        raise RigError(f"effects = {items!r}, expected a list of {{name: …, parameters: {{…}}}}", "effects")
     settings = []
     for i, item in enumerate(items):
         body = mapping(item, f"effects[{i}]")
-        only_keys(body, {"name", "parameters", "ci95"}, f"effects[{i}]")
+        only_keys(body, names(EFFECT), f"effects[{i}]")
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
         settings.append(EffectSetting(text(body.get("name", ""), f"effects[{i}].name"), values))
+    check_effects(settings)
     return tuple(settings)

@@ -9,9 +9,8 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
-import yaml
-
-from rsea_ros.errors import OutputError, RigError
+from rsea_ros import strict_yaml
+from rsea_ros.errors import FieldError, OutputError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document, rig_to_document
 from rsea_ros.new_files import write_text
@@ -44,19 +43,20 @@ def load_rig(name_or_path: str | Path) -> Rig:
     """Read a rig. Raises RigError naming file, field, value and what was expected."""
     path = rig_path(name_or_path)
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = strict_yaml.read(path)
     except FileNotFoundError:
         raise RigError(f"{path}: no such file, expected a rig in YAML") from None
     except OSError as error:
         raise RigError(f"{path}: {error.strerror}, expected a rig in YAML that can be read") from None
-    except (yaml.YAMLError, ValueError) as error:
-        raise RigError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
-    if not isinstance(document, Mapping):
-        raise RigError(f"{path}: holds {type(document).__name__}, expected a mapping with the keys of a rig")
-    try:
-        return rig_from_document(document, default_name=path.stem)
-    except RigError as error:
+    except FieldError as error:
         raise RigError(f"{path}: {error}") from None
+    if not isinstance(document.content, Mapping):
+        held = type(document.content).__name__
+        raise RigError(f"{path}: holds {held}, expected a mapping with the keys of a rig")
+    try:
+        return rig_from_document(document.content, default_name=path.stem)
+    except RigError as error:
+        raise RigError(f"{path}: {document.where(error.field)}{error}", error.field) from None
 
 
 def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
@@ -74,4 +74,4 @@ def save_rig(rig: Rig, path: str | Path, *, force: bool = False) -> None:
 
 def rig_text(rig: Rig) -> str:
     """Return the YAML of a rig."""
-    return str(yaml.safe_dump(rig_to_document(rig), sort_keys=False, allow_unicode=True))
+    return strict_yaml.dump(rig_to_document(rig))

@@ -55,8 +55,11 @@ def test_a_bag_with_the_measurement(inputs, capsys, storage):
             "run.csv: line 16, column 'x' is 'lots', expected a finite number",
         ),
         (("run.csv", "t,u,x", "t,u,y"), "run.csv: no column 'x', expected one of t, u, y"),
-        (("map.yaml", "deg", "gon"), "map.yaml: unit 'gon' unknown, expected one of"),
-        (("map.yaml", "position", "angle"), "map.yaml: channels: unknown key 'angle'"),
+        (
+            ("map.yaml", "deg", "gon"),
+            "map.yaml: line 5: channels.position: unit 'gon' unknown, expected one of",
+        ),
+        (("map.yaml", "position", "angle"), "map.yaml: line 5: channels: unknown key 'angle'"),
     ],
 )
 def test_mistakes_are_one_line_and_status_2(inputs, capsys, change, text):
@@ -104,3 +107,12 @@ def test_the_module_runs_as_a_program(inputs):
     again = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (again.returncode, again.stdout) == (2, "")
     assert again.stderr == f"rsea import: {out}: exists already, expected a new name or --force\n"
+
+
+def test_what_is_missing_is_on_the_terminal_and_in_the_bag(inputs, capsys):
+    file, mapping, out = inputs
+    Path(file).write_text(Path(file).read_text().replace("7,3.5,14", "7,,14"))
+    assert main(["import", file, "--map", mapping, "--out", str(out)]) == 0
+    told = "command: 1 of 20 values of u are missing, the first at 0.007 s"
+    assert told in capsys.readouterr().out.splitlines()
+    assert told in read_record(out).notes

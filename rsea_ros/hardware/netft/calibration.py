@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-import urllib.request
+from collections.abc import Mapping
 from dataclasses import dataclass
-from http.client import HTTPException
-from xml.etree import ElementTree
+from xml.parsers import expat
 
+from rsea_ros.decimal_number import is_decimal
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Wrench
+from rsea_ros.hardware.netft.page import get
+from rsea_ros.wording import shown
 
 NEWTON = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "klbf": 4448.2216152605, "kgf": 9.80665}
 """N per unit of force, as the sensor names it (`scfgfu`)."""
@@ -18,6 +20,9 @@ NEWTON_METRE = {
     "lbf-ft": 1.3558179483314004, "kgf-cm": 0.0980665, "kgfcm": 0.0980665,
 }  # fmt: skip
 """N m per unit of torque (`scfgtu`)."""
+
+_MOST = 1e12
+"""Counts for a unit, or records a second. A sensor has a million counts for a newton."""
 
 
 @dataclass(frozen=True)
@@ -38,10 +43,9 @@ class Calibration:
 def parse(page: bytes, where: str = "netftapi2.xml") -> Calibration:
     """Return the calibration of a page. Raises DeviceError naming the field that is missing or wrong."""
     try:
-        root = ElementTree.fromstring(page)
-    except ElementTree.ParseError as error:
+        fields = _fields(page)
+    except (expat.ExpatError, LookupError, ValueError) as error:
         raise DeviceError(f"{where}: not XML ({error}), expected the sensor's calibration") from None
-    fields = {element.tag: (element.text or "").strip() for element in root.iter()}
     force = _unit(fields, "scfgfu", NEWTON, where) / _counts(fields, "cfgcpf", where)
     torque = _unit(fields, "scfgtu", NEWTON_METRE, where) / _counts(fields, "cfgcpt", where)
     rate = _counts(fields, "comrdtrate", where) if "comrdtrate" in fields else math.nan
@@ -49,30 +53,46 @@ def parse(page: bytes, where: str = "netftapi2.xml") -> Calibration:
 
 
 def fetch(host: str, port: int = 80, timeout: float = 2.0) -> Calibration:
-    """Ask a sensor for its calibration. Raises DeviceError when it does not answer."""
-    address = f"http://{host}:{port}/netftapi2.xml"
-    try:
-        opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))  # the sensor is next door
-        with opener.open(address, timeout=timeout) as answer:
-            page = answer.read(1 << 20)
-    except (OSError, HTTPException, ValueError) as error:
-        raise DeviceError(f"F/T sensor {address}: {error}, expected its calibration") from None
-    return parse(page, address)
+    """Ask a sensor for its calibration. Raises DeviceError when it has not answered after timeout, s."""
+    return parse(get(host, port, "/netftapi2.xml", timeout), f"http://{host}:{port}/netftapi2.xml")
 
 
-def _counts(fields: dict[str, str], name: str, where: str) -> float:
+def _fields(page: bytes) -> Mapping[str, str]:
+    """Return the text of every element by its name. Raises ValueError for a page that declares entities."""
+    fields: dict[str, str] = {}
+    path: list[str] = []
+
+    def start(name: str, attributes: object) -> None:
+        path.append(name)
+        fields[name] = ""
+
+    def text(data: str) -> None:
+        if path:
+            fields[path[-1]] += data
+
+    def entity(name: str, *rest: object) -> None:
+        raise ValueError(f"entity {shown(name)} declared")
+
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda name: path.pop()
+    parser.CharacterDataHandler = text
+    parser.EntityDeclHandler = entity
+    parser.Parse(page, True)
+    return {name: value.strip() for name, value in fields.items()}
+
+
+def _counts(fields: Mapping[str, str], name: str, where: str) -> float:
     text = fields.get(name, "")
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not (math.isfinite(value) and value > 0.0):
-        raise DeviceError(f"{where}: {name} = {text!r}, expected a number above 0")
+    value = float(text) if is_decimal(text) else 0.0
+    if not 1.0 / _MOST < value < _MOST:
+        raise DeviceError(f"{where}: {name} = {shown(text)}, expected a number above 0 and below {_MOST:g}")
     return value
 
 
-def _unit(fields: dict[str, str], name: str, units: dict[str, float], where: str) -> float:
+def _unit(fields: Mapping[str, str], name: str, units: dict[str, float], where: str) -> float:
     text = fields.get(name, "")
     if text not in units:
-        raise DeviceError(f"{where}: {name} = {text!r}, expected one of {', '.join(units)}")
+        raise DeviceError(f"{where}: {name} = {shown(text)}, expected one of {', '.join(units)}")
     return units[text]

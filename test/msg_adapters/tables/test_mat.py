@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from msg_adapters.tables import mat_file
 from msg_adapters.tables.files import read_columns
 from rsea_ros.errors import ImportMapError
 
@@ -21,19 +22,22 @@ def test_vectors_of_any_orientation_and_type(tmp_path):
 @pytest.mark.parametrize(
     ("column", "text"),
     [
-        ("y", "no column 'y', expected one of t, short, word, table, gain, broken"),
+        ("y", "no column 'y', expected one of t, short, word, table, gain, broken, angle, cell"),
         ("short", "vectors of unequal length"),
-        ("word", r"variable 'word' is <U5 \(1,\), expected a vector of numbers"),
-        ("table", r"variable 'table' is float64 \(2, 3\), expected a vector"),
+        ("word", r"variable 'word' is char \(1,\), expected a vector of numbers"),
+        ("table", r"variable 'table' is double \(2, 3\), expected a vector"),
         ("gain", r"variable 'gain' is .* \(1, 1\), expected a vector"),
-        ("broken", r"broken\[3\] is nan, expected a finite number"),
+        ("broken", r"broken\[3\] is inf, expected a finite number"),
+        ("angle", r"variable 'angle' is complex128 .*, expected a vector of numbers"),
+        ("cell", r"variable 'cell' is struct .*, expected a vector of numbers"),
     ],
 )
 def test_variables_that_are_no_channel(tmp_path, column, text):
     file = tmp_path / "run.mat"
-    broken = np.array([0.0, 1.0, 2.0, np.nan, 4.0])
+    broken = np.array([0.0, 1.0, 2.0, np.inf, 4.0])
     content = {"t": np.arange(5.0), "short": np.arange(4.0), "word": "hello", "table": np.eye(2, 3)}
-    savemat(file, {**content, "gain": 3.0, "broken": broken})
+    content |= {"gain": 3.0, "broken": broken, "angle": np.arange(5) * 1j, "cell": {"a": 1.0}}
+    savemat(file, content)
     with pytest.raises(ImportMapError, match=text):
         read_columns(file, ["t", column])
 
@@ -54,3 +58,55 @@ def test_files_that_are_no_gzip(tmp_path, content):
     file.write_bytes(content)
     with pytest.raises(ImportMapError, match=str(file)):
         read_columns(file, ["t"])
+
+
+def test_a_missing_number_is_a_hole(tmp_path):
+    savemat(tmp_path / "run.mat", {"x": np.array([0.0, np.nan, 2.0])})
+    assert np.isnan(read_columns(tmp_path / "run.mat", ["x"])["x"]).tolist() == [False, True, False]
+
+
+def test_only_what_is_named_is_loaded_and_its_size_comes_first(tmp_path, monkeypatch):
+    file = tmp_path / "run.mat"
+    savemat(file, {"x": np.arange(50.0), "large": np.zeros(400)})
+    monkeypatch.setattr(mat_file, "LARGEST", 100)
+    assert read_columns(file, ["x"])["x"].size == 50
+    with pytest.raises(ImportMapError, match="variable 'large' has 400 values, expected fewer than 100"):
+        read_columns(file, ["large"])
+
+
+@pytest.mark.parametrize("head", [b"MATLAB 7.3 MAT-file, Platform: GLNXA64", b"\x89HDF\r\n\x1a\n"])
+def test_version_7_3_is_named(tmp_path, head):
+    (tmp_path / "run.mat").write_bytes(head + bytes(600))
+    with pytest.raises(
+        ImportMapError, match=r"run.mat: MAT file of version 7.3 .* save\(…, '-v7'\) in MATLAB"
+    ):
+        read_columns(tmp_path / "run.mat", ["t"])
+
+
+@pytest.mark.parametrize(
+    ("program", "message"),
+    [
+        ("import os; os.kill(os.getpid(), 11)", "could not be read: the MAT reader ended with SIGSEGV"),
+        ("raise SystemExit(3)", "could not be read: the MAT reader ended with status 3"),
+        ("print('hello')", "could not be read: the MAT reader gave no answer"),
+        ("while True: pass", "could not be read within 0.3 s"),
+    ],
+)
+def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message):
+    (tmp_path / "child.py").write_text(program)
+    savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
+    monkeypatch.setattr(mat_file, "CHILD", tmp_path / "child.py")
+    monkeypatch.setattr(mat_file, "TIME", 0.3 if "while" in program else 20.0)
+    with pytest.raises(ImportMapError, match=message):
+        read_columns(tmp_path / "run.mat", ["x"])
+
+
+def test_a_file_that_asks_for_all_memory(tmp_path):
+    """A vector of a hundred million numbers that the file does not hold, declared in its header."""
+    savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
+    data = (tmp_path / "run.mat").read_bytes()
+    shape = np.array([1, 5], "<i4").tobytes()
+    assert data.count(shape) == 1
+    (tmp_path / "run.mat").write_bytes(data.replace(shape, np.array([1, 99_999_999], "<i4").tobytes()))
+    with pytest.raises(ImportMapError, match=str(tmp_path)):
+        read_columns(tmp_path / "run.mat", ["x"])

@@ -1,0 +1,72 @@
+"""How a table of text is laid out: what parts its cells, and their names."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rsea_ros.decimal_number import is_decimal
+
+COMMENT = "#"
+BLANKS = " "
+"""As delimiter: one or several blanks or tabs."""
+DELIMITERS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": BLANKS, "tab": "\t", "blanks": BLANKS}
+"""What a map may say, and what is meant."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """names: of the columns. headed: whether they stand in the first line that counts."""
+
+    delimiter: str
+    names: tuple[str, ...]
+    headed: bool
+
+    def cells(self, line: str) -> list[str]:
+        """Return the cells of a line; a delimiter at its end begins no further cell."""
+        cells = split(line, self.delimiter)
+        return cells[:-1] if len(cells) == len(self.names) + 1 and not cells[-1] else cells
+
+    def fits(self, line: str) -> bool:
+        """Tell whether a line without quotes has a cell for every name."""
+        if self.delimiter == BLANKS:
+            return len(line.split()) == len(self.names)
+        extra = line.count(self.delimiter) + 1 - len(self.names)
+        return extra == 0 or (extra == 1 and line.rstrip(" ").endswith(self.delimiter))
+
+
+def counts(line: str) -> bool:
+    """Tell whether a line is neither empty nor a comment."""
+    text = line.strip()
+    return bool(text) and not text.startswith(COMMENT)
+
+
+def split(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line without blanks and quotes around them."""
+    if delimiter == BLANKS:
+        return [cell.strip('"') for cell in line.split()]
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+
+
+def layout_of(first: str, columns: Sequence[str], path: Path, delimiter: str | None) -> Layout:
+    """Return the layout by the first line that counts.
+
+    Without a delimiter it is the first of several with which the line has the columns asked for; where
+    none has, the one that makes most cells.
+    """
+    usual = "\t" if ".tsv" in path.suffixes else ","
+    tried = [delimiter] if delimiter else list(dict.fromkeys([usual, "\t", ";", ",", "|", BLANKS]))
+    layouts = [_layout(first, one) for one in tried]
+    fitting = (layout for layout in layouts if set(columns) <= set(layout.names))
+    return next(fitting, max(layouts, key=lambda layout: len(layout.names)))
+
+
+def _layout(first: str, delimiter: str) -> Layout:
+    cells = split(first, delimiter)
+    while cells[1:] and not cells[-1]:
+        cells.pop()
+    if all(is_decimal(cell) for cell in cells):
+        return Layout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
+    return Layout(delimiter, tuple(cells), headed=True)

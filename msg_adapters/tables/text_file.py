@@ -1,0 +1,114 @@
+"""Columns of numbers out of text, block by block: memory grows with the columns asked for, not the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from msg_adapters.tables.layout import BLANKS, Layout, counts, layout_of
+from msg_adapters.tables.lines import blocks_of_lines
+from msg_adapters.tables.table import Table, check_size, index_of
+from rsea_ros.decimal_number import is_decimal
+from rsea_ros.signals import FloatArray
+from rsea_ros.wording import shown
+
+MISSING = {"", "-", "--", "na", "n/a", "#n/a", "nan", "nil", "none", "null"}
+"""What stands, in small letters, where there is no value."""
+MOST_LEFT_OUT = 0.1
+"""Of the rows. With more of them the table is not what its first line says."""
+_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
+
+
+def read_text(path: Path, columns: Sequence[str], delimiter: str | None) -> Table:
+    """Return the columns asked for. Raises ValueError with line, column, value and expectation."""
+    numbered = _numbered_blocks(path)
+    first = next(((number, line) for block in numbered for number, line in block), None)
+    if first is None:
+        raise ValueError("empty file, expected a row of column names and rows of numbers")
+    layout = layout_of(first[1], columns, path, delimiter)
+    reader = _Reader(layout, {column: index_of(column, layout.names) for column in columns})
+    for block in _numbered_blocks(path):
+        reader.add([row for row in block if not (layout.headed and row == first)])
+    return reader.table()
+
+
+def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
+    """Yield lines that count, with their numbers."""
+    number = 1
+    for lines in blocks_of_lines(path):
+        yield [(number + i, line) for i, line in enumerate(lines) if counts(line)]
+        number += len(lines)
+
+
+class _Reader:
+    """Collects columns block by block."""
+
+    def __init__(self, layout: Layout, indices: dict[str, int]) -> None:
+        self._layout = layout
+        self._indices = indices
+        self._parts: dict[str, list[FloatArray]] = {column: [] for column in indices}
+        self._rows = 0
+        self._left_out = 0
+        self._first = ""
+
+    def add(self, rows: list[tuple[int, str]]) -> None:
+        """Take a block of lines that count."""
+        if not rows:
+            return
+        self._rows += len(rows)
+        check_size(self._rows, len(self._indices))
+        values = self._fast([line for _, line in rows])
+        if values is None:
+            values = self._careful(rows)
+        for at, parts in enumerate(self._parts.values()):
+            parts.append(np.ascontiguousarray(values[:, at]))
+
+    def table(self) -> Table:
+        """Return what was collected. Raises ValueError where that is no table."""
+        if not self._rows:
+            raise ValueError("no rows, expected numbers below the column names")
+        if self._left_out > MOST_LEFT_OUT * self._rows:
+            raise ValueError(f"{self._first}, as in {self._left_out} of {self._rows} rows")
+        columns = {}
+        for column, parts in self._parts.items():
+            columns[column] = np.concatenate(parts)
+            parts.clear()
+        return Table(columns, self._rows, self._left_out, self._first)
+
+    def _fast(self, lines: list[str]) -> FloatArray | None:
+        """Return the values of a block where all of it is plain numbers, else None."""
+        layout = self._layout
+        if not all(layout.fits(line) for line in lines):
+            return None
+        delimiter = None if layout.delimiter == BLANKS else layout.delimiter
+        indices = list(self._indices.values())
+        try:
+            table = np.loadtxt(lines, delimiter=delimiter, usecols=indices, comments=None, ndmin=2)
+        except ValueError:
+            return None
+        return table if len(table) == len(lines) and np.isfinite(table).all() else None
+
+    def _careful(self, rows: list[tuple[int, str]]) -> FloatArray:
+        """Return the values of a block, NaN for what is missing, without rows that have too few cells."""
+        kept = []
+        for number, line in rows:
+            cells = self._layout.cells(line)
+            if len(cells) == len(self._layout.names):
+                kept.append([_value(number, name, cells[at]) for name, at in self._indices.items()])
+                continue
+            self._left_out += 1
+            expected = len(self._layout.names)
+            self._first = self._first or f"line {number} has {len(cells)} fields, expected {expected}"
+        return np.array(kept, np.float64).reshape(len(kept), len(self._indices))
+
+
+def _value(line: int, column: str, cell: str) -> float:
+    if is_decimal(cell):
+        return float(cell)
+    if cell.lower() in MISSING:
+        return float("nan")
+    hint = ", with a decimal point" if _COMMA.fullmatch(cell) else ""
+    raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, expected a finite number{hint}")

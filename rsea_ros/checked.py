@@ -1,0 +1,61 @@
+"""Values out of a YAML document, checked: each error names the field, the value and what was expected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rsea_ros.errors import FieldError
+from rsea_ros.units import same_unit
+from rsea_ros.wording import shown
+
+
+def number(value: Any, name: str, unit: str) -> float:
+    """Return a YAML value as a float. Raises FieldError when it is not a number."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    try:
+        converted = float(value) if is_number else math.nan
+    except OverflowError:
+        converted = math.nan
+    if math.isnan(converted):
+        raise FieldError(f"{name} = {shown(value)}, expected a number ({unit})", name)
+    return converted
+
+
+def switch(body: Mapping[str, Any], name: str) -> bool:
+    """Return true or false of a group. Raises FieldError when it is something else."""
+    value = body.get(name.split(".")[-1], False)
+    if not isinstance(value, bool):
+        raise FieldError(f"{name} = {shown(value)}, expected true or false", name)
+    return value
+
+
+def text(value: Any, name: str) -> str:
+    """Return a text. Raises FieldError when it is none."""
+    if not isinstance(value, str):
+        raise FieldError(f"{name} = {shown(value)}, expected text", name)
+    return value
+
+
+def mapping(value: Any, name: str, expected: str = "a mapping") -> Mapping[str, Any]:
+    """Return a mapping. Raises FieldError when it is none."""
+    if not isinstance(value, Mapping):
+        raise FieldError(f"{name} = {shown(value)}, expected {expected}", name)
+    return value
+
+
+def only_keys(body: Mapping[str, Any], allowed: set[str], where: str) -> None:
+    """Raise FieldError for a key that is not allowed."""
+    for key in body:
+        if key not in allowed:
+            expected = ", ".join(sorted(allowed))
+            raise FieldError(
+                f"{where}: unknown key {shown(key)}, expected one of {expected}", f"{where}.{key}"
+            )
+
+
+def unit(value: Any, name: str, expected: str) -> None:
+    """Raise FieldError for another unit than the one expected, however that is written."""
+    if not same_unit(value, expected):
+        raise FieldError(f"{name} = {shown(value)}, expected {expected!r}", name)

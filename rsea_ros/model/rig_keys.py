@@ -1,0 +1,103 @@
+"""The keys of a rig: what each expects. docs/rig.md shows them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import get_args
+
+from rsea_ros.keys import NEEDED, Key, table
+from rsea_ros.model.rig import END_NAMES, FIELDS, Field, Train
+from rsea_ros.signals import UNITS
+
+_END = (
+    "inertia of its load",
+    "its viscous damping",
+    "its stiffness to ground",
+    "m g l of a pendulum: its largest torque",
+)
+_MEANINGS = {
+    "rotor.reflected_inertia": "rotor inertia, seen at the gear output",
+    "rotor.reflected_damping": "viscous damping of motor and gear, seen there",
+    "gear.ratio": "turns of the motor for one of the output",
+    "gear.stiffness": "of the gear itself",
+    "chassis.inertia": "of what turns with the gear's housing",
+    "spring.stiffness": "of the spring; needed unless it is rigid",
+    "spring.damping": "of the spring",
+    "housing.inertia": "of the housing, where a proximal spring holds it",
+    "proximal_spring.stiffness": "between the housing and its end",
+    "proximal_spring.damping": "of that spring",
+    **{
+        f"{end}.{key}": meaning
+        for end in END_NAMES
+        for key, meaning in zip(("inertia", "damping", "stiffness", "gravity"), _END, strict=True)
+    },
+}  # fmt: skip
+_TRAINS = ", ".join(f"`{train}`" for train in get_args(Train))
+GROUPS = sorted({name.split(".")[0] for name in FIELDS})
+SWITCHES: Mapping[str, Sequence[Key]] = {
+    "gear": (Key("train", _TRAINS, "planetary", "kind of gear train"),),
+    "spring": (Key("rigid", "true or false", "false", "there is no spring"),),
+    **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in END_NAMES},
+}  # fmt: skip
+TOP = (
+    Key("name", "text", "name of the file", "of the rig"),
+    Key("about", "text", "empty", "what the bench is"),
+    Key("source", "text", "empty", "where its values come from"),
+    Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "which end the paper calls proximal"),
+    Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "where the F/T sensor sits"),
+    Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
+    Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
+    Key("controller", "mapping", "none", "position loop that ran during the record"),
+    Key("effects", "list", "none", "effects of the catalogue that act"),
+    *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
+)
+QUANTITY = (
+    Key("value", "number", NEEDED),
+    Key("unit", "the unit of the field", NEEDED),
+    Key("spread", "0 to 10, relative, one sigma", "0", "how well the value is known; 0: no fit moves it"),
+    Key("source", "text", "empty", "where the value comes from"),
+    Key("ci95", "[low, high]", "none", "95 % interval that a fit has written"),
+)
+SENSOR = (
+    Key("noise", "number >= 0", "0", "standard deviation of a sample"),
+    Key("quantum", "number >= 0", "0", "smallest step"),
+    Key("unit", "unit of the channel", NEEDED),
+    Key("source", "text", "empty", "where the values come from"),
+    Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
+    Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
+)
+CLOCK = (Key("value", "number", NEEDED), Key("unit", "s", NEEDED))
+CONTROLLER = (
+    Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
+    Key("k_v", "N m s/rad, >= 0", NEEDED),
+    Key("limit", "N m, > 0", "no limit", "largest command"),
+    Key("source", "text", "empty", "where the values come from"),
+)
+EFFECT = (
+    Key("name", "name of an effect, each once", NEEDED),
+    Key("parameters", "mapping of numbers in SI, within their bounds", NEEDED),
+    Key("ci95", "mapping", "none", "95 % intervals that a diagnosis has written"),
+)
+
+
+def tables() -> str:
+    """Return the tables of docs/rig.md in Markdown."""
+    parts = [table("rig", TOP)]
+    for group in GROUPS:
+        fields = [(name, field) for name, field in FIELDS.items() if name.startswith(f"{group}.")]
+        parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
+    parts.append(table("sensors.CHANNEL", SENSOR))
+    parts.append("Channels and their units: " + ", ".join(f"`{n}` {u}" for n, u in UNITS.items()) + ".\n")
+    parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
+    return "\n".join(parts)
+
+
+def _key(name: str, field: Field) -> Key:
+    bound = f"{'>=' if field.low_allowed else '>'} {field.low:g}"
+    default = (
+        NEEDED if field.default is None else "infinite" if math.isinf(field.default) else f"{field.default:g}"
+    )
+    if name.endswith("_end.inertia"):
+        default = "needed unless clamped"
+    return Key(name.split(".")[1], f"{field.unit}, {bound}", default, _MEANINGS[name])

@@ -1,0 +1,190 @@
+"""YAML that people write, read strictly: one meaning a value, no key twice, bounded in size and depth.
+
+Numbers are plain decimals (`1e-3` too). What YAML 1.1 takes for a number and people do not (`0x10`, `010`,
+`1:30`, `1_000`, a date) is refused with its line, as are anchors, aliases and tags.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rsea_ros.decimal_number import decimal, is_decimal
+from rsea_ros.errors import FieldError
+from rsea_ros.wording import shown
+
+LARGEST = 1 << 20
+"""Bytes. The largest rig has 4 kB."""
+DEEPEST = 16
+"""Levels of nesting. A rig has 4."""
+_CONSTANTS: dict[str, Any] = dict.fromkeys(("", "~", "null", "Null", "NULL"))
+_CONSTANTS |= {
+    spelling: value
+    for words, value in ((("true", "yes", "on"), True), (("false", "no", "off"), False))
+    for word in words
+    for spelling in (word, word.capitalize(), word.upper())
+}  # fmt: skip
+_CONSTANTS |= {
+    sign + dot: float(sign + dot.lstrip(".")) for sign in ("", "+", "-") for dot in (".inf", ".Inf", ".INF")
+}
+_CONSTANTS |= dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan"))
+_DOUBTFUL = {
+    "hexadecimal": re.compile(r"[-+]?0[xX][0-9a-fA-F_]+"),
+    "binary": re.compile(r"[-+]?0b[01_]+"),
+    "octal": re.compile(r"[-+]?0(o|_*[0-9])[0-9_]*"),
+    "sexagesimal": re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?"),
+    "a number with underscores": re.compile(r"[-+]?[0-9.]*[0-9]_[0-9_.]*([eE][-+]?[0-9]+)?"),
+    "a date": re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt ].*)?"),
+}
+_LONGEST_NUMBER = 400
+"""Characters. Python refuses to read integers of more than 4300 digits, and a double holds 309."""
+Way = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a file holds: mappings, lists, texts, numbers, switches, None; and the line of each.
+
+    lines: by the way to a value, keys and indices as texts.
+    """
+
+    content: Any
+    lines: Mapping[Way, int]
+
+    def where(self, field: str) -> str:
+        """Return `line 7: ` of a dotted field such as `effects[0].name`, or of the nearest one above it."""
+        way = tuple(re.findall(r"[^.\[\]]+", field))
+        way = way if way[:1] in self.lines else way[1:]  # `rig.colour` is the key `colour` of a whole rig
+        while way and way not in self.lines:
+            way = way[:-1]
+        line = self.lines.get((*way, "value"), self.lines.get(way))
+        return f"line {line}: " if way else ""
+
+
+def read(path: Path) -> Document:
+    """Read a file. Raises OSError, and FieldError with line, key, value and what was expected."""
+    if stat.S_ISFIFO(path.stat().st_mode):
+        raise FieldError("is a pipe, expected a file")
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise FieldError(f"more than {LARGEST} bytes, expected a file that a person wrote")
+    try:
+        return parse(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise FieldError(f"not YAML: {error}, expected text in UTF-8") from None
+
+
+def parse(text: str) -> Document:
+    """Return the document of a text. Raises FieldError with line, key, value and what was expected."""
+    lines: dict[Way, int] = {}
+    try:
+        events = _checked(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
+        first = next(events, None)
+        content = None if first is None else _value(first, events, (), lines)
+        if next(events, None) is not None:
+            raise FieldError("not YAML: a second document, expected one")
+    except yaml.YAMLError as error:
+        raise FieldError(f"not YAML: {' '.join(str(error).split())}") from None
+    return Document(content, lines)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes every text that would not be read as the text that it is."""
+
+
+def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+    doubtful = any(pattern.fullmatch(text) for pattern in _DOUBTFUL.values())
+    style = "'" if doubtful or is_decimal(text) or text in _CONSTANTS else None
+    style = '"' if any(mark in text for mark in "\x85\u2028\u2029") else style  # line breaks, to YAML
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _quoted)
+
+
+def dump(document: Mapping[str, Any]) -> str:
+    """Return the text that `parse` reads as the document."""
+    return str(yaml.dump(document, Dumper=_Dumper, sort_keys=False, allow_unicode=True))
+
+
+def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
+    """Yield the events that carry content; refuse what the module does not read."""
+    depth = 0
+    for event in events:
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+            raise _refusal(event, "an anchor or alias (& or *), expected the value written out")
+        tag = getattr(event, "tag", None)
+        if tag not in (None, "!"):
+            raise FieldError(f"not YAML: line {_line(event)}: tag {shown(tag)}, expected none")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise _refusal(event, f"nested more than {DEEPEST} deep")
+        if isinstance(event, (yaml.ScalarEvent, yaml.CollectionStartEvent, yaml.CollectionEndEvent)):
+            yield event
+
+
+def _value(event: yaml.Event, events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> Any:
+    """Return the value that begins with an event, taking what belongs to it from the events after it."""
+    lines.setdefault(way, _line(event))
+    if isinstance(event, yaml.ScalarEvent):
+        return _scalar(event, ".".join(way) or "value")
+    if isinstance(event, yaml.MappingStartEvent):
+        return _mapping(events, way, lines)
+    items: list[Any] = []
+    for item in _until_end(events):
+        items.append(_value(item, events, (*way, str(len(items))), lines))
+    return items
+
+
+def _mapping(events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> dict[Any, Any]:
+    body: dict[Any, Any] = {}
+    for event in _until_end(events):
+        if not isinstance(event, yaml.ScalarEvent):
+            raise _refusal(event, "a key that is no single word, expected a name")
+        key = _scalar(event, "key")
+        name = (*way, str(key))
+        if name in lines:
+            raise _refusal(event, f"key {shown(key)} stands twice, first in line {lines[name]}")
+        lines[name] = _line(event)
+        body[key] = _value(next(events), events, name, lines)
+    return body
+
+
+def _until_end(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
+    """Yield where each part of a collection begins, up to the collection's end."""
+    for event in events:
+        if isinstance(event, yaml.CollectionEndEvent):
+            return
+        yield event
+
+
+def _scalar(event: yaml.ScalarEvent, key: str) -> Any:
+    """Return text, number, switch or None. A quoted one is a text."""
+    text = str(event.value)
+    if not event.implicit[0] or event.tag or len(text) > _LONGEST_NUMBER:
+        return text
+    if text in _CONSTANTS:
+        return _CONSTANTS[text]
+    for kind, pattern in _DOUBTFUL.items():
+        if pattern.fullmatch(text):
+            expected = "expected a decimal number, or a text in quotes"
+            raise _refusal(event, f"{key}: {shown(text)} is {kind}, {expected}")
+    if re.fullmatch(r"[-+]?[0-9]+", text):
+        return int(text)
+    return decimal(text) if is_decimal(text) else text
+
+
+def _refusal(event: yaml.Event, what: str) -> FieldError:
+    return FieldError(f"line {_line(event)}: {what}")
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1 if event.start_mark else 0

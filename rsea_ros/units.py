@@ -1,0 +1,38 @@
+"""Units as people write them: `Nm`, `N*m`, `N·m` and `N m` are one, `kg m^2`, `kgm2` and `kg*m²` too."""
+
+from __future__ import annotations
+
+import re
+
+_SEPARATOR = re.compile(r"[\s·⋅∙*.]+|-(?=[A-Za-z])")
+_RAISED = str.maketrans("²³µ", "23μ")
+_SAME = {
+    "°": "deg",
+    "°/s": "deg/s",
+    "μs": "us",
+    "μm": "um",
+    "rev/min": "rpm",
+    "N m/(rad/s)": "N m s/rad",
+    "Nm/(rad/s)": "N m s/rad",
+    "-": "1",
+    "1/1": "1",
+}
+
+
+def same_unit(text: object, unit: str) -> bool:
+    """Tell whether a text means a unit, which is written as in `N m s/rad`.
+
+    Blanks between the symbols may be left out, but not put into a symbol: `m s` is no millisecond.
+    """
+    words, wanted = _words(str(text).strip()), _words(unit)
+    if words == wanted:
+        return True
+    return " " in wanted and words.replace(" ", "") == wanted.replace(" ", "")
+
+
+def _words(text: str) -> str:
+    """Return the symbols with a blank between factors, exponents without a sign of power."""
+    plain = text.replace("**", "^").translate(_RAISED)
+    plain = " ".join(_SEPARATOR.sub(" ", plain).split()) if plain != "-" else plain
+    plain = re.sub(r" ?/ ?", "/", plain.replace("^", ""))
+    return _SAME.get(plain, plain)

@@ -1,0 +1,130 @@
+"""YAML of people: what could be misread is refused with its line, and nothing grows while it is read."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rsea_ros.errors import FieldError
+from rsea_ros.strict_yaml import DEEPEST, LARGEST, dump, parse, read
+
+REFUSED = {
+    "a: 1\nb: 2\na: 3": r"line 3: key 'a' stands twice, first in line 1",
+    "g:\n  x: 1\n  x: 1": r"line 3: key 'x' stands twice, first in line 2",
+    "1: x\n1: y": r"line 2: key 1 stands twice",
+    "g:\n  value: 0x10": r"line 2: g.value: '0x10' is hexadecimal, expected a decimal number",
+    "a: 010": r"line 1: a: '010' is octal",
+    "a: 0o17": r"line 1: a: '0o17' is octal",
+    "a: 0b11": r"line 1: a: '0b11' is binary",
+    "a: 1:30": r"line 1: a: '1:30' is sexagesimal",
+    "a: 1:30:20.5": r"line 1: a: '1:30:20.5' is sexagesimal",
+    "a: 1_000": r"line 1: a: '1_000' is a number with underscores",
+    "a: 1_0.5": r"line 1: a: '1_0.5' is a number with underscores",
+    "a: [1, 2024-07-18]": r"line 1: a.1: '2024-07-18' is a date",
+    "a: 2024-07-18 10:58:26": r"line 1: a: '2024-07-18 10:58:26' is a date",
+    "a: &x 1": r"line 1: an anchor or alias",
+    "a: *x": r"line 1: an anchor or alias",
+    "a: !!binary aGk=": r"not YAML: line 1: tag 'tag:yaml.org,2002:binary', expected none",
+    "a: !!str 5": r"not YAML: line 1: tag",
+    "? [1]\n: 2": r"line 1: a key that is no single word",
+    "a: 1\n---\nb: 2": r"not YAML: a second document",
+    "a: [": r"not YAML: ",
+    "a\tb: \t- 1\n\tc": r"not YAML: ",
+    "a: " + "[" * 50_000: rf"line 1: nested more than {DEEPEST} deep",
+    "\n".join("  " * level + "a:" for level in range(50)): r"line 17: nested more than 16 deep",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda text: text[:30])
+def test_what_could_be_misread_is_refused(text):
+    with pytest.raises(FieldError, match=rf"^{REFUSED[text]}") as caught:
+        parse(text)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 250
+
+
+def test_a_bomb_of_aliases_is_refused_at_once():
+    layers = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+    layers += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]" for k in range(1, 10)]
+    started = time.process_time()
+    with pytest.raises(FieldError, match=r"line 1: an anchor"):
+        parse("\n".join(layers))
+    assert time.process_time() - started < 1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("12", 12),
+        ("-0.5", -0.5),
+        ("1e-3", 1e-3),
+        ("5.0e-6", 5e-6),
+        (".5", 0.5),
+        ("0", 0),
+        ("yes", True),
+        ("False", False),
+        ("~", None),
+        ("", None),
+        (".inf", float("inf")),
+        ("'0x10'", "0x10"),
+        ('"1:30"', "1:30"),
+        ("nan", "nan"),
+        ("1e999", "1e999"),
+        ("1,5", "1,5"),
+        ("N m/rad", "N m/rad"),
+        ("1" * 5000, "1" * 5000),
+    ],
+)
+def test_what_a_value_is(text, value):
+    assert parse(f"a: {text}").content == {"a": value}
+
+
+def test_not_a_number_is_left_to_the_field():
+    assert str(parse("a: .nan").content["a"]) == "nan"
+
+
+PLAIN = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(10**9), 10**9)
+    | st.floats(allow_nan=False)
+    | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=20,
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.dictionaries(st.text(max_size=8), PLAIN, max_size=4))
+def test_what_the_project_writes_is_read_back(document):
+    assert parse(dump(document)).content == document
+
+
+def test_lines_of_fields():
+    document = parse(
+        "name: x\nrotor:\n  inertia:\n    unit: kg\n    value: 3\neffects:\n- name: a\n- name: b\n"
+    )
+    assert document.where("rotor.inertia") == "line 5: "
+    assert document.where("rotor.inertia.unit") == "line 4: "
+    assert document.where("rotor.damping") == "line 2: "
+    assert document.where("effects[1].name") == "line 8: "
+    assert document.where("rig.name") == "line 1: "
+    assert document.where("") == ""
+
+
+def test_files(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_bytes(b"\xef\xbb\xbfa: 1\r\n")
+    assert read(file).content == {"a": 1}
+    file.write_bytes(b"a: \xff")
+    with pytest.raises(FieldError, match=r"not YAML: .*, expected text in UTF-8"):
+        read(file)
+    file.write_bytes(b"a: " + b"x" * LARGEST)
+    with pytest.raises(FieldError, match="more than 1048576 bytes"):
+        read(file)
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FieldError, match="is a pipe, expected a file"):
+        read(tmp_path / "pipe")

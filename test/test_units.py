@@ -1,0 +1,43 @@
+"""Units: every common way to write one is that one, and no other."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from rsea_ros.model.rig import FIELDS
+from rsea_ros.signals import UNITS
+from rsea_ros.units import same_unit
+
+WAYS = {
+    "N m": ["Nm", "N*m", "N·m", "N.m", "N-m", "N⋅m", " N  m "],
+    "kg m^2": ["kgm2", "kg*m^2", "kg m²", "kg·m²", "kg m**2", "kgm^2", "kg m2"],
+    "N m s/rad": ["Nms/rad", "N*m*s/rad", "Nm s/rad", "N·m·s/rad", "Nm/(rad/s)", "N m s / rad"],
+    "N m/rad": ["Nm/rad", "N*m/rad", "N·m / rad"],
+    "rad/s": ["rad / s"],
+    "1": [1, "-", "1"],
+    "deg": ["°"],
+    "us": ["μs", "µs"],
+    "rpm": ["rev/min"],
+}
+
+
+@pytest.mark.parametrize(("unit", "text"), [(u, text) for u, texts in WAYS.items() for text in texts])
+def test_one_unit_in_many_ways(unit, text):
+    assert same_unit(text, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("m s", "ms"), ("mN m", "N m"), ("m N", "N m"), ("N/m", "N m"), ("Nm", "N m/rad"), ("kg m", "kg m^2"),
+     ("rads", "rad/s"), ("", "1"), (None, "1"),
+     ("r p m", "rpm"), ("NM", "N m"), (True, "1"), ("N m^2", "N m")],
+)  # fmt: skip
+def test_other_units(text, unit):
+    assert not same_unit(text, unit)
+
+
+def test_no_two_units_of_the_rig_are_the_same():
+    units = {field.unit for field in FIELDS.values()} | set(UNITS.values())
+    assert not [pair for pair in itertools.permutations(units, 2) if same_unit(*pair)]
