@@ -19,21 +19,8 @@ class Series:
     values: FloatArray
 
 
-def checked(series: Series, notes: list[str]) -> Series:
-    """Return the series without repeated stamps, of which the first is kept and a note is left.
-
-    Raises BagError for a value that is not finite and for a stamp that goes back.
-    """
-    _finite(series)
-    _forward(series)
-    keep = np.diff(series.stamps, prepend=series.stamps[0] - 1) > 0
-    if not keep.all():
-        repeats = np.count_nonzero(~keep)
-        notes.append(f"{series.where}: {repeats} of {keep.size} stamps repeat, the first of each kept")
-    return Series(series.where, series.stamps[keep], series.values[keep])
-
-
-def _finite(series: Series) -> None:
+def check_finite(series: Series) -> None:
+    """Raises BagError for a value that is not finite."""
     bad = np.flatnonzero(~np.isfinite(series.values))
     if bad.size:
         at = bad[0]
@@ -43,15 +30,12 @@ def _finite(series: Series) -> None:
         )
 
 
-def _forward(series: Series) -> None:
-    steps = np.diff(series.stamps)
-    bad = np.flatnonzero(steps < 0)
-    if bad.size:
-        at = bad[0] + 1
-        raise BagError(
-            f"{series.where}[{at}] is stamped {_seconds(series.stamps[at])}, {-steps[at - 1] * 1e-9:.6f} s"
-            f" before its predecessor, expected stamps that never go back ({bad.size} do)"
-        )
+def note_repeats(series: Series, notes: list[str]) -> None:
+    """Leave a note of stamps that repeat."""
+    repeats = np.count_nonzero(np.diff(np.sort(series.stamps)) == 0)
+    if repeats:
+        total = series.stamps.size
+        notes.append(f"{series.where}: {repeats} of {total} stamps repeat, the first of each kept")
 
 
 def _seconds(stamp: np.int64) -> str:

@@ -12,11 +12,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
-BASE = {"errors", "signals", "progress", "wording"}
+BASE = {"errors", "signals", "stamps", "progress", "wording"}
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors"},
+    "stamps": {"signals"},
     "progress": set(),
     "wording": set(),
     "effects": BASE,
@@ -50,6 +51,7 @@ FOREIGN = {
     "control": NUMERIC,
     "design": NUMERIC | {"yaml"},
     "signals": {"numpy"},
+    "stamps": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},

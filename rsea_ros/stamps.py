@@ -1,0 +1,261 @@
+"""Stamps of a run put right: samples in their order, clock jumps taken out, gaps and repeats told.
+
+Samples that only arrived out of order are sorted. A clock that jumped shifts all the samples after the jump:
+sorted, they would mix with those before it, so the jump is taken out first. The two are told apart by
+density: of samples that are merely late there are never more to a stretch of time than the clock ticks.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+
+import numpy as np
+
+from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, IntArray, Record
+
+_GAP = 1.6
+"""In sample periods: a longer interval is a gap."""
+_AROUND = 8
+"""Samples on either side of a gap or a jump that say whether it lasts."""
+_FOLLOW = 0.2
+"""How far the steady clock behind the stamps goes towards each of them."""
+_MOST_JUMPS = 200
+"""Steps back that are looked at, the longest first: no clock is set more often in a run."""
+_LONGEST_PAUSE = 3600.0
+"""Seconds: no run pauses for longer, so the clock was set."""
+LONGEST_PAUSE_NS = _LONGEST_PAUSE * 1e9
+_FEW = 0.01
+"""Share of a channel's samples that lie far from all others: they are stray, not the run."""
+
+KINDS = ("clock_jump", "duplicate_stamps", "dropped_samples", "out_of_order", "stray_stamps")
+
+
+def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
+    """Return the record with rising stamps, and what was wrong with them that it does not tell yet."""
+    faults: list[Fault] = []
+    record, shared = _without_long_pauses(record)
+    faults += shared
+    channels = {}
+    for name, channel in record.channels.items():
+        if len(channel) < 3:
+            channels[name] = channel
+            continue
+        channel, jumps = _without_jumps(channel, name, _expected_span(record, name))
+        channel, disorder = in_order(channel, name)
+        repeated = np.concatenate([[False], np.diff(channel.t) <= 0.0])
+        faults += [*jumps, *disorder]
+        if repeated.any():
+            faults.append(Fault("duplicate_stamps", name, float(repeated.mean())))
+            channel = Channel(channel.t[~repeated], channel.y[~repeated])
+        faults += _dropped(channel, name, int(repeated.sum()))
+        channels[name] = channel
+    told = {fault.channel for fault in record.faults if fault.kind in KINDS}
+    new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in told]
+    return record.with_channels(**channels), new
+
+
+def in_order(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
+    """Return a channel sorted by its stamps, without those that fit nowhere, and what was wrong.
+
+    A channel whose clock jumped back comes as it is: sorting would mix its samples.
+    """
+    step = np.diff(channel.t)
+    if not np.any(step < 0.0) or jumps_back(channel.t).any():
+        return channel, []
+    late = _out_of_order(channel.t)
+    stray = _stray(channel.t, late)
+    order = np.argsort(channel.t[~stray], kind="stable")
+    sorted_channel = Channel(channel.t[~stray][order], channel.y[~stray][order])
+    faults = []
+    if count := int((late & ~stray).sum()):
+        detail = f"first at {channel.t[int(np.argmax(late & ~stray))]:.6g} s, sorted"
+        faults.append(Fault("out_of_order", name, count / len(channel), detail, count, "samples"))
+    if stray.any():
+        faults.append(stray_fault(stray, name))
+    return sorted_channel, faults
+
+
+def jumps_back(t: FloatArray) -> BoolArray:
+    """Return after which samples the clock jumped back, shape (n - 1,)."""
+    step = np.diff(t)
+    period = _period(t)
+    at = np.zeros(len(step), bool)
+    candidates = np.flatnonzero(step < -0.5 * period)
+    if not len(candidates):
+        return at
+    lowest = np.minimum.accumulate(t)
+    highest = np.maximum.accumulate(t[::-1])[::-1]
+    for k in candidates[np.argsort(step[candidates], kind="stable")][:_MOST_JUMPS]:
+        apart = highest[k + 1] < lowest[k] and min(k + 1, len(t) - k - 1) > _AROUND
+        at[k] = apart or _mixes(t, int(k), period)
+    return at
+
+
+def _mixes(t: FloatArray, k: int, period: float) -> bool:
+    """Tell whether the samples after k would lie between those before it rather than in their gaps."""
+    low, high = float(t[k + 1]), float(t[k])
+    reach = (high - low) / period + 1.0
+    around = int(min(len(t), 4 * reach + 2 * _AROUND))
+    before = t[max(0, k + 1 - around) : k + 1]
+    after = t[k + 1 : k + 1 + around]
+    first = max(_AROUND // 2, 2)
+    if len(after) < 2 or len(before) < 2:
+        return False
+    level = _level(after[:_AROUND], period) - _level(before[-_AROUND:], period, before=True)
+    within = [int(((part >= low) & (part <= high)).sum()) for part in (before, after)]
+    return level < -0.75 * period and sum(within) - reach > 0.5 * reach and within[1] >= min(first, reach)
+
+
+def _level(t: FloatArray, period: float, *, before: bool = False) -> float:
+    """Return where the clock of some samples stands at the step that they begin or end at, s."""
+    places = np.arange(len(t)) - (len(t) if before else 0)
+    return float(np.median(t - places * period))
+
+
+def _period(t: FloatArray) -> float:
+    """Return the sample period, s: the median step of those that go forward."""
+    step = np.diff(t)
+    forward = step[step > 0.0]
+    return float(np.median(forward)) if len(forward) else 0.0
+
+
+def _out_of_order(t: FloatArray) -> BoolArray:
+    """Return the fewest samples without which the others are in order (all but a longest rising part)."""
+    ends: list[float] = []
+    places: list[int] = []
+    previous = np.full(len(t), -1)
+    for k, value in enumerate(t.tolist()):
+        at = bisect_right(ends, value)
+        previous[k] = places[at - 1] if at else -1
+        ends[at : at + 1] = [value]
+        places[at : at + 1] = [k]
+    late = np.ones(len(t), bool)
+    k = places[-1]
+    while k >= 0:
+        late[k] = False
+        k = int(previous[k])
+    return late
+
+
+def _stray(t: FloatArray, late: BoolArray) -> BoolArray:
+    """Return which samples out of order have a stamp that is not theirs: no gap is waiting for them there."""
+    kept = t[~late]
+    period = _period(kept)
+    stray = np.zeros(len(t), bool)
+    rank: IntArray = np.cumsum(~late)
+    for k in np.flatnonzero(late):
+        at = int(np.searchsorted(kept, t[k]))
+        far = abs(at - int(rank[k])) > 2
+        near = np.abs(kept[max(0, at - 1) : at + 1] - t[k])
+        outside = at in (0, len(kept)) and float(near.min()) > 10.0 * period
+        stray[k] = far and (outside or float(near.min()) < 0.25 * period)
+    return stray
+
+
+def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
+    """Take out steps of hours: before the few samples that strayed, and where the clock was set."""
+    faults: list[Fault] = []
+    channels = {}
+    for name, channel in record.channels.items():
+        step = np.diff(channel.t)
+        if not np.any(np.abs(step) > _LONGEST_PAUSE):
+            channels[name] = channel
+            continue
+        channel, found = _without_stray_parts(channel, name)
+        channels[name], jumps = _without_set_clock(channel, name)
+        faults += [*found, *jumps]
+    return record.with_channels(**channels), faults
+
+
+def _without_stray_parts(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
+    """Leave out the few samples that lie more than an hour from the others."""
+    stray = far_apart(channel.t, _LONGEST_PAUSE)
+    if not stray.any():
+        return channel, []
+    return Channel(channel.t[~stray], channel.y[~stray]), [stray_fault(stray, name)]
+
+
+def far_apart(t: FloatArray | IntArray, longest: float = LONGEST_PAUSE_NS) -> BoolArray:
+    """Return which stamps are the few that lie further than `longest` from all others, in the unit of t."""
+    breaks = np.flatnonzero(np.abs(np.diff(t)) > longest) + 1
+    stray = np.zeros(len(t), bool)
+    if len(breaks):
+        for part in np.split(np.arange(len(t)), breaks):
+            stray[part] = len(part) <= max(1.0, _FEW * len(t))
+    return stray if not stray.all() else np.zeros(len(t), bool)
+
+
+def stray_fault(stray: BoolArray, name: str) -> Fault:
+    """Return the fault of samples left out because their stamps are not theirs."""
+    count = int(stray.sum())
+    detail = f"first is sample {int(np.argmax(stray))}, left out"
+    return Fault("stray_stamps", name, count / len(stray), detail, count, "samples")
+
+
+def _without_set_clock(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
+    """Take out steps of more than an hour."""
+    at = np.abs(np.diff(channel.t)) > _LONGEST_PAUSE
+    return _taken_out(channel, name, at) if at.any() else (channel, [])
+
+
+def _expected_span(record: Record, name: str) -> float:
+    """Return how long the other channels last, s: a clock that jumped makes one channel longer or shorter."""
+    others = [float(np.ptp(c.t)) for n, c in record.channels.items() if n != name and len(c) > 1]
+    return float(np.median(others)) if others else 0.0
+
+
+def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channel, list[Fault]]:
+    """Take out steps of the clock: those back for good, and one that makes the channel longer than others."""
+    at = jumps_back(channel.t)
+    step = np.diff(channel.t)
+    period = _period(channel.t)
+    surplus = float(channel.t[-1] - channel.t[0]) - expected if expected else 0.0
+    largest = int(np.argmax(step))
+    if (
+        expected
+        and surplus > _GAP * period
+        and step[largest] > _GAP * period
+        and abs(step[largest] - period - surplus) < 2.0 * period
+    ):
+        at[largest] = True
+    return _taken_out(channel, name, at) if at.any() else (channel, [])
+
+
+def _taken_out(channel: Channel, name: str, at: BoolArray) -> tuple[Channel, list[Fault]]:
+    """Return the channel with each step of `at` as long as a period, and the fault."""
+    step = np.diff(channel.t)
+    shift = np.concatenate([[0.0], np.cumsum(np.where(at, step - _period(channel.t), 0.0))])
+    first, largest = int(np.argmax(at)), float(np.abs(shift).max())
+    detail = f"{largest:.4g} s at {channel.t[first]:.3f} s"
+    share = 1.0 - (first + 1) / len(channel.t)
+    return Channel(channel.t - shift, channel.y), [Fault("clock_jump", name, share, detail, largest, "s")]
+
+
+def _dropped(channel: Channel, name: str, taken_out: int) -> list[Fault]:
+    """Return the fault of missing samples. taken_out: how many had a stamp that was not theirs."""
+    step = np.diff(channel.t)
+    period = float(np.median(step)) if len(step) else 0.0
+    if not np.any(step > _GAP * period):
+        return []
+    ticks = _ticks(step, period)
+    lost = float(np.median(ticks[-3:] - np.arange(len(ticks))[-3:])) - taken_out
+    if lost < 1.0:
+        return []
+    longest = int(np.argmax(step))
+    detail = f"longest gap {step[longest]:.4g} s at {channel.t[longest]:.3f} s"
+    return [Fault("dropped_samples", name, lost / (len(channel) + lost), detail, lost, "samples")]
+
+
+def _ticks(step: FloatArray, period: float) -> FloatArray:
+    """Return at which tick of a steady clock each sample was taken, counted along the record.
+
+    The clock follows the stamps slowly: jitter is made up for by the next samples, a gap is not.
+    """
+    tick, behind = 0, 0.0
+    ticks = [0]
+    for places in (step / period).tolist():
+        passed = round(behind + places)
+        behind = (1.0 - _FOLLOW) * (behind + places - passed)
+        tick += passed
+        ticks.append(tick)
+    return np.array(ticks, np.float64)
