@@ -54,7 +54,7 @@ def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     if not complete:
         contents.notes.append(CUT_OFF)
         contents.tell("cut_off", path.name, CUT_OFF)
-    if summary.damage:
+    if complete and summary.damage:
         scanner.damage.add("checksum_mismatch", summary.damage)
     scanner.damage.tell(contents, path.name)
     scanner.compare(path.name)

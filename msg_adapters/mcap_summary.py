@@ -21,6 +21,8 @@ from msg_adapters.mcap_records import (
     number,
 )
 
+NO_END = "it does not end with a footer"
+
 
 @dataclass
 class Summary:
@@ -41,9 +43,9 @@ def read_summary(buffer: Buffer) -> Summary:
     summary = Summary()
     footer = len(buffer) - len(MAGIC) - RECORD.size - FOOTER_CONTENT.size
     if footer < len(MAGIC) or buffer[-len(MAGIC) :] != MAGIC:
-        return summary
+        return Summary(damage=NO_END)
     if RECORD.unpack_from(buffer, footer) != (FOOTER, FOOTER_CONTENT.size):
-        return summary
+        return Summary(damage=NO_END)
     start, _, checksum = FOOTER_CONTENT.unpack_from(buffer, footer + RECORD.size)
     if start == 0:
         return summary

@@ -53,6 +53,8 @@ def known(bag: Path, contents: Contents) -> Known:
     except FileNotFoundError:
         contents.notes.append(f"{bag}: without {NAME} (recorder killed?), read from its files")
         return Known()
+    except BagError:
+        raise
     except (TypeError, ValueError, KeyError) as error:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
         contents.tell("damaged_metadata", NAME, f"not understood ({brief(str(error))}), read without it")

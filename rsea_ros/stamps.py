@@ -17,6 +17,8 @@ _GAP = 1.6
 """In sample periods: a longer interval is a gap."""
 _AROUND = 8
 """Samples on either side of a gap or a jump that say whether it lasts."""
+_SHORTEST_JUMP = 5.0
+"""In sample periods: less than that a channel may well end later than the others, by chance."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _MOST_JUMPS = 200
@@ -199,8 +201,10 @@ def _without_set_clock(channel: Channel, name: str) -> tuple[Channel, list[Fault
 
 
 def _expected_span(record: Record, name: str) -> float:
-    """Return how long the other channels last, s: a clock that jumped makes one channel longer or shorter."""
-    others = [float(np.ptp(c.t)) for n, c in record.channels.items() if n != name and len(c) > 1]
+    """Return how long the channels with other stamps last, s: a jump makes one longer or shorter."""
+    whole = {(len(c), c.t[0], c.t[-1]) for c in record.channels.values() if len(c) > 1}
+    mine = record[name].t
+    others = [last - first for n, first, last in whole if (n, first, last) != (len(mine), mine[0], mine[-1])]
     return float(np.median(others)) if others else 0.0
 
 
@@ -213,8 +217,7 @@ def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channe
     largest = int(np.argmax(step))
     if (
         expected
-        and surplus > _GAP * period
-        and step[largest] > _GAP * period
+        and step[largest] > _SHORTEST_JUMP * period
         and abs(step[largest] - period - surplus) < 2.0 * period
     ):
         at[largest] = True
