@@ -21,6 +21,8 @@ _SHORTEST_JUMP = 5.0
 """In sample periods: less than that a channel may well end later than the others, by chance."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
+_MANY_BACK = 0.02
+"""Share of the steps: where more go back it is disorder, and steps in order of arrival say little."""
 _MOST_JUMPS = 200
 """Steps back that are looked at, the longest first: no clock is set more often in a run."""
 _LONGEST_PAUSE = 3600.0
@@ -83,7 +85,7 @@ def jumps_back(t: FloatArray) -> BoolArray:
     period = _period(t)
     at = np.zeros(len(step), bool)
     candidates = np.flatnonzero(step < -0.5 * period)
-    if not len(candidates):
+    if not len(candidates) or period <= 0.0:
         return at
     lowest = np.minimum.accumulate(t)
     highest = np.maximum.accumulate(t[::-1])[::-1]
@@ -94,18 +96,17 @@ def jumps_back(t: FloatArray) -> BoolArray:
 
 
 def _mixes(t: FloatArray, k: int, period: float) -> bool:
-    """Tell whether the samples after k would lie between those before it rather than in their gaps."""
+    """Tell whether the samples after k lie between those before it, rather than where these leave gaps."""
     low, high = float(t[k + 1]), float(t[k])
-    reach = (high - low) / period + 1.0
-    around = int(min(len(t), 4 * reach + 2 * _AROUND))
+    around = int(min(len(t), 4.0 * (high - low) / period + 2 * _AROUND))
     before = t[max(0, k + 1 - around) : k + 1]
     after = t[k + 1 : k + 1 + around]
-    first = max(_AROUND // 2, 2)
-    if len(after) < 2 or len(before) < 2:
-        return False
-    level = _level(after[:_AROUND], period) - _level(before[-_AROUND:], period, before=True)
-    within = [int(((part >= low) & (part <= high)).sum()) for part in (before, after)]
-    return level < -0.75 * period and sum(within) - reach > 0.5 * reach and within[1] >= min(first, reach)
+    shift = _level(after[:_AROUND], period) - _level(before[-_AROUND:], period, before=True)
+    high = min(high, float(after.max()))
+    due = (high - low) / period + 1.0
+    within = [int(np.count_nonzero((part >= low) & (part <= high))) for part in (before, after)]
+    lasts = within[1] >= min(_AROUND // 2, due)
+    return shift < -0.75 * period and sum(within) > 1.5 * due and lasts
 
 
 def _level(t: FloatArray, period: float, *, before: bool = False) -> float:
@@ -115,8 +116,10 @@ def _level(t: FloatArray, period: float, *, before: bool = False) -> float:
 
 
 def _period(t: FloatArray) -> float:
-    """Return the sample period, s: the median step of those that go forward."""
+    """Return the sample period, s: the median step forward; where many go back, of the sorted stamps."""
     step = np.diff(t)
+    if np.count_nonzero(step < 0.0) > _MANY_BACK * len(step):
+        step = np.diff(np.sort(t))
     forward = step[step > 0.0]
     return float(np.median(forward)) if len(forward) else 0.0
 

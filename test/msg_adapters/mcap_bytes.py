@@ -75,7 +75,9 @@ class McapFile:
 
     def file(self, data: Sequence[bytes] | None = None, *, checksum: int | None = None) -> bytes:
         """Return the file; checksum: of the data, by default the right one."""
-        body = MAGIC + record(HEADER, text("ros2") + text("")) + b"".join(self.data() if data is None else data)
+        body = (
+            MAGIC + record(HEADER, text("ros2") + text("")) + b"".join(self.data() if data is None else data)
+        )
         body += record(DATA_END, struct.pack("<I", zlib.crc32(body) if checksum is None else checksum))
         summary = self.summary()
         footer = struct.pack("<BQQQ", FOOTER, 20, len(body), 0)

@@ -9,7 +9,18 @@ import zlib
 import numpy as np
 import pytest
 from foreign import run_rows
-from mcap_bytes import ATTACHMENT, CHUNK_ROWS, DATA_END, MESSAGE, McapFile, chunk, message, record, text, write
+from mcap_bytes import (
+    ATTACHMENT,
+    CHUNK_ROWS,
+    DATA_END,
+    MESSAGE,
+    McapFile,
+    chunk,
+    message,
+    record,
+    text,
+    write,
+)
 
 from msg_adapters import read_record
 from rsea_ros.errors import BagError
@@ -162,6 +173,8 @@ def _is_chunk(data: bytearray, at: int) -> bool:
 
 def test_a_bag_without_a_sound_chunk_is_refused_in_one_line(tmp_path):
     parts = [_flipped(part, 200) for part in CHUNKED.data()]
-    with pytest.raises(BagError, match="no message on /rsea/torque_command.*damaged MCAP.*checksum") as caught:
+    with pytest.raises(
+        BagError, match=r"no message on /rsea/torque_command.*damaged MCAP.*checksum"
+    ) as caught:
         read_record(write(tmp_path / "a.mcap", CHUNKED.file(parts)))
     assert "\n" not in str(caught.value)

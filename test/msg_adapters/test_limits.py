@@ -96,7 +96,7 @@ HOSTILE = {
 
 @pytest.mark.parametrize("case", HOSTILE)
 def test_a_database_with_a_program_of_its_own_is_refused(tmp_path, case):
-    with pytest.raises(BagError, match="expected a plain table|no plain column"):
+    with pytest.raises(BagError, match=r"expected a plain table|no plain column"):
         read_record(_spoilt(tmp_path, *HOSTILE[case]))
 
 
