@@ -28,12 +28,13 @@ from msg_adapters.mcap_records import (
     MESSAGE_HEAD,
     RECORD,
     SCHEMA,
+    STATISTICS,
     Buffer,
     Declarations,
     number,
     text,
 )
-from msg_adapters.mcap_summary import Summary, read_summary
+from msg_adapters.mcap_summary import Summary, read_summary, take_statistics
 
 CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 
@@ -134,6 +135,8 @@ class _Scanner:
         elif opcode in (DATA_END, FOOTER):
             self.ended = True
             self._check_data(buffer, opcode, first, stop)
+        elif opcode == STATISTICS and self.summary.total is None:
+            self._statistics(buffer, first, stop)
         elif opcode == ATTACHMENT:
             checksum = number(buffer, stop - 4, 4, stop) if stop - first > 4 else 0
             if checksum and zlib.crc32(buffer[first : stop - 4]) != checksum:
@@ -141,6 +144,13 @@ class _Scanner:
                 self.damage.add("checksum_mismatch", f"the checksum {where} does not fit its content")
         else:
             self._small(buffer, opcode, first, stop, 0)
+
+    def _statistics(self, buffer: Buffer, first: int, stop: int) -> None:
+        """Take in the statistics of a file whose footer does not lead to them."""
+        try:
+            take_statistics(buffer, first, stop, self.summary)
+        except ValueError as error:
+            self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
 
     def _small(self, buffer: Buffer, opcode: int, first: int, stop: int, base: int) -> None:
         """Take a record that may lie in a chunk too, whose records begin at byte `base` of the file."""

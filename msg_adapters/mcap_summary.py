@@ -75,11 +75,12 @@ def _records(buffer: Buffer, at: int, stop: int, summary: Summary) -> None:
         elif opcode == CHUNK_INDEX:
             summary.chunks.append(number(buffer, first + 16, 8, at))
         elif opcode == STATISTICS:
-            _statistics(buffer, first, at, summary)
+            take_statistics(buffer, first, at, summary)
     summary.chunks.sort()
 
 
-def _statistics(buffer: Buffer, first: int, stop: int, summary: Summary) -> None:
+def take_statistics(buffer: Buffer, first: int, stop: int, summary: Summary) -> None:
+    """Take in a STATISTICS record. Raises ValueError for a damaged one."""
     if first + STATISTICS_HEAD.size > stop:
         raise ValueError("the statistics end too early")
     summary.total = STATISTICS_HEAD.unpack_from(buffer, first)[0]

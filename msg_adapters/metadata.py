@@ -18,6 +18,7 @@ NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 NOTES = "rsea_notes"
 VERSION = 9
+_LONGEST_NOTE, _MOST_NOTES = 500, 50
 
 
 @dataclass
@@ -75,7 +76,8 @@ def _known(bag: Path, document: Any) -> Known:
     counts = {_text_of(name): int(topic["message_count"]) for name, topic in topics}
     custom = root.get("custom_data")
     notes = custom.get(NOTES, "") if isinstance(custom, dict) else ""
-    return Known(files, counts, _text_of(notes).splitlines())
+    lines = [brief(line, _LONGEST_NOTE) for line in _text_of(notes).splitlines()]
+    return Known(files, counts, lines[:_MOST_NOTES])
 
 
 def _text_of(value: Any) -> str:

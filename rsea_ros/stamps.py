@@ -11,6 +11,7 @@ from bisect import bisect_right
 
 import numpy as np
 
+from rsea_ros.errors import ChannelError
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, IntArray, Record
 
 _GAP = 1.6
@@ -19,6 +20,10 @@ _AROUND = 8
 """Samples on either side of a gap or a jump that say whether it lasts."""
 _SHORTEST_JUMP = 5.0
 """In sample periods: less than that a channel may well end later than the others, by chance."""
+_REPEAT = 1e-3
+"""Of nearly all steps: what is closer is a repeat."""
+_MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
+"""Periods that a channel may span, and times its number of samples: an hour's gap at 2 kHz has 7e6."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _MANY_BACK = 0.02
@@ -35,7 +40,10 @@ KINDS = ("clock_jump", "duplicate_stamps", "dropped_samples", "out_of_order", "s
 
 
 def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
-    """Return the record with rising stamps, and what was wrong with them that it does not tell yet."""
+    """Return the record with rising stamps, and what was wrong with them that it does not tell yet.
+
+    Raises ChannelError for stamps so uneven that no clock of a sensor can have made them.
+    """
     faults: list[Fault] = []
     record, shared = _without_long_pauses(record)
     faults += shared
@@ -46,16 +54,38 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
             continue
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name))
         channel, disorder = in_order(channel, name)
-        repeated = np.concatenate([[False], np.diff(channel.t) <= 0.0])
+        repeated = np.concatenate([[False], np.diff(channel.t) <= _repeat(channel.t)])
         faults += [*jumps, *disorder]
         if repeated.any():
             faults.append(Fault("duplicate_stamps", name, float(repeated.mean())))
             channel = Channel(channel.t[~repeated], channel.y[~repeated])
+        _check_even(channel, f"{record.source}: {name}")
         faults += _dropped(channel, name, int(repeated.sum()))
         channels[name] = channel
     told = {fault.channel for fault in record.faults if fault.kind in KINDS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in told]
     return record.with_channels(**channels), new
+
+
+def _repeat(t: FloatArray) -> float:
+    """Return up to which step two samples are one, s: a small part of nearly all steps."""
+    step = np.diff(t)
+    return _REPEAT * float(np.quantile(step[step > 0.0], 0.9)) if np.any(step > 0.0) else 0.0
+
+
+def _check_even(channel: Channel, where: str) -> None:
+    """Raises ChannelError for stamps that nearly all lie together, in far fewer places than their span has.
+
+    Whoever lays a grid of their period over their span needs this to be bounded.
+    """
+    if len(channel) < 3:
+        return
+    places = float(np.ptp(channel.t)) / _period(channel.t)
+    if places > max(_MOST_PLACES, _MOST_PER_SAMPLE * len(channel)):
+        raise ChannelError(
+            f"{where}: {len(channel)} stamps, half of them {_period(channel.t):.3g} s apart, over"
+            f" {np.ptp(channel.t):.3g} s, expected even sampling"
+        )
 
 
 def in_order(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:

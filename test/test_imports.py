@@ -17,7 +17,7 @@ CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "de
 OWN = {
     "errors": set(),
     "signals": {"errors"},
-    "stamps": {"signals"},
+    "stamps": {"errors", "signals"},
     "progress": set(),
     "wording": set(),
     "effects": BASE,

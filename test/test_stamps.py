@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rsea_ros.errors import ChannelError
 from rsea_ros.signals import Channel, Record
 from rsea_ros.stamps import far_apart, jumps_back, repair_stamps
 
@@ -80,3 +81,18 @@ def test_few_stamps_far_from_all_others():
     t[[0, 500, 501]] += 1e9
     assert np.flatnonzero(far_apart(t, 3600.0)).tolist() == [0, 500, 501]
     assert not far_apart(np.array([0.0, 1e9]), 3600.0).any()
+
+
+def test_stamps_that_nearly_repeat_are_repeats():
+    """Half the steps a nanosecond: a grid of the median step would have 7e9 places."""
+    t = np.arange(COUNT) * PERIOD
+    t[1::2] = t[::2] + 1e-9
+    repaired, faults = repair_stamps(_record(t))
+    assert len(repaired["ft"]) == COUNT // 2
+    assert [f.kind for f in faults] == ["duplicate_stamps"]
+
+
+def test_stamps_of_no_clock_are_refused():
+    t = np.concatenate([np.arange(COUNT - 50) * 1e-9, 1.0 + np.arange(50) * 60.0])
+    with pytest.raises(ChannelError, match="ft: 2000 stamps, half of them 1e-09 s apart"):
+        repair_stamps(_record(t))

@@ -101,7 +101,14 @@ def _no_records():
     return data[: -len(BARE.summary()) - 37] + b"\x00" * 40 + data[-37:]
 
 
+def _footer_leads_nowhere():
+    """Messages lost, and a footer without a place for the summary that counts them."""
+    data = _lost_messages()
+    return data[:-28] + bytes(20) + data[-8:]
+
+
 CASES = {
+    "footer leads nowhere": (_footer_leads_nowhere, {"missing_messages": ("/rsea/ft", 7)}, 7),
     "lost messages": (_lost_messages, {"missing_messages": ("/rsea/ft", 7)}, 7),
     "lost in a chunk": (_lost_in_a_chunk, {"missing_messages": ("/rsea/torque_command", 5)}, 0),
     "flipped number": (_flipped_number, {"checksum_mismatch": ("a.mcap", None)}, 0),
