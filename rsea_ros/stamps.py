@@ -24,6 +24,9 @@ _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
 """Periods that a channel may span, and times its number of samples: an hour's gap at 2 kHz has 7e6."""
+_PLACES, _TAKEN, _OUTSIDE = 2, 0.25, 10.0
+"""A sample more places out of order than this is stray where another lies nearer than this part of a period,
+or where it lies so many periods outside the run."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _MANY_BACK = 0.02
@@ -49,12 +52,9 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
     faults += shared
     channels = {}
     for name, channel in record.channels.items():
-        if len(channel) < 3:
-            channels[name] = channel
-            continue
         channel, jumps = _without_jumps(channel, name, _expected_span(record, name))
-        channel, disorder = in_order(channel, name)
-        repeated = np.concatenate([[False], np.diff(channel.t) <= _repeat(channel.t)])
+        channel, disorder = _sorted(channel, name)
+        repeated = np.diff(channel.t, prepend=-np.inf) <= _repeat(channel.t)
         faults += [*jumps, *disorder]
         if repeated.any():
             faults.append(Fault("duplicate_stamps", name, float(repeated.mean())))
@@ -93,8 +93,12 @@ def in_order(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
 
     A channel whose clock jumped back comes as it is: sorting would mix its samples.
     """
-    step = np.diff(channel.t)
-    if not np.any(step < 0.0) or jumps_back(channel.t).any():
+    return (channel, []) if jumps_back(channel.t).any() else _sorted(channel, name)
+
+
+def _sorted(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
+    """Return a channel sorted by its stamps, without those that fit nowhere, and what was wrong."""
+    if not np.any(np.diff(channel.t) < 0.0):
         return channel, []
     late = _out_of_order(channel.t)
     stray = _stray(channel.t, late)
@@ -175,15 +179,13 @@ def _out_of_order(t: FloatArray) -> BoolArray:
 def _stray(t: FloatArray, late: BoolArray) -> BoolArray:
     """Return which samples out of order have a stamp that is not theirs: no gap is waiting for them there."""
     kept = t[~late]
-    period = _period(kept)
-    stray = np.zeros(len(t), bool)
     rank: IntArray = np.cumsum(~late)
-    for k in np.flatnonzero(late):
-        at = int(np.searchsorted(kept, t[k]))
-        far = abs(at - int(rank[k])) > 2
-        near = np.abs(kept[max(0, at - 1) : at + 1] - t[k])
-        outside = at in (0, len(kept)) and float(near.min()) > 10.0 * period
-        stray[k] = far and (outside or float(near.min()) < 0.25 * period)
+    at = np.searchsorted(kept, t[late])
+    left, right = kept[np.maximum(at - 1, 0)], kept[np.minimum(at, len(kept) - 1)]
+    near = np.minimum(np.abs(t[late] - left), np.abs(right - t[late])) / (_period(kept) or 1.0)
+    outside = ((at == 0) | (at == len(kept))) & (near > _OUTSIDE)
+    stray = np.zeros(len(t), bool)
+    stray[late] = (np.abs(at - rank[late]) > _PLACES) & (outside | (near < _TAKEN))
     return stray
 
 
@@ -243,6 +245,8 @@ def _expected_span(record: Record, name: str) -> float:
 
 def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channel, list[Fault]]:
     """Take out steps of the clock: those back for good, and one that makes the channel longer than others."""
+    if len(channel) < 3:
+        return channel, []
     at = jumps_back(channel.t)
     step = np.diff(channel.t)
     period = _period(channel.t)
