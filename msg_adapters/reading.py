@@ -9,7 +9,7 @@ import numpy as np
 
 from msg_adapters.bags import BagPath, read_contents
 from msg_adapters.cdr import Block
-from msg_adapters.checks import Series, check_finite, note_repeats
+from msg_adapters.checks import Series, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import Decoded
 from msg_adapters.health import DIAGNOSTICS, tell_health
@@ -57,7 +57,8 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
         for one in series.values():
             check_finite(one)
             note_repeats(one, told.notes)
-    _require_values(source, series, strict)
+    series = on_the_clock_of_the_command(series, told)
+    _require_values(source, series, strict, told)
     tell_health(contents, told)
     return _record(series, source, told, strict)
 
@@ -102,12 +103,12 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             raise BagError(f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}")
 
 
-def _require_values(source: str, series: dict[str, Series], strict: bool) -> None:
-    """Refuse messages whose arrays are empty where values are needed."""
+def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
+    """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
     if not set(series) - ({"command", "reference"} if strict else set()):
-        raise BagError(f"{source}: the messages hold no values, expected a measurement")
+        raise BagError(f"{source}: the messages hold no values, expected a measurement{told.told()}")
 
 
 def _series(

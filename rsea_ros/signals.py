@@ -54,6 +54,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "unknown_records": "records of a kind that the format does not know, left out",
         "zero_stamps": "header stamps that nobody set; the log time stands in",
         "clock_jump": "the clock of the stamps jumped; taken out",
+        "clock_offset": "the clock of a channel differs from the command's",
         "dropped_samples": "samples are missing: the stamps have gaps",
         "duplicate_stamps": "stamps repeat; the first sample of each is kept",
         "out_of_order": "samples out of order in the log, sorted by their stamps",

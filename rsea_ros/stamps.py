@@ -24,9 +24,9 @@ _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
 """Periods that a channel may span, and times its number of samples: an hour's gap at 2 kHz has 7e6."""
-_PLACES, _TAKEN, _OUTSIDE = 2, 0.25, 10.0
-"""A sample more places out of order than this is stray where another lies nearer than this part of a period,
-or where it lies so many periods outside the run."""
+_PLACES, _NO_GAP, _OUTSIDE = 2, 1.4, 10.0
+"""A sample more places out of order than this is stray where those around it leave no gap, in periods, or
+where it lies so many periods outside the run."""
 _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _MANY_BACK = 0.02
@@ -182,10 +182,12 @@ def _stray(t: FloatArray, late: BoolArray) -> BoolArray:
     rank: IntArray = np.cumsum(~late)
     at = np.searchsorted(kept, t[late])
     left, right = kept[np.maximum(at - 1, 0)], kept[np.minimum(at, len(kept) - 1)]
-    near = np.minimum(np.abs(t[late] - left), np.abs(right - t[late])) / (_period(kept) or 1.0)
-    outside = ((at == 0) | (at == len(kept))) & (near > _OUTSIDE)
+    period = _period(kept) or 1.0
+    near = np.minimum(np.abs(t[late] - left), np.abs(right - t[late])) / period
+    outside = (at == 0) | (at == len(kept))
+    unfit = np.where(outside, near > _OUTSIDE, right - left < _NO_GAP * period)
     stray = np.zeros(len(t), bool)
-    stray[late] = (np.abs(at - rank[late]) > _PLACES) & (outside | (near < _TAKEN))
+    stray[late] = (np.abs(at - rank[late]) > _PLACES) & unfit
     return stray
 
 

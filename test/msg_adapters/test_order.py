@@ -8,6 +8,7 @@ from foreign import EPOCH, STORE, run_rows, wrench, write_foreign
 from mcap_bytes import McapFile, write
 
 from msg_adapters import read_record, write_record
+from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel
 from rsea_ros.stamps import repair_stamps
 
@@ -113,3 +114,18 @@ def _without_stamp(name, message):
         )
         message.header.stamp.sec = message.header.stamp.nanosec = 0
     return message
+
+
+def test_a_channel_of_another_clock_is_left_out(tmp_path):
+    """A sensor that stamps from its own start on: the simulation went through the years between."""
+    rows = run_rows(COUNT)
+    for k in range(COUNT):
+        rows[3 * k + 2][2].header.stamp.sec -= 1_000_000_000
+    got = read_record(write(tmp_path / "a.mcap", McapFile(rows).file()))
+    assert "ft" not in got and len(got["position"]) == COUNT and got.epoch_ns == EPOCH
+    (fault,) = got.faults
+    assert (fault.kind, fault.channel, fault.unit) == ("clock_offset", "ft", "s")
+    assert fault.size == pytest.approx(-1e9)
+    only = [row for row in rows if row[0] != "/rsea/joint_states"]
+    with pytest.raises(BagError, match=r"expected a measurement \(clock offset: left out"):
+        read_record(write(tmp_path / "b.mcap", McapFile(only).file()))
