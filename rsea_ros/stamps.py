@@ -39,7 +39,8 @@ LONGEST_PAUSE_NS = _LONGEST_PAUSE * 1e9
 _FEW = 0.01
 """Share of a channel's samples that lie far from all others: they are stray, not the run."""
 
-KINDS = ("clock_jump", "duplicate_stamps", "dropped_samples", "out_of_order", "stray_stamps")
+_EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
+"""Kinds of faults that, once told, have told of the gaps too."""
 
 
 def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
@@ -62,7 +63,7 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         faults += _dropped(channel, name, int(repeated.sum()))
         channels[name] = channel
-    told = {fault.channel for fault in record.faults if fault.kind in KINDS}
+    told = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
     new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in told]
     return record.with_channels(**channels), new
 

@@ -129,3 +129,9 @@ def test_a_channel_of_another_clock_is_left_out(tmp_path):
     only = [row for row in rows if row[0] != "/rsea/joint_states"]
     with pytest.raises(BagError, match=r"expected a measurement \(clock offset: left out"):
         read_record(write(tmp_path / "b.mcap", McapFile(only).file()))
+
+
+def test_a_gap_is_told_beside_disorder(tmp_path):
+    rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
+    got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, 0.5)).file()))
+    assert {(f.kind, f.size) for f in got.faults if f.channel == "ft"} >= {("dropped_samples", 20)}
