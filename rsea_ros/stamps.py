@@ -23,7 +23,7 @@ _SHORTEST_JUMP = 5.0
 _REPEAT = 1e-3
 """Of nearly all steps: what is closer is a repeat."""
 _MOST_PLACES, _MOST_PER_SAMPLE = 1e7, 100.0
-"""Periods that a channel may span, and times its number of samples: an hour's gap at 2 kHz has 7e6."""
+"""Periods that a channel may span, and times its number of samples: a long run at 2 kHz has 1e6."""
 _PLACES, _NO_GAP, _OUTSIDE = 2, 1.4, 10.0
 """A sample more places out of order than this is stray where those around it leave no gap, in periods, or
 where it lies so many periods outside the run."""
@@ -33,8 +33,9 @@ _MANY_BACK = 0.02
 """Share of the steps: where more go back it is disorder, and steps in order of arrival say little."""
 _MOST_JUMPS = 200
 """Steps back that are looked at, the longest first: no clock is set more often in a run."""
-_LONGEST_PAUSE = 3600.0
-"""Seconds: no run pauses for longer, so the clock was set."""
+_LONGEST_PAUSE = 600.0
+"""Seconds: as long as a long run. Whoever lays a grid over the record goes through its pauses too; a longer
+one is taken for a clock that was set."""
 LONGEST_PAUSE_NS = _LONGEST_PAUSE * 1e9
 _FEW = 0.01
 """Share of a channel's samples that lie far from all others: they are stray, not the run."""
@@ -193,7 +194,7 @@ def _stray(t: FloatArray, late: BoolArray) -> BoolArray:
 
 
 def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
-    """Take out steps of hours: before the few samples that strayed, and where the clock was set."""
+    """Take out pauses longer than a run: before few samples that strayed, and where the clock was set."""
     faults: list[Fault] = []
     channels = {}
     for name, channel in record.channels.items():
@@ -208,7 +209,7 @@ def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
 
 
 def _without_stray_parts(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Leave out the few samples that lie more than an hour from the others."""
+    """Leave out the few samples that lie far from the others."""
     stray = far_apart(channel.t, _LONGEST_PAUSE)
     if not stray.any():
         return channel, []
@@ -233,7 +234,7 @@ def stray_fault(stray: BoolArray, name: str) -> Fault:
 
 
 def _without_set_clock(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Take out steps of more than an hour."""
+    """Take out steps longer than any pause."""
     at = np.abs(np.diff(channel.t)) > _LONGEST_PAUSE
     return _taken_out(channel, name, at) if at.any() else (channel, [])
 
