@@ -194,17 +194,17 @@ def _stray(t: FloatArray, late: BoolArray) -> BoolArray:
 
 
 def _without_long_pauses(record: Record) -> tuple[Record, list[Fault]]:
-    """Take out pauses longer than a run: before few samples that strayed, and where the clock was set."""
+    """Leave out few samples far from all others; where all channels pause for too long, the clock was set."""
     faults: list[Fault] = []
     channels = {}
     for name, channel in record.channels.items():
-        step = np.diff(channel.t)
-        if not np.any(np.abs(step) > _LONGEST_PAUSE):
-            channels[name] = channel
-            continue
-        channel, found = _without_stray_parts(channel, name)
-        channels[name], jumps = _without_set_clock(channel, name)
-        faults += [*found, *jumps]
+        channels[name], stray = _without_stray_parts(channel, name)
+        faults += stray
+    pauses = {name: np.abs(np.diff(c.t)) > _LONGEST_PAUSE for name, c in channels.items()}
+    if all(at.any() for at in pauses.values()):
+        for name, at in pauses.items():
+            channels[name], jump = _taken_out(channels[name], name, at)
+            faults += jump
     return record.with_channels(**channels), faults
 
 
@@ -233,18 +233,12 @@ def stray_fault(stray: BoolArray, name: str) -> Fault:
     return Fault("stray_stamps", name, count / len(stray), detail, count, "samples")
 
 
-def _without_set_clock(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Take out steps longer than any pause."""
-    at = np.abs(np.diff(channel.t)) > _LONGEST_PAUSE
-    return _taken_out(channel, name, at) if at.any() else (channel, [])
-
-
 def _expected_span(record: Record, name: str) -> float:
-    """Return how long the channels with other stamps last, s: a jump makes one longer or shorter."""
-    whole = {(len(c), c.t[0], c.t[-1]) for c in record.channels.values() if len(c) > 1}
-    mine = record[name].t
-    others = [last - first for n, first, last in whole if (n, first, last) != (len(mine), mine[0], mine[-1])]
-    return float(np.median(others)) if others else 0.0
+    """Return how long a channel should last, s: as the command; the command as the others."""
+    if name != "command" and "command" in record and len(record["command"]) > 1:
+        return float(np.ptp(record["command"].t))
+    spans = {(len(c), float(np.ptp(c.t))) for n, c in record.channels.items() if n != name and len(c) > 1}
+    return float(np.median([span for _, span in spans])) if spans else 0.0
 
 
 def _without_jumps(channel: Channel, name: str, expected: float) -> tuple[Channel, list[Fault]]:

@@ -96,3 +96,21 @@ def test_stamps_of_no_clock_are_refused():
     t = np.concatenate([np.arange(COUNT - 50) * 1e-9, 1.0 + np.arange(50) * 60.0])
     with pytest.raises(ChannelError, match="ft: 2000 stamps, half of them 1e-09 s apart"):
         repair_stamps(_record(t))
+
+
+def test_a_sensor_that_was_silent_for_long_keeps_its_place():
+    """Eleven minutes without it, while all others went on: no clock was set."""
+    t = np.arange(0.0, 2000.0, 0.5)
+    silent = t[(t < 600.0) | (t > 1260.0)]
+    ones = {name: Channel(s.copy(), np.ones(len(s))) for name, s in (("command", t), ("ft", silent))}
+    repaired, faults = repair_stamps(Record(ones))
+    assert [f.kind for f in faults] == ["dropped_samples"]
+    assert np.array_equal(repaired["ft"].t, silent)
+
+
+def test_two_clocks_of_three_that_jump_alike_are_found():
+    t = np.arange(COUNT) * PERIOD
+    years = np.where(np.arange(COUNT) < 900, 0.0, 1e8)
+    repaired, faults = repair_stamps(_record(t + years, position=t + 1e-3 + years))
+    assert {(f.kind, f.channel) for f in faults} == {("clock_jump", "ft"), ("clock_jump", "position")}
+    assert repaired.stop < 2 * COUNT * PERIOD
