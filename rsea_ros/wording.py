@@ -17,8 +17,3 @@ def brief(text: str, longest: int = _LONGEST) -> str:
     cut = text[: longest + 1]
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cut[:longest])
     return plain + ("…" if len(cut) > longest else "")
-
-
-def count_of(number: int, noun: str) -> str:
-    """Return `1 message`, `2 messages`."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
