@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from msg_adapters import mcap_file, metadata, sqlite_file
-from msg_adapters.compression import ERRORS, unpack_file, unpack_message
-from msg_adapters.contents import Contents
+from msg_adapters.compression import ERRORS, ZSTD_MAGIC, Allowance, unpack_file, unpack_message
+from msg_adapters.contents import AND, Contents, Messages
 from rsea_ros.errors import BagError
 
-SCANNERS: Mapping[str, Callable[[Path, Contents], None]] = {
+SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".mcap": mcap_file.scan,
-    ".db3": sqlite_file.scan,
+    ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
 }
 PACKED = ".zstd"
 
@@ -28,15 +29,29 @@ def read_contents(paths: BagPath | Sequence[BagPath], wanted: Collection[str] | 
     Raises BagError for what is missing, unreadable, no bag, or damaged.
     """
     contents = Contents(wanted)
+    parts: list[Contents] = []
     for path in [Path(paths)] if isinstance(paths, (str, Path)) else map(Path, paths):
         try:
-            for file in _files(path, contents):
-                _scan(file, contents)
+            parts += _bag(path, contents)
         except PermissionError as error:
             raise BagError(f"{error.filename or path}: no permission to read it") from None
         except OSError as error:
             raise BagError(f"{error.filename or path}: {error.strerror}") from None
+    join(parts, contents)
     return contents
+
+
+def join(parts: Sequence[Contents], contents: Contents) -> None:
+    """Add files to the contents, each topic by the first log time of the files, not by their names."""
+    for part in parts:
+        for topic, messages in part.topics.items():
+            for msgtype in messages.msgtype.split(AND):
+                contents.sink(topic, msgtype)
+    for topic, whole in contents.topics.items():
+        filled = [part.topics[topic] for part in parts if topic in part.topics and part.topics[topic].raw]
+        for messages in sorted(filled, key=lambda messages: min(messages.log_times)):
+            whole.log_times.extend(messages.log_times)
+            whole.raw.extend(messages.raw)
 
 
 def iterate(
@@ -52,37 +67,78 @@ def iterate(
     yield from rows
 
 
-def _files(path: Path, contents: Contents) -> list[Path]:
-    """Return the storage files of a bag: those its metadata name, else those that lie there."""
+def _bag(path: Path, contents: Contents) -> list[Contents]:
+    """Return the files of a bag, read; notes and faults go to the contents."""
     if not path.exists():
         raise BagError(f"{path}: no such bag")
     if not path.is_dir():
-        return [path]
-    files = metadata.files_of(path, contents)
-    files = files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
+        return [_scan(path, contents)]
+    told = metadata.known(path, contents)
+    files = told.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")
-    return files
+    parts = _scan_all(files, contents)
+    contents.notes.extend(told.notes)
+    read: Counter[str] = Counter()
+    for part in parts:
+        read.update({topic: len(messages.raw) for topic, messages in part.topics.items()})
+    for topic, expected in told.counts.items():
+        contents.compare(topic, expected, read[topic], metadata.NAME)
+    return parts
+
+
+def _scan_all(files: Sequence[Path], contents: Contents) -> list[Contents]:
+    """Return what each file holds. One that cannot be read is left out and told, if others can."""
+    parts = []
+    errors = []
+    for file in files:
+        try:
+            parts.append(_scan(file, contents))
+        except BagError as error:
+            errors.append(error)
+            contents.tell("damaged_file", file.name, f"left out: {error}")
+    if errors and not parts:
+        raise errors[0]
+    return parts
 
 
 def _suffix(file: Path) -> str:
     return Path(file.stem).suffix if file.suffix == PACKED else file.suffix
 
 
-def _scan(file: Path, contents: Contents) -> None:
+def _scan(file: Path, contents: Contents) -> Contents:
+    """Return what a file holds; its notes and faults go to the contents of the whole."""
     if _suffix(file) not in SCANNERS:
         raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file")
     if file.stat().st_size == 0:
         raise BagError(f"{file}: empty file")
-    found = Contents(contents.wanted)
+    part = Contents(contents.wanted)
     try:
+        allowance = Allowance(file.stat().st_size)
         with TemporaryDirectory() if file.suffix == PACKED else nullcontext() as directory:
-            SCANNERS[_suffix(file)](unpack_file(file, Path(directory)) if directory else file, found)
-        for topic, messages in found.topics.items():
-            sink = contents.sink(topic, messages.msgtype)
-            if sink is not None:
-                sink.log_times.extend(messages.log_times)
-                sink.raw.extend(map(unpack_message, messages.raw))
+            plain = unpack_file(file, Path(directory)) if directory else file
+            SCANNERS[_suffix(file)](plain, part, allowance)
+        for topic, messages in part.topics.items():
+            _unpack(topic, messages, allowance, part)
     except (*ERRORS, ValueError) as error:
         raise BagError(f"{file}: {error}") from None
-    contents.notes.extend(f"{file}: {note}" for note in found.notes)
+    contents.notes.extend(f"{file}: {note}" for note in part.notes)
+    contents.faults.extend(part.faults)
+    return part
+
+
+def _unpack(topic: str, messages: Messages, allowance: Allowance, contents: Contents) -> None:
+    """Decompress messages that are compressed one by one; leave out those that cannot be."""
+    if not any(raw.startswith(ZSTD_MAGIC) for raw in messages.raw):
+        return
+    damaged: list[str] = []
+    kept: list[tuple[int, bytes]] = []
+    for log_time, raw in zip(messages.log_times, messages.raw, strict=True):
+        try:
+            kept.append((log_time, unpack_message(raw, allowance)))
+        except (*ERRORS, ValueError) as error:
+            damaged.append(str(error))
+    if damaged:
+        share = len(damaged) / len(messages.raw)
+        contents.tell("damaged_messages", topic, damaged[0], len(damaged), "messages", share)
+    messages.log_times, messages.raw = [t for t, _ in kept], [raw for _, raw in kept]

@@ -23,6 +23,8 @@ ByteMatrix = npt.NDArray[np.uint8]
 
 HEADER = 4
 STAMP = 4
+_MANY = 32
+"""Layouts of one length; a topic has one or two of them."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +32,16 @@ class Layout:
     """Where the numbers of a message lie.
 
     names: joints. fields: name -> (first byte, count of doubles). order: '<' or '>'.
-    structure: positions of the bytes that make the layout (lengths and texts, no padding: padding may
-    hold anything).
+    structure: first and end of the runs of bytes that make the layout: lengths and names. Not the frame,
+    which may be any text, and not the padding, which may hold anything.
+    end: the first byte behind the message.
     """
 
     names: tuple[str, ...]
     fields: Mapping[str, tuple[int, int]]
     order: str
-    structure: tuple[int, ...]
+    structure: tuple[tuple[int, int], ...]
+    end: int
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,11 @@ class Block:
     def stamps(self) -> IntArray:
         """Return the header stamps, ns, shape (n,)."""
         seconds = self._cut(STAMP, 4, "i4")[:, 0].astype(np.int64)
-        nanoseconds = self._cut(STAMP + 4, 4, "u4")[:, 0].astype(np.int64)
-        return seconds * 1_000_000_000 + nanoseconds
+        return seconds * 1_000_000_000 + self.nanoseconds()
+
+    def nanoseconds(self) -> IntArray:
+        """Return the part of the header stamps below a second, ns, shape (n,)."""
+        return self._cut(STAMP + 4, 4, "u4")[:, 0].astype(np.int64)
 
     def field(self, name: str) -> FloatArray:
         """Return the doubles of a field, shape (n, count)."""
@@ -64,8 +71,8 @@ class Block:
         return columns.view(np.dtype(f"{self.layout.order}{kind}"))
 
 
-class _Walk:
-    """A walk through one message that notes which bytes make its layout."""
+class Walk:
+    """A walk through one message that notes which bytes make its layout; texts are passed by unread."""
 
     def __init__(self, raw: bytes) -> None:
         if raw[:2] not in (b"\x00\x00", b"\x00\x01"):
@@ -73,62 +80,117 @@ class _Walk:
         self.raw = raw
         self.order = "<" if raw[1] else ">"
         self.at = HEADER
-        self.structure = [1]
+        self.structure = [(1, 2)]
 
     def _take(self, size: int, align: int) -> int:
         first = HEADER + -(-(self.at - HEADER) // align) * align
+        if first + size > len(self.raw):
+            raise ValueError(f"{len(self.raw)} bytes, expected at least {first + size}")
         self.at = first + size
-        if self.at > len(self.raw):
-            raise ValueError(f"{len(self.raw)} bytes, expected at least {self.at}")
         return first
 
+    def skip(self, size: int) -> None:
+        """Pass by some bytes."""
+        self._take(size, 1)
+
     def count(self) -> int:
+        """Return a count or length, which is part of the layout."""
         first = self._take(4, 4)
-        self.structure.extend(range(first, first + 4))
+        self.structure.append((first, first + 4))
         return int(struct.unpack_from(f"{self.order}I", self.raw, first)[0])
 
-    def text(self) -> str:
+    def text(self) -> tuple[int, int]:
+        """Return first byte and end of a text."""
         first = self._take(self.count(), 1)
-        self.structure.extend(range(first, self.at))
-        return self.raw[first : self.at].rstrip(b"\x00").decode(errors="replace")
+        return first, self.at
+
+    def read_text(self) -> str:
+        """Return a text; of more than 1000 bytes the first."""
+        first, end = self.text()
+        return self.raw[first : min(end, first + 1000)].rstrip(b"\x00").decode(errors="replace")
 
     def stamp_and_frame(self) -> None:
+        """Pass by a header."""
         self._take(8, 4)
         self.text()
 
+    def name(self) -> str:
+        """Return a name, which is part of the layout."""
+        first, end = self.text()
+        self.structure.append((first, end))
+        return self.raw[first:end].rstrip(b"\x00").decode(errors="replace")
+
     def doubles(self, count: int) -> tuple[int, int]:
+        """Return first byte and count of doubles."""
         return (self._take(8 * count, 8) if count else self.at, count)
 
 
 def layout_of(raw: bytes, msgtype: str) -> Layout:
     """Walk one serialised JointState or WrenchStamped. Raises ValueError for a damaged message."""
-    walk = _Walk(raw)
+    walk = Walk(raw)
     walk.stamp_and_frame()
     names: tuple[str, ...] = ()
     if msgtype == WRENCH:
         fields = {"wrench": walk.doubles(6)}
     else:
-        names = tuple([walk.text() for _ in range(walk.count())])
+        names = tuple([walk.name() for _ in range(walk.count())])
         fields = {name: walk.doubles(walk.count()) for name in ("position", "velocity", "effort")}
-    return Layout(names, fields, walk.order, tuple(walk.structure))
+    return Layout(names, fields, walk.order, tuple(walk.structure), walk.at)
 
 
-def blocks(messages: Sequence[bytes], msgtype: str, where: str) -> Iterator[Block]:
+def blocks(
+    messages: Sequence[bytes], msgtype: str, where: str, damaged: dict[int, str] | None = None
+) -> Iterator[Block]:
     """Sort the messages of a topic by layout.
 
-    Raises BagError for a damaged message; `where` (file and topic) is for its text.
+    damaged: takes index and reason of each message that is none; they are left out.
+    Raises BagError where no message is left; `where` (file and topic) is for its text.
     """
+    damaged = {} if damaged is None else damaged
     lengths = np.fromiter(map(len, messages), np.int64, len(messages))
-    for length in np.unique(lengths):
-        rows = np.flatnonzero(lengths == length)
-        joined = b"".join([messages[row] for row in rows.tolist()])
-        matrix = np.frombuffer(joined, np.uint8).reshape(rows.size, int(length))
-        while rows.size:
-            try:
-                layout = layout_of(matrix[0].tobytes(), msgtype)
-            except ValueError as error:
-                raise BagError(f"{where}: message {rows[0]} is no {msgtype}: {error}") from None
-            structure = np.array(layout.structure)
-            same = (matrix[:, structure] == matrix[0, structure]).all(axis=1)
+    order = np.argsort(lengths, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(lengths[order])) + 1):
+        if rows.size:
+            yield from _of_one_length(messages, rows, msgtype, damaged)
+    if damaged and len(damaged) == len(messages):
+        first = min(damaged)
+        raise BagError(f"{where}: message {first} is no {msgtype}: {damaged[first]}")
+
+
+def _of_one_length(
+    messages: Sequence[bytes], rows: IntArray, msgtype: str, damaged: dict[int, str]
+) -> Iterator[Block]:
+    """Sort messages of one length by layout: the first ones by comparing bytes, a motley rest one by one."""
+    length = len(messages[rows[0]])
+    joined = b"".join([messages[row] for row in rows.tolist()])
+    matrix = np.frombuffer(joined, np.uint8).reshape(rows.size, length)
+    for _ in range(_MANY):
+        layout = _layout_or_reason(messages[rows[0]], msgtype)
+        same = np.zeros(rows.size, bool)
+        if isinstance(layout, str):
+            same[0], damaged[int(rows[0])] = True, layout
+        else:
+            same[:] = True
+            for first, end in layout.structure:
+                same &= (matrix[:, first:end] == matrix[0, first:end]).all(axis=1)
             yield Block(rows[same], matrix[same], layout)
-            rows, matrix = rows[~same], matrix[~same]
+        rows, matrix = rows[~same], matrix[~same]
+        if not rows.size:
+            return
+    groups: dict[tuple[object, ...], tuple[Layout, list[int]]] = {}
+    for place, row in enumerate(rows.tolist()):
+        layout = _layout_or_reason(messages[row], msgtype)
+        if isinstance(layout, str):
+            damaged[row] = layout
+        else:
+            key = (layout.names, tuple(layout.fields.items()), layout.order)
+            groups.setdefault(key, (layout, []))[1].append(place)
+    for layout, places in groups.values():
+        yield Block(rows[places], matrix[places], layout)
+
+
+def _layout_or_reason(raw: bytes, msgtype: str) -> Layout | str:
+    try:
+        return layout_of(raw, msgtype)
+    except ValueError as error:
+        return str(error)

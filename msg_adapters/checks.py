@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from msg_adapters.contents import Contents
 from rsea_ros.errors import BagError
-from rsea_ros.signals import FloatArray, IntArray
+from rsea_ros.signals import Fault, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -19,21 +21,8 @@ class Series:
     values: FloatArray
 
 
-def checked(series: Series, notes: list[str]) -> Series:
-    """Return the series without repeated stamps, of which the first is kept and a note is left.
-
-    Raises BagError for a value that is not finite and for a stamp that goes back.
-    """
-    _finite(series)
-    _forward(series)
-    keep = np.diff(series.stamps, prepend=series.stamps[0] - 1) > 0
-    if not keep.all():
-        repeats = np.count_nonzero(~keep)
-        notes.append(f"{series.where}: {repeats} of {keep.size} stamps repeat, the first of each kept")
-    return Series(series.where, series.stamps[keep], series.values[keep])
-
-
-def _finite(series: Series) -> None:
+def check_finite(series: Series) -> None:
+    """Raises BagError for a value that is not finite."""
     bad = np.flatnonzero(~np.isfinite(series.values))
     if bad.size:
         at = bad[0]
@@ -43,15 +32,33 @@ def _finite(series: Series) -> None:
         )
 
 
-def _forward(series: Series) -> None:
-    steps = np.diff(series.stamps)
-    bad = np.flatnonzero(steps < 0)
-    if bad.size:
-        at = bad[0] + 1
-        raise BagError(
-            f"{series.where}[{at}] is stamped {_seconds(series.stamps[at])}, {-steps[at - 1] * 1e-9:.6f} s"
-            f" before its predecessor, expected stamps that never go back ({bad.size} do)"
-        )
+def note_repeats(series: Series, notes: list[str]) -> None:
+    """Leave a note of stamps that repeat."""
+    repeats = np.count_nonzero(np.diff(np.sort(series.stamps)) == 0)
+    if repeats:
+        total = series.stamps.size
+        notes.append(f"{series.where}: {repeats} of {total} stamps repeat, the first of each kept")
+
+
+def on_the_clock_of_the_command(series: Mapping[str, Series], told: Contents) -> dict[str, Series]:
+    """Leave out channels without a moment in common with the command: their stamps come from another clock.
+
+    Whoever simulated from the command's first stamp to their last would go through all the years between.
+    """
+    command = series.get("command")
+    kept = {}
+    for name, one in series.items():
+        ahead = 0 if command is None else int(one.stamps.min()) - int(command.stamps.min())
+        if command is None or _in_common(one.stamps, command.stamps):
+            kept[name] = one
+        else:
+            detail = "left out: no moment in common with the command, its stamps are from another clock"
+            told.faults.append(Fault("clock_offset", name, 1.0, detail, ahead * 1e-9, "s"))
+    return kept
+
+
+def _in_common(a: IntArray, b: IntArray) -> bool:
+    return bool(max(a.min(), b.min()) <= min(a.max(), b.max()))
 
 
 def _seconds(stamp: np.int64) -> str:

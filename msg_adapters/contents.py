@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
+
+from rsea_ros.signals import Fault
+
+AND = " and "
+"""Between the types of a topic that has several."""
 
 
 @dataclass
@@ -20,15 +26,48 @@ class Contents:
     """All topics of a file or bag, the messages of those asked for, and what happened on reading.
 
     wanted: topics whose messages are kept, None for all.
+    faults: damage, with counts and where. notes: what was taken for granted.
     """
 
     wanted: Collection[str] | None = None
     topics: dict[str, Messages] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+
+    def wants(self, topic: str) -> bool:
+        """Tell whether the messages of a topic are kept."""
+        return self.wanted is None or topic in self.wanted
 
     def sink(self, topic: str, msgtype: str) -> Messages | None:
         """Declare a topic; return where its messages go, None where nobody wants them."""
         messages = self.topics.setdefault(topic, Messages(msgtype))
-        if msgtype not in messages.msgtype.split(" and "):
-            messages.msgtype += f" and {msgtype}"
-        return messages if self.wanted is None or topic in self.wanted else None
+        if msgtype not in messages.msgtype.split(AND):
+            messages.msgtype += f"{AND}{msgtype}"
+        return messages if self.wants(topic) else None
+
+    def tell(
+        self,
+        kind: str,
+        where: str,
+        detail: str,
+        size: float | None = None,
+        unit: str = "",
+        share: float = math.nan,
+    ) -> None:
+        """Add a fault of a topic or a file, once where two witnesses tell of the same."""
+        if not any((f.kind, f.channel, f.size) == (kind, where, size) for f in self.faults):
+            self.faults.append(Fault(kind, where, share, detail, size, unit))
+
+    def compare(self, topic: str, expected: int, got: int, witness: str) -> None:
+        """Tell where a topic has fewer or more messages than a witness has counted."""
+        if not self.wants(topic) or got == expected:
+            return
+        kind = "missing_messages" if got < expected else "surplus_messages"
+        share = (expected - got) / expected if got < expected else math.nan
+        detail = f"{got} read, {expected} expected from {witness}"
+        self.tell(kind, topic, detail, abs(expected - got), "messages", share)
+
+    def told(self) -> str:
+        """Return notes and faults for the text of a refusal, empty where there are none."""
+        parts = [*self.notes, *(f"{f.kind.replace('_', ' ')}: {f.detail}" for f in self.faults)]
+        return f" ({'; '.join(parts)})" if parts else ""

@@ -1,6 +1,6 @@
 """MCAP files read from front to back, without their index, so that a cut-off file reads as well.
 
-Format: https://mcap.dev/spec. A record is an opcode (1 byte), a length (8 bytes) and a content.
+What is damaged is left out and told; the rest is read.
 """
 
 from __future__ import annotations
@@ -8,102 +8,224 @@ from __future__ import annotations
 import mmap
 import struct
 import zlib
+from bisect import bisect_right
+from collections import Counter
 from pathlib import Path
 
-from msg_adapters.compression import CHUNK_FORMATS, ERRORS
+from msg_adapters.compression import ERRORS, Allowance, unpack_chunk
 from msg_adapters.contents import Contents, Messages
+from msg_adapters.mcap_damage import Damage
+from msg_adapters.mcap_records import (
+    ATTACHMENT,
+    CHANNEL,
+    CHUNK,
+    CHUNK_HEAD,
+    DATA_END,
+    FOOTER,
+    KNOWN,
+    MAGIC,
+    MESSAGE,
+    MESSAGE_HEAD,
+    RECORD,
+    SCHEMA,
+    STATISTICS,
+    Buffer,
+    Declarations,
+    number,
+    text,
+)
+from msg_adapters.mcap_summary import Summary, read_summary, take_statistics
 
-MAGIC = b"\x89MCAP0\r\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 0x02, 0x03, 0x04, 0x05, 0x06, 0x0F
-
-RECORD = struct.Struct("<BQ")
-MESSAGE_HEAD = struct.Struct("<HIQQ")
-CHUNK_HEAD = struct.Struct("<QQQI")
-
-Buffer = bytes | mmap.mmap
+CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 
 
-def scan(path: Path, contents: Contents) -> None:
+def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     """Add all messages of a file to the contents, in the order in which they were written.
 
     A file without end (its recorder was killed) gives what is complete, and a note.
-    Raises ValueError for a file that is no MCAP and for damage before the end.
+    Raises ValueError for a file that is no MCAP.
     """
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise ValueError(f"no MCAP file, expected it to start with {MAGIC!r}")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
-            try:
-                complete = _Scanner(contents).run(buffer, len(MAGIC), len(buffer))
-            except (*ERRORS, ValueError, struct.error) as error:
-                raise ValueError(f"damaged MCAP: {error}") from None
+            summary = read_summary(buffer)
+            scanner = _Scanner(contents, summary, allowance)
+            complete = scanner.run(buffer)
     if not complete:
-        contents.notes.append("cut off (recorder killed?), read up to its last complete message")
+        contents.notes.append(CUT_OFF)
+        contents.tell("cut_off", path.name, CUT_OFF)
+    if complete and summary.damage:
+        scanner.damage.add("checksum_mismatch", summary.damage)
+    scanner.damage.tell(contents, path.name)
+    scanner.compare(path.name)
 
 
 class _Scanner:
-    """The schemas and channels of one file, as they come along."""
+    """The channels of one file as they come along, where their messages go, and what is damaged.
 
-    def __init__(self, contents: Contents) -> None:
-        self.contents = contents
-        self.types: dict[int, str] = {}
+    What the summary repeats of schemas and channels stands in where their record is damaged.
+    """
+
+    def __init__(self, contents: Contents, summary: Summary, allowance: Allowance) -> None:
+        self.contents, self.summary, self.allowance = contents, summary, allowance
+        self.damage = Damage()
+        self.declared = Declarations()
+        self.declared.types |= summary.declared.types
         self.sinks: dict[int, Messages | None] = {}
+        for key, channel in summary.declared.channels.items():
+            self.declared.channels[key] = channel
+            self.sinks[key] = contents.sink(*channel)
+        self.read: Counter[str] = Counter()
+        self.ended = self.closed = False
 
-    def run(self, buffer: Buffer, at: int, stop: int) -> bool:
-        """Take the records from `at` to `stop`; return whether the end of the data was among them."""
-        while at + RECORD.size <= stop:
-            opcode, size = RECORD.unpack_from(buffer, at)
-            first = at + RECORD.size
-            at = first + size
-            if opcode in (DATA_END, FOOTER):
-                return True
-            if opcode == CHUNK and first + CHUNK_HEAD.size + 12 <= stop:
-                self._chunk(buffer, first, min(at, stop), complete=at <= stop)
-            if at > stop:
-                return False
-            if opcode == MESSAGE:
-                channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(buffer, first)
-                sink = self._sink(channel)
-                if sink is not None:
-                    sink.log_times.append(log_time)
-                    sink.raw.append(buffer[first + MESSAGE_HEAD.size : at])
-            elif opcode == SCHEMA:
-                self.types[_uint16(buffer, first)] = _text(buffer, first + 2)[0]
-            elif opcode == CHANNEL:
-                self._channel(buffer, first)
-        return False
+    def run(self, buffer: Buffer) -> bool:
+        """Take all records of the file; return whether the end of the data was among them."""
+        at, stop = len(MAGIC), len(buffer)
+        while at < stop:
+            if buffer[at : at + len(MAGIC)] == MAGIC:
+                at += len(MAGIC)
+                continue
+            opcode, size = RECORD.unpack_from(buffer, at) if at + RECORD.size <= stop else (0, 0)
+            if opcode == 0 or at + RECORD.size + size > stop:
+                following = self._next_chunk(buffer, at)
+                if following is None:
+                    self._broken_off(buffer, at, opcode)
+                    return self.ended
+                self.damage.add("damaged_records", f"no record at byte {at}", following - at)
+                at = following
+                continue
+            self._take(buffer, opcode, at + RECORD.size, at + RECORD.size + size)
+            at += RECORD.size + size
+        return self.ended
 
-    def _sink(self, channel: int) -> Messages | None:
+    def compare(self, file: str) -> None:
+        """Tell where the file holds other numbers of messages than its statistics say."""
+        expected: Counter[str] = Counter()
+        for key, count in self.summary.counts.items():
+            topic, _ = self.summary.declared.channels.get(key) or self.declared.channels.get(key, ("", ""))
+            expected[topic] += count
+        for topic in {**expected, **self.read} if self.summary.counts else ():
+            self.contents.compare(topic, expected[topic], self.read[topic], f"the statistics of {file}")
+        total = self.summary.total
+        if total is not None and not self.summary.counts and total != self.read.total():
+            detail = f"{self.read.total()} read, {total} expected from the statistics"
+            self.contents.tell("missing_messages", file, detail, abs(total - self.read.total()), "messages")
+
+    def _next_chunk(self, buffer: Buffer, at: int) -> int | None:
+        """Return where the index says that the next chunk begins, None where it knows of none."""
+        chunks = self.summary.chunks
+        later = chunks[bisect_right(chunks, at) :]
+        return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
+
+    def _broken_off(self, buffer: Buffer, at: int, opcode: int) -> None:
+        """Use what there is of an uncompressed chunk; tell of other leavings."""
+        if opcode == CHUNK and not self.ended:
+            self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)
+        elif self.ended:
+            detail = f"{len(buffer) - at} bytes at byte {at} are no records"
+            self.damage.add("damaged_records", detail, len(buffer) - at)
+
+    def _take(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:
+        """Take one record of the file itself."""
+        if self.ended and opcode in (MESSAGE, CHUNK, DATA_END):
+            self.damage.add("data_after_end", f"at byte {first - RECORD.size}, behind the end of the data")
+        if opcode == CHUNK:
+            self._chunk(buffer, first, stop, complete=True)
+        elif opcode in (DATA_END, FOOTER):
+            self.ended = True
+            self._check_data(buffer, opcode, first, stop)
+        elif opcode == STATISTICS and self.summary.total is None:
+            self._statistics(buffer, first, stop)
+        elif opcode == ATTACHMENT:
+            checksum = number(buffer, stop - 4, 4, stop) if stop - first > 4 else 0
+            if checksum and zlib.crc32(buffer[first : stop - 4]) != checksum:
+                where = f"of the attachment at byte {first - RECORD.size}"
+                self.damage.add("checksum_mismatch", f"the checksum {where} does not fit its content")
+        else:
+            self._small(buffer, opcode, first, stop, 0)
+
+    def _statistics(self, buffer: Buffer, first: int, stop: int) -> None:
+        """Take in the statistics of a file whose footer does not lead to them."""
+        try:
+            take_statistics(buffer, first, stop, self.summary)
+        except ValueError as error:
+            self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
+
+    def _small(self, buffer: Buffer, opcode: int, first: int, stop: int, base: int) -> None:
+        """Take a record that may lie in a chunk too, whose records begin at byte `base` of the file."""
+        if opcode == MESSAGE:
+            self._message(buffer, first, stop, base)
+        elif opcode in (SCHEMA, CHANNEL):
+            try:
+                if opcode == SCHEMA:
+                    self.declared.schema(buffer, first, stop)
+                else:
+                    key = self.declared.channel(buffer, first, stop)
+                    self.sinks[key] = self.contents.sink(*self.declared.channels[key])
+            except ValueError as error:
+                self.damage.add("damaged_records", f"at byte {base + first}: {error}", stop - first)
+        elif opcode not in KNOWN or (base and opcode != MESSAGE):
+            where = f"at byte {base or first}" if not base else f"in the chunk at byte {base}"
+            self.damage.add("unknown_records", f"opcode {opcode:#04x} {where}")
+
+    def _message(self, buffer: Buffer, first: int, stop: int, base: int) -> None:
+        if stop - first < MESSAGE_HEAD.size:
+            self.damage.add("damaged_messages", f"of {stop - first} bytes at byte {base + first}")
+            return
+        channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(buffer, first)
         if channel not in self.sinks:
-            raise ValueError(f"message of channel {channel}, which nothing declares before it")
-        return self.sinks[channel]
+            self.damage.add("damaged_messages", f"of channel {channel}, which nothing declares")
+            return
+        self.read[self.declared.channels[channel][0]] += 1
+        sink = self.sinks[channel]
+        if sink is not None:
+            sink.log_times.append(log_time)
+            sink.raw.append(buffer[first + MESSAGE_HEAD.size : stop])
 
-    def _channel(self, buffer: Buffer, first: int) -> None:
-        topic, at = _text(buffer, first + 4)
-        encoding, _ = _text(buffer, at)
-        msgtype = self.types.get(_uint16(buffer, first + 2), "unknown")
-        if encoding != "cdr":
-            msgtype = f"{msgtype} ({encoding})"
-        self.sinks[_uint16(buffer, first)] = self.contents.sink(topic, msgtype)
+    def _check_data(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:
+        """Compare the checksum of all that lies before DATA_END; some writers leave the magic out of it."""
+        checksum = number(buffer, first, 4, stop) if opcode == DATA_END and stop - first >= 4 else 0
+        if not checksum:
+            return
+        with memoryview(buffer) as view, view[: first - RECORD.size] as data, data[len(MAGIC) :] as rest:
+            if zlib.crc32(data) != checksum and zlib.crc32(rest) != checksum:
+                self.damage.add("checksum_mismatch", "the checksum of the data does not fit them")
 
     def _chunk(self, buffer: Buffer, first: int, stop: int, complete: bool) -> None:
-        *_, checksum = CHUNK_HEAD.unpack_from(buffer, first)
-        compression, at = _text(buffer, first + CHUNK_HEAD.size)
-        if compression not in CHUNK_FORMATS:
-            raise ValueError(f"chunk compression {compression!r}, expected none, zstd or lz4")
-        if compression and not complete:
+        """Take the records of a chunk; of one that breaks off only where they are not compressed."""
+        where = f"chunk at byte {first - RECORD.size}"
+        try:
+            records = self._unpacked(buffer, first, stop, complete)
+        except (*ERRORS, ValueError, struct.error) as error:
+            if complete:
+                self.damage.add("damaged_chunks", f"{where} left out: {error}")
             return
-        records = CHUNK_FORMATS[compression](buffer[at + 8 : stop])
+        at = 0
+        while at + RECORD.size <= len(records):
+            opcode, size = RECORD.unpack_from(records, at)
+            end = at + RECORD.size + size
+            if end > len(records):
+                break
+            self._small(records, opcode, at + RECORD.size, end, first - RECORD.size)
+            at = end
+        if complete and at < len(records):
+            self.damage.add("damaged_chunks", f"{where} breaks off after {at} of {len(records)} bytes")
+
+    def _unpacked(self, buffer: Buffer, first: int, stop: int, complete: bool) -> bytes:
+        """Return the records of a chunk. Raises ValueError where they are not what the chunk says."""
+        if first + CHUNK_HEAD.size > stop:
+            raise ValueError(f"it has {stop - first} bytes")
+        _, _, declared, checksum = CHUNK_HEAD.unpack_from(buffer, first)
+        compression, at = text(buffer, first + CHUNK_HEAD.size, stop)
+        length = number(buffer, at, 8, stop)
+        if complete and at + 8 + length != stop:
+            raise ValueError(f"it has {stop - at - 8} bytes, expected the {length} that it declares")
+        if compression and not complete:
+            return b""
+        records = unpack_chunk(compression, buffer[at + 8 : stop], declared, self.allowance)
         if complete and checksum and zlib.crc32(records) != checksum:
-            raise ValueError(f"checksum of the chunk at byte {first - RECORD.size} does not fit its content")
-        self.run(records, 0, len(records))
-
-
-def _uint16(buffer: Buffer, at: int) -> int:
-    return int.from_bytes(buffer[at : at + 2], "little")
-
-
-def _text(buffer: Buffer, at: int) -> tuple[str, int]:
-    """Return a text and where it ends."""
-    end = at + 4 + int.from_bytes(buffer[at : at + 4], "little")
-    return buffer[at + 4 : end].decode(), end
+            raise ValueError("its checksum does not fit its content")
+        if complete and len(records) != declared:
+            raise ValueError(f"it holds {len(records)} bytes, expected the {declared} that it declares")
+        return records

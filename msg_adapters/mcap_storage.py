@@ -12,20 +12,25 @@ import zlib
 from pathlib import Path
 
 from msg_adapters.definitions import definition
-from msg_adapters.mcap_file import (
+from msg_adapters.mcap_records import (
     CHANNEL,
     CHUNK,
     CHUNK_HEAD,
+    CHUNK_INDEX,
     DATA_END,
     FOOTER,
+    FOOTER_CONTENT,
+    HEADER,
     MAGIC,
     MESSAGE,
+    MESSAGE_INDEX,
     RECORD,
     SCHEMA,
+    STATISTICS,
+    STATISTICS_HEAD,
 )
 from rsea_ros.files import create, write_at
 
-HEADER, MESSAGE_INDEX, CHUNK_INDEX, STATISTICS = 0x01, 0x07, 0x08, 0x0B
 CHUNK_SIZE = 1 << 20
 MESSAGE_RECORD = struct.Struct("<BQHIQQ")
 
@@ -98,7 +103,7 @@ class McapStorage:
         self.flush()
         data_end = _record(DATA_END, bytes(4))
         summary = self._schemas + self._channels + b"".join(self._chunks) + self._statistics()
-        footer = _record(FOOTER, struct.pack("<QQI", self._end + len(data_end), 0, 0))
+        footer = _record(FOOTER, FOOTER_CONTENT.pack(self._end + len(data_end), 0, 0))
         self._put(data_end + summary + footer + MAGIC)
         self.abort()
 
@@ -116,7 +121,7 @@ class McapStorage:
         times = self._times or [0]
         numbers = (sum(self._counts.values()), len(self._types), len(self._counts), 0, 0, len(self._chunks))
         counts = b"".join(struct.pack("<HQ", key, count) for key, count in self._counts.items())
-        return _record(STATISTICS, struct.pack("<QHIIIIQQ", *numbers, min(times), max(times)), _sized(counts))
+        return _record(STATISTICS, STATISTICS_HEAD.pack(*numbers, min(times), max(times)), _sized(counts))
 
     def _put(self, data: bytes) -> None:
         """Write at the end. The end moves only when all is written, so that a second try mends the first."""

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
 import yaml
 
+from msg_adapters import yaml_text
 from msg_adapters.contents import Contents
 from rsea_ros.errors import BagError
+from rsea_ros.wording import brief
 
 NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 NOTES = "rsea_notes"
 VERSION = 9
+_LONGEST_NOTE, _MOST_NOTES = 500, 50
 
 
 @dataclass
@@ -28,34 +31,72 @@ class Topic:
     count: int = 0
 
 
-def files_of(bag: Path, contents: Contents) -> list[Path]:
-    """Return the files that the metadata of a bag name; empty where there are none (recorder killed).
+@dataclass(frozen=True)
+class Known:
+    """What the metadata of a bag say: its files, how many messages each topic has, and notes."""
 
-    Topics and types are taken from the files themselves; the metadata add only the order and the notes.
-    Raises BagError for metadata that name a file that is not there.
+    files: list[Path] = field(default_factory=list)
+    counts: Mapping[str, int] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+
+def known(bag: Path, contents: Contents) -> Known:
+    """Return what the metadata of a bag say; nothing where there are none (recorder killed).
+
+    Topics and types are taken from the files themselves; the metadata add the order, notes, and how many
+    messages of each topic there should be.
+    Raises BagError for metadata that name a file that is not there, and for what no recorder writes:
+    more than 1 MB, aliases, deep nesting.
     """
+    path = bag / NAME
     try:
-        known = yaml.safe_load((bag / NAME).read_text())[ROOT]
-        files = [bag / PurePath(name).name for name in known["relative_file_paths"]]
-        notes = str((known.get("custom_data") or {}).get(NOTES, ""))
+        found = _known(bag, yaml_text.load(path))
     except FileNotFoundError:
         contents.notes.append(f"{bag}: without {NAME} (recorder killed?), read from its files")
-        return []
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError):
-        contents.notes.append(f"{bag / NAME}: not understood, read from the files beside it")
-        return []
-    for file in files:
+        return Known()
+    except BagError:
+        raise
+    except (TypeError, ValueError, KeyError) as error:
+        contents.notes.append(f"{path}: not understood, read from the files beside it")
+        contents.tell("damaged_metadata", NAME, f"not understood ({brief(str(error))}), read without it")
+        return Known()
+    for file in found.files:
         if not file.exists():
-            raise BagError(f"{bag / NAME}: names {file.name}, which is not there")
-    contents.notes.extend(notes.splitlines())
-    return files
+            raise BagError(f"{path}: names {brief(file.name)}, which is not there")
+    return found
+
+
+def _known(bag: Path, document: Any) -> Known:
+    """Raises TypeError, ValueError or KeyError for a document that is not what rosbag2 writes."""
+    root = document[ROOT]
+    files = [bag / PurePath(_text_of(name)).name for name in _list_of(root["relative_file_paths"])]
+    topics = [
+        (topic["topic_metadata"]["name"], topic) for topic in _list_of(root["topics_with_message_count"])
+    ]
+    counts = {_text_of(name): int(topic["message_count"]) for name, topic in topics}
+    custom = root.get("custom_data")
+    notes = custom.get(NOTES, "") if isinstance(custom, dict) else ""
+    lines = [brief(line, _LONGEST_NOTE) for line in _text_of(notes).splitlines()]
+    return Known(files, counts, lines[:_MOST_NOTES])
+
+
+def _text_of(value: Any) -> str:
+    if not isinstance(value, str) or "\0" in value:
+        raise TypeError(f"{brief(repr(value))}, expected a text")
+    return value
+
+
+def _list_of(value: Any) -> list[Any]:
+    if not isinstance(value, list):
+        raise TypeError(f"{brief(repr(value))}, expected a list")
+    return value
 
 
 def text(
     file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], notes: Sequence[str]
 ) -> str:
     """Return the metadata of a bag of one file; span is its first and last log time, ns."""
-    known: Mapping[str, Any] = {
+    document: Mapping[str, Any] = {
         "version": VERSION,
         "storage_identifier": storage,
         **_amount(topics, span),
@@ -67,7 +108,7 @@ def text(
         "custom_data": {NOTES: "\n".join(notes)} if notes else None,
         "ros_distro": "rsea_ros",
     }
-    return str(yaml.safe_dump({ROOT: known}, sort_keys=False))
+    return str(yaml.safe_dump({ROOT: document}, sort_keys=False))
 
 
 def _amount(topics: Sequence[Topic], span: tuple[int, int]) -> dict[str, Any]:

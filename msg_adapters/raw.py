@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Sequence
-from itertools import pairwise
 
 from msg_adapters.cdr import STAMP, Layout, layout_of
 from rsea_ros.errors import ParameterError
+from rsea_ros.wording import brief
 
 SECOND = 1_000_000_000
+LONGEST = 65_536
+"""Bytes of a message of one joint or one wrench, with long names. A longer one is refused unread: what a
+cycle does for a message must not depend on who sends it."""
 
 
 class RawReader:
@@ -31,7 +34,12 @@ class RawReader:
         self._at: list[int] = []
 
     def read(self, raw: bytes) -> tuple[int, list[float]]:
-        """Return the stamp, ns, and the numbers. Raises ParameterError for a message of several joints."""
+        """Return the stamp, ns, and the numbers.
+
+        Raises ParameterError for a message of several joints, a damaged one, and one of more than 64 KiB.
+        """
+        if len(raw) > LONGEST:
+            raise ParameterError(f"{len(raw)} bytes, expected at most {LONGEST} of a {self._msgtype}")
         if len(raw) != self._length or any(raw[a:b] != same for a, b, same in self._fixed):
             self._learn(raw)
         seconds, nanoseconds = self._stamp.unpack_from(raw, STAMP)
@@ -45,10 +53,10 @@ class RawReader:
         except ValueError as error:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
         if len(layout.names) > 1:
-            names = ", ".join(layout.names)
+            names = brief(", ".join(layout.names[:5]))
             raise ParameterError(f"{len(layout.names)} joints ({names}), expected one")
         self._at = [_position(layout, name, index) for name, index in self._fields]
-        self._fixed = [(a, b, raw[a:b]) for a, b in _runs(layout.structure)]
+        self._fixed = [(a, b, raw[a:b]) for a, b in _joined(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length = len(raw)
 
@@ -78,7 +86,11 @@ def _position(layout: Layout, name: str, index: int) -> int:
     return first + 8 * index if index < count else 0
 
 
-def _runs(positions: Sequence[int]) -> list[tuple[int, int]]:
-    """Return first and end of each run of neighbouring positions."""
-    breaks = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(positions)) if b != a + 1), len(positions)]
-    return [(positions[a], positions[b - 1] + 1) for a, b in pairwise(breaks)]
+def _joined(runs: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Return first and end of the runs, those that touch as one."""
+    joined: list[tuple[int, int]] = []
+    for first, end in runs:
+        if joined and joined[-1][1] == first:
+            first = joined.pop()[0]
+        joined.append((first, end))
+    return joined

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from msg_adapters.bags import BagPath, read_contents
-from msg_adapters.cdr import Block, blocks
-from msg_adapters.checks import Series, checked
+from msg_adapters.cdr import Block
+from msg_adapters.checks import Series, check_finite, note_repeats, on_the_clock_of_the_command
 from msg_adapters.contents import Contents, Messages
+from msg_adapters.decoding import Decoded
+from msg_adapters.health import DIAGNOSTICS, tell_health
 from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
+from rsea_ros.stamps import far_apart, in_order, repair_stamps, stray_fault
+from rsea_ros.wording import brief
 
-LATEST = 2**63 - 1
-"""The highest stamp in ns that a 64-bit integer holds; a damaged log time may be higher."""
+_MOST_NAMED = 20
+"""Topics or joints that a message lists."""
+
+LATEST = 2**62
+"""The highest log time that is believed, ns: the year 2116. Differences of stamps stay within 64 bits."""
 
 
 def read_record(
@@ -24,31 +32,50 @@ def read_record(
     """Read one bag, or several files of one run, as a record; other topics are ignored.
 
     Stamps are those of the message headers; where one is zero, the log time stands in and a note says so.
-    strict: refuse what no model can be fitted to (missing command or measurement, NaN, stamps that go
-    back); repeated stamps are dropped with a note. Otherwise all samples come as they are.
+    Samples that lie out of order are sorted by their stamps. Damaged messages are left out. Whatever was
+    damaged stands in the record's faults, and what the bag's /diagnostics tell of the run.
+    strict: refuse what no model can be fitted to (missing command or measurement, NaN), and put the stamps
+    right (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN come as they are.
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
-    contents = read_contents(paths, {topics.topic(role) for role in ROLES})
+    contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
     return record_from(contents, source, topics, strict=strict)
 
 
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
     """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
-    notes = contents.notes
+    told = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
     series: dict[str, Series] = {}
     for role in ROLES:
         messages = contents.topics.get(topics.topic(role))
         if messages is not None and messages.raw:
-            series.update(_series(source, role, messages, topics, notes))
+            series.update(_series(source, role, messages, topics, told))
     if strict:
-        series = {name: checked(one, notes) for name, one in series.items()}
-    _require_values(source, series, strict)
+        for one in series.values():
+            check_finite(one)
+            note_repeats(one, told.notes)
+    series = on_the_clock_of_the_command(series, told)
+    _require_values(source, series, strict, told)
+    tell_health(contents, told)
+    return _record(series, source, told, strict)
+
+
+def _record(series: Mapping[str, Series], source: str, told: Contents, strict: bool) -> Record:
+    """Put the series on one clock, in order."""
     epoch = min(int(one.stamps.min()) for one in series.values())
-    channels = {name: Channel(_seconds(one.stamps - epoch), one.values) for name, one in series.items()}
-    return Record(channels, source, epoch, tuple(dict.fromkeys(notes)))
+    channels: dict[str, Channel] = {}
+    for name, one in series.items():
+        ordered, faults = in_order(Channel(_seconds(one.stamps - epoch), one.values), name)
+        channels[name] = ordered
+        told.faults += faults
+    record = Record(channels, source, epoch, tuple(dict.fromkeys(told.notes)), tuple(told.faults))
+    if not strict:
+        return record
+    repaired, found = repair_stamps(record)
+    return replace(repaired, faults=(*record.faults, *found))
 
 
 def _seconds(nanoseconds: IntArray) -> FloatArray:
@@ -61,53 +88,54 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
     for role in ROLES:
         found = contents.topics.get(topics.topic(role), Messages(TYPES[role]))
         if found.msgtype != TYPES[role]:
-            raise BagError(f"{source}: {topics.topic(role)} is {found.msgtype}, expected {TYPES[role]}")
+            raise BagError(
+                f"{source}: {topics.topic(role)} is {brief(found.msgtype)}, expected {TYPES[role]}"
+            )
         if found.raw:
             filled.add(role)
     needs = [("torque_command",), ("joint_states", "ft")] if strict else [ROLES]
     for roles in needs:
         if not filled.intersection(roles):
             wanted = " or ".join(topics.topic(role) for role in roles)
-            have = ", ".join(f"{name} ({m.msgtype})" for name, m in sorted(contents.topics.items()))
-            told = f" ({'; '.join(contents.notes)})" if contents.notes else ""
-            raise BagError(
-                f"{source}: no message on {wanted}; the bag holds {have or 'no topic at all'}{told}"
-            )
+            topics_held = sorted(contents.topics.items())[:_MOST_NAMED]
+            have = ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics_held)
+            have = have or "no topic at all"
+            raise BagError(f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}")
 
 
-def _require_values(source: str, series: dict[str, Series], strict: bool) -> None:
-    """Refuse messages whose arrays are empty where values are needed."""
+def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
+    """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
     if strict and "command" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
     if not set(series) - ({"command", "reference"} if strict else set()):
-        raise BagError(f"{source}: the messages hold no values, expected a measurement")
+        raise BagError(f"{source}: the messages hold no values, expected a measurement{told.told()}")
 
 
 def _series(
-    source: str, role: str, messages: Messages, topics: TopicMap, notes: list[str]
+    source: str, role: str, messages: Messages, topics: TopicMap, told: Contents
 ) -> dict[str, Series]:
     """Decode one topic: channel -> series. A field that no message fills is left out."""
-    where = f"{source}: {topics.topic(role)}"
-    stamps = np.zeros(len(messages.raw), np.int64)
-    values = {field: np.full(len(stamps), np.nan) for field in FIELDS[role].values()}
-    there = {field: np.zeros(len(stamps), bool) for field in values}
-    found = list(blocks(messages.raw, TYPES[role], where))
+    topic = topics.topic(role)
+    where = f"{source}: {topic}"
+    decoded = Decoded(messages, TYPES[role], tuple(FIELDS[role].values()))
+    found = decoded.blocks(topic, where, told)
     _one_joint(where, found, topics.joint)
     for block in found:
-        stamps[block.rows] = block.stamps()
-        for field in values:
-            column = _column(block, field, topics)
-            if column is not None:
-                values[field][block.rows] = column
-                there[field][block.rows] = True
-    stamps = _with_log_times(where, stamps, messages.log_times, notes)
+        decoded.take(block, {field: _column(block, field, topics) for field in decoded.fields})
+    decoded.tell_empty(topic, told)
+    stamps = _with_log_times(topic, where, decoded, messages.log_times, told)
     series = {}
     for channel, field in FIELDS[role].items():
-        one = Series(f"{where} {field}", stamps[there[field]], values[field][there[field]])
+        filled = decoded.filled[field]
+        one = Series(f"{where} {field}", stamps[filled], decoded.values[field][filled])
         if np.isnan(one.values).all():
             if one.values.size:
-                notes.append(f"{one.where}: not a number in every message, taken as not measured")
+                told.notes.append(f"{one.where}: not a number in every message, taken as not measured")
             continue
+        stray = far_apart(one.stamps)
+        if stray.any():
+            told.faults.append(stray_fault(stray, channel))
+            one = Series(one.where, one.stamps[~stray], one.values[~stray])
         series[channel] = one
     return series
 
@@ -117,7 +145,7 @@ def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
     layouts = [block.layout for block in found if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])
-    listed = ", ".join(names) or "without names"
+    listed = ", ".join(map(brief, names[:_MOST_NAMED])) or "without names"
     if joint is not None and names and joint not in names:
         raise BagError(f"{where}: no joint {joint!r}, the messages hold {listed}")
     if joint is None and count > 1:
@@ -136,10 +164,16 @@ def _column(block: Block, field: str, topics: TopicMap) -> FloatArray | None:
     return block.field(field)[:, index] if index < block.layout.fields[field][1] else None
 
 
-def _with_log_times(where: str, stamps: IntArray, log_times: Sequence[int], notes: list[str]) -> IntArray:
+def _with_log_times(
+    topic: str, where: str, decoded: Decoded, log_times: Sequence[int], told: Contents
+) -> IntArray:
     """Put the log time where the header stamp is zero, which means that nobody set it."""
-    unset = [row for row in np.flatnonzero(stamps == 0).tolist() if log_times[row]]
+    stamps: IntArray = decoded.stamps.copy()
+    zero = np.flatnonzero((stamps == 0) & decoded.sound)
+    unset = [row for row in zero.tolist() if log_times[row]]
     if unset:
-        notes.append(f"{where}: {len(unset)} of {len(stamps)} header stamps are zero, log time taken")
+        detail = f"{len(unset)} of {len(stamps)} header stamps are zero, log time taken"
+        told.notes.append(f"{where}: {detail}")
+        told.tell("zero_stamps", topic, detail, len(unset), "messages", len(unset) / len(stamps))
         stamps[unset] = [min(log_times[row], LATEST) for row in unset]
     return stamps

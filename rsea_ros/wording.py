@@ -8,6 +8,7 @@ from collections.abc import Sequence
 _CONTROLS = r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 _COLOUR = r"\x1b(?!\[[\d;]*m)"
 _PLAIN, _COLOURED = re.compile(f"{_CONTROLS}|\x1b"), re.compile(f"{_CONTROLS}|{_COLOUR}")
+_LONGEST = 60
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
@@ -29,3 +30,10 @@ def shown(value: object, longest: int = 60) -> str:
     """Return a value as it stands in a message: quoted, and cut where it is long."""
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def brief(text: str, longest: int = _LONGEST) -> str:
+    """Return a text of unknown origin fit for a message: one line, no control characters, not too long."""
+    cut = text[: longest + 1]
+    plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cut[:longest])
+    return plain + ("…" if len(cut) > longest else "")

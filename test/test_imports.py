@@ -13,11 +13,12 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-BASE = {"errors", "signals", "progress", "wording", "interrupts", "files", "new_files"} | YAML
+BASE = {"errors", "signals", "stamps", "progress", "wording", "interrupts", "files", "new_files"} | YAML
 CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
+    "stamps": {"errors", "signals"},
     "progress": set(),
     "wording": set(),
     "interrupts": set(),
@@ -73,6 +74,7 @@ FOREIGN = {
     "signals": {"numpy"},
     "arrays": {"numpy"},
     "library": {"numpy", "plotly", "rich"},
+    "stamps": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
     "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression"} | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},

@@ -16,6 +16,7 @@ from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, write_text
 from rsea_ros.report.identification_json import fault_json
+from rsea_ros.stamps import repair_stamps
 
 HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"
 
@@ -37,12 +38,13 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         check_free([Path(args.out)], force=args.force, inputs=[args.bag, args.model])
     record = read_record([args.bag], topics=topic_map(args), strict=False)
+    record, faults = repair_stamps(record)
     comparisons = predict(load_rig(args.model), record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)
     errors = {n: {"rms_error": c.rms_error, "fit_percent": c.fit_percent} for n, c in comparisons.items()}
-    faults = [fault_json(fault) for fault in record.faults]
-    print(json.dumps({"channels": errors, "data": {"faults": faults}}, indent=2))
+    told = [fault_json(fault) for fault in (*record.faults, *faults)]
+    print(json.dumps({"channels": errors, "data": {"faults": told}}, indent=2))
     return 0
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.clock import repair_clock
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
+from rsea_ros.stamps import repair_stamps
 
 _AROUND = 10
 _SPIKE = 12.0
@@ -39,7 +39,7 @@ class Checked:
 def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
-    repaired, clock_faults = repair_clock(record)
+    repaired, clock_faults = repair_stamps(record)
     faults += clock_faults
     masked: dict[str, BoolArray] = {}
     for name, channel in repaired.channels.items():

@@ -64,7 +64,7 @@ class Bench:
         self._told = counts
         kinds = ("cycles missed", "commands late", "commands refused")
         troubles = [f"{count} {kind}" for count, kind in zip(new, kinds, strict=True) if count]
-        values = {**timing.values(), **commands.values(time.time_ns())}
+        values = {**timing.values(), "lost_cycles": cycle.left_out, **commands.values(time.time_ns())}
         return Report(WARN if troubles else OK, ", ".join(troubles) or "running", values)
 
     def close(self) -> None:

@@ -97,7 +97,8 @@ class Record:
 
     def _report(self) -> Report:
         lost = self._lost()
-        return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "recording", self._counts())
+        summary = f"{lost} messages lost" if lost else "recording"
+        return Report(WARN if lost else OK, summary, {**self._counts(), "lost_messages": lost})
 
 
 def main() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import resource
 import signal
 import subprocess
@@ -16,6 +17,7 @@ from foreign import EPOCH, joint_state, write_foreign
 
 from msg_adapters import write_record
 from msg_adapters.writing import BagWriter
+from rsea_ros.cli.main import main
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -115,10 +117,15 @@ def test_a_value_that_is_no_number(record, tmp_path, out, value):
     refused(done, tmp_path / "bag", f"/rsea/ft wrench[7] is {value}", "expected a finite number")
 
 
-def test_stamps_that_go_back(record, tmp_path, out):
-    write_record(changed(record, "ft", 9, t=0.001), tmp_path / "bag")
-    done = rsea("identify", tmp_path / "bag", "--out", out)
-    refused(done, tmp_path / "bag", "/rsea/ft wrench[9]", "expected stamps that never go back")
+@pytest.mark.parametrize(
+    ("sample", "stamp", "kinds"),
+    [(9, 3.3 / 280, ["stray_stamps", "dropped_samples"]), (11, 13.5 / 280, ["out_of_order"])],
+)
+def test_a_stamp_that_goes_back_is_told_and_the_rest_used(record, tmp_path, sample, stamp, kinds):
+    write_record(changed(record, "ft", sample, t=stamp), tmp_path / "bag")
+    assert main(["identify", str(tmp_path / "bag"), "--out", str(tmp_path / "found")]) == 0
+    faults = json.loads((tmp_path / "found" / "identification.json").read_text())["data"]["faults"]
+    assert [(f["kind"], f["channel"], f["size"]) for f in faults] == [(kind, "ft", 1) for kind in kinds]
 
 
 def test_two_joints(tmp_path, out):

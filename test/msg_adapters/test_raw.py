@@ -48,6 +48,45 @@ def test_several_joints_and_damaged_messages_are_refused():
     assert STATE.read(raw) == (STAMP, [0.0, 0.0])
 
 
+class Counted(bytes):
+    """Bytes that count those cut out of them."""
+
+    cut = 0
+
+    def __getitem__(self, key):
+        part = super().__getitem__(key)
+        Counted.cut += len(part) if isinstance(part, bytes) else 0
+        return part
+
+
+@pytest.mark.parametrize(
+    ("reader", "message"),
+    [
+        (RawReader(WRENCH, [("wrench", 5)]), wrench_message(STAMP, (1.0,) * 6, frame="f" * 3_000_000)),
+        (STATE, joint_state_message(STAMP, 0.0, 0.0, 0.0, "j" * 3_000_000)),
+        (STATE, efforts_message(STAMP, {f"joint {k}": 1.0 for k in range(10_000)})),
+    ],
+)
+def test_a_text_of_megabytes_is_refused_unread(reader, message):
+    """It took 2.4 s of the cycle that commands the torque."""
+    raw = Counted(serialize_message(message))
+    Counted.cut = 0
+    with pytest.raises(ParameterError, match="bytes, expected at most 65536") as caught:
+        reader.read(raw)
+    assert Counted.cut == 0 and len(str(caught.value)) < 200
+
+
+def test_a_frame_is_neither_read_nor_compared():
+    """A sender that puts a counter into the frame costs no walk of each message."""
+    reader = RawReader(WRENCH, [("wrench", 5)])
+    messages = [wrench_message(STAMP, (0.0,) * 5 + (k,), frame="f" * 60_000 + f"{k:04}") for k in range(9)]
+    raw = [Counted(serialize_message(message)) for message in messages]
+    reader.read(raw[0])
+    Counted.cut = 0
+    assert [reader.read(one)[1] for one in raw] == [[float(k)] for k in range(9)]
+    assert Counted.cut < 9 * 20
+
+
 def test_what_is_written_is_read_by_rclpy():
     template = efforts_message(0, {"distal": 0.0, "proximal": 0.0})
     writer = RawWriter(serialize_message(template), JOINT_STATE, "effort")

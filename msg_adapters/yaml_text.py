@@ -1,0 +1,44 @@
+"""YAML of unknown origin: every scalar stays a text, nothing is expanded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rsea_ros.errors import BagError
+from rsea_ros.wording import brief
+
+LARGEST = 1_000_000
+DEEPEST = 30
+
+_Loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+
+def load(path: Path) -> Any:
+    """Return the document of a file as mappings, lists and texts.
+
+    Raises BagError for a file of more than 1 MB, aliases, and deep nesting; ValueError for what is no YAML;
+    FileNotFoundError.
+    """
+    with path.open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise BagError(f"{path}: more than {LARGEST} bytes, expected the metadata of a bag")
+    try:
+        text = data.decode()
+        _check(path, text)
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        raise ValueError(brief(" ".join(str(error).split()))) from None
+
+
+def _check(path: Path, text: str) -> None:
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        if isinstance(event, yaml.AliasEvent):
+            raise BagError(f"{path}: has an alias (*{brief(str(event.anchor))}), expected none")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST:
+            raise BagError(f"{path}: nested more than {DEEPEST} deep, expected the metadata of a bag")

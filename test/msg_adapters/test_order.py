@@ -1,0 +1,137 @@
+"""Messages out of order in the log: sorted by their stamps; a clock that jumped is another matter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from foreign import EPOCH, STORE, run_rows, wrench, write_foreign
+from mcap_bytes import McapFile, write
+
+from msg_adapters import read_record, write_record
+from rsea_ros.errors import BagError
+from rsea_ros.signals import Channel
+from rsea_ros.stamps import repair_stamps
+
+COUNT = 400
+PERIOD = 3_571_428
+
+
+def _jittered(rows, share, seed=5):
+    """Return rows in the order in which they arrive after a delay of up to `share` periods, or spread so."""
+    rng = np.random.default_rng(seed)
+    delays = np.abs(rng.normal(0.0, share * PERIOD, len(rows)))
+    arrived = [(name, at + int(d), message) for (name, at, message), d in zip(rows, delays, strict=True)]
+    return sorted(arrived, key=lambda row: row[1])
+
+
+@pytest.mark.parametrize("strict", [True, False])
+@pytest.mark.parametrize("share", [0.5, 3.0])
+def test_jitter_of_the_arrival_changes_nothing(tmp_path, strict, share):
+    rows = run_rows(COUNT)
+    clean = read_record(write(tmp_path / "clean.mcap", McapFile(rows).file()), strict=strict)
+    got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, share)).file()), strict=strict)
+    assert got.epoch_ns == clean.epoch_ns
+    for name, channel in clean.channels.items():
+        assert np.array_equal(got[name].t, channel.t) and np.array_equal(got[name].y, channel.y)
+    assert {fault.kind for fault in got.faults} == {"out_of_order"}
+    assert {fault.channel for fault in got.faults} == set(clean.channels)
+    assert all(fault.size and 0.0 < fault.share < 1.0 for fault in got.faults)
+
+
+def test_one_late_message_is_sorted_and_counted(tmp_path):
+    rows = run_rows(COUNT)
+    late = rows.pop(3 * 100 + 2)
+    rows.insert(3 * 140 + 2, late)
+    got = read_record(write(tmp_path / "a.mcap", McapFile(rows).file()))
+    assert np.array_equal(got["ft"].y, np.arange(COUNT) * 0.7)
+    (fault,) = got.faults
+    assert (fault.kind, fault.channel, fault.size) == ("out_of_order", "ft", 1)
+
+
+def test_files_of_a_run_come_in_the_order_of_their_log_times(tmp_path):
+    rows = run_rows(COUNT)
+    first = write(tmp_path / "z.mcap", McapFile(rows[:600]).file())
+    second = write(tmp_path / "a.mcap", McapFile(rows[600:]).file())
+    got = read_record([second, first])
+    assert np.array_equal(got["ft"].y, np.arange(COUNT) * 0.7)
+    assert got.faults == ()
+
+
+@pytest.mark.parametrize("seconds", [-0.5, 0.5, -86400.0 * 4000])
+def test_a_clock_that_jumped_is_set_right_where_a_model_is_fitted(tmp_path, record, seconds):
+    """Of a bag whose log times are no help: they are made of the stamps."""
+    t, y = record["ft"].t.copy(), record["ft"].y
+    t[300:] += seconds
+    write_record(record.with_channels(ft=Channel(t, y)), tmp_path / "bag")
+    got = read_record(tmp_path / "bag")
+    assert [(f.kind, f.channel) for f in got.faults] == [("clock_jump", "ft")]
+    assert got.faults[0].size == pytest.approx(abs(seconds), abs=1e-5)
+    assert np.array_equal(got["ft"].y, y)
+    assert np.allclose(np.diff(got["ft"].t), 1 / 280, atol=1e-5)
+    raw = read_record(tmp_path / "bag", strict=False)
+    assert np.allclose(np.diff(raw["ft"].t), np.diff(t), atol=1e-5) and raw.faults == ()
+    assert [f.kind for f in repair_stamps(raw)[1]] == ["clock_jump"]
+
+
+@pytest.mark.parametrize("at", [0, 150, COUNT - 1])
+@pytest.mark.parametrize("stamp", [0.25 + EPOCH * 1e-9, 17.0, 2.0**31 - 1, -(2.0**31)])
+def test_a_stamp_that_is_not_the_samples_is_left_out(tmp_path, at, stamp):
+    """A bit of the seconds is wrong: no grid may be laid over the years in between."""
+    rows = run_rows(COUNT)
+    wrong = round(stamp * 1e9)
+    message = wrench(0, [0.0] * 5 + [99.0])
+    message.header.stamp.sec, message.header.stamp.nanosec = wrong // 10**9, wrong % 10**9
+    rows[3 * at + 2] = ("/rsea/ft", rows[3 * at + 2][1], message)
+    got = read_record(write(tmp_path / "a.mcap", McapFile(rows).file()))
+    assert 99.0 not in got["ft"].y and len(got["ft"]) == COUNT - 1
+    assert ("stray_stamps", "ft", 1) in {(f.kind, f.channel, f.size) for f in got.faults}
+    assert got.stop - got.start < 2.0
+
+
+def test_gaps_are_told_where_a_model_is_fitted(tmp_path):
+    rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
+    got = read_record(write_foreign(tmp_path / "bag", rows))
+    (fault,) = got.faults
+    assert (fault.kind, fault.channel, fault.size) == ("dropped_samples", "ft", 20)
+    assert "longest gap 0.075 s" in fault.detail
+
+
+def test_log_times_beyond_all_years_are_no_overflow(tmp_path):
+    file = McapFile(run_rows(COUNT))
+    stampless = [
+        (name, 2**64 - 1 if name == "/rsea/ft" else at, _without_stamp(name, message))
+        for name, at, message in file.rows
+    ]
+    got = read_record(write(tmp_path / "a.mcap", McapFile(stampless).file()), strict=False)
+    assert "zero_stamps" in {fault.kind for fault in got.faults}
+    assert all(np.isfinite(channel.t).all() for channel in got.channels.values())
+
+
+def _without_stamp(name, message):
+    if name == "/rsea/ft":
+        message = STORE.deserialize_cdr(
+            STORE.serialize_cdr(message, message.__msgtype__), message.__msgtype__
+        )
+        message.header.stamp.sec = message.header.stamp.nanosec = 0
+    return message
+
+
+def test_a_channel_of_another_clock_is_left_out(tmp_path):
+    """A sensor that stamps from its own start on: the simulation went through the years between."""
+    rows = run_rows(COUNT)
+    for k in range(COUNT):
+        rows[3 * k + 2][2].header.stamp.sec -= 1_000_000_000
+    got = read_record(write(tmp_path / "a.mcap", McapFile(rows).file()))
+    assert "ft" not in got and len(got["position"]) == COUNT and got.epoch_ns == EPOCH
+    (fault,) = got.faults
+    assert (fault.kind, fault.channel, fault.unit) == ("clock_offset", "ft", "s")
+    assert fault.size == pytest.approx(-1e9)
+    only = [row for row in rows if row[0] != "/rsea/joint_states"]
+    with pytest.raises(BagError, match=r"expected a measurement \(clock offset: left out"):
+        read_record(write(tmp_path / "b.mcap", McapFile(only).file()))
+
+
+def test_a_gap_is_told_beside_disorder(tmp_path):
+    rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
+    got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, 0.5)).file()))
+    assert {(f.kind, f.size) for f in got.faults if f.channel == "ft"} >= {("dropped_samples", 20)}

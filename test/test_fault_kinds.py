@@ -1,0 +1,39 @@
+"""Every kind of fault that the code tells stands in one table, and in the docs."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+from msg_adapters.health import COUNTERS
+from rsea_ros.diagnosis.faults import FINDERS
+from rsea_ros.signals import FAULT_KINDS
+
+ROOT = Path(__file__).resolve().parents[1]
+TELLING = {"Fault", "tell", "add"}
+
+
+def _literal_kinds() -> Iterator[str]:
+    """Yield the kinds that stand in calls of Fault, tell and add in the readers and the core."""
+    for folder in ("msg_adapters", "rsea_ros/diagnosis", "rsea_ros/identification"):
+        for path in (ROOT / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+                    name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+                    if name in TELLING and isinstance(node.args[0].value, str):
+                        yield node.args[0].value
+
+
+def test_the_table_has_every_kind():
+    kinds = (
+        {kind for kind in _literal_kinds() if "_" in kind} | set(FINDERS) | {k for k, _ in COUNTERS.values()}
+    )
+    assert {"damaged_chunks", "missing_topic", "cut_off", "coarse_steps", "nan"} <= kinds
+    assert kinds <= set(FAULT_KINDS)
+
+
+def test_the_docs_have_the_table():
+    text = (ROOT / "docs" / "bags.md").read_text()
+    for kind, meaning in FAULT_KINDS.items():
+        assert f"| `{kind}` | {meaning} |" in text

@@ -1,0 +1,116 @@
+"""Stamps put right: jitter is no fault, gaps and jumps are found, and a second look finds nothing new."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rsea_ros.errors import ChannelError
+from rsea_ros.signals import Channel, Record
+from rsea_ros.stamps import far_apart, jumps_back, repair_stamps
+
+PERIOD = 1 / 280
+COUNT = 2000
+
+
+def _record(t, **others):
+    even = np.arange(COUNT) * PERIOD
+    channels = {"command": even, "position": even + 1e-3, "ft": t, **others}
+    return Record({name: Channel(np.asarray(s), np.arange(len(s)) * 1.0) for name, s in channels.items()})
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.49])
+def test_jitter_of_the_stamps_is_no_gap(share):
+    rng = np.random.default_rng(1)
+    t = np.arange(COUNT) * PERIOD + rng.uniform(-share, share, COUNT) * PERIOD
+    assert repair_stamps(_record(t))[1] == []
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_lost_samples_are_counted_beside_jitter(share):
+    rng = np.random.default_rng(2)
+    t = np.arange(COUNT) * PERIOD + rng.uniform(-share, share, COUNT) * PERIOD
+    keep = rng.random(COUNT) >= 0.03
+    keep[[0, -1, -2, -3]] = True
+    (fault,) = repair_stamps(_record(t[keep]))[1]
+    assert (fault.kind, fault.size) == ("dropped_samples", COUNT - keep.sum())
+
+
+@pytest.mark.parametrize("periods", [5, 100, 1000])
+def test_a_jump_back_is_told_from_disorder(periods):
+    t = np.arange(COUNT) * PERIOD
+    jumped = np.where(np.arange(COUNT) < 1500, t, t - periods * PERIOD)
+    assert np.flatnonzero(jumps_back(jumped)).tolist() == [1499]
+    swapped = np.concatenate([t[:500], t[700:900], t[500:700], t[900:]])
+    assert not jumps_back(swapped).any()
+    assert not jumps_back(np.sort(t + 0.0)[np.argsort(t + np.sin(np.arange(COUNT)) * 4 * PERIOD)]).any()
+
+
+def test_a_jump_of_the_joint_states_is_found_though_they_are_three_channels():
+    t = np.arange(COUNT) * PERIOD
+    jumped = np.where(np.arange(COUNT) < 900, t, t + 0.5)
+    record = _record(t, position=jumped, velocity=jumped, motor_torque=jumped)
+    repaired, faults = repair_stamps(record)
+    assert {(f.kind, f.channel) for f in faults} == {
+        ("clock_jump", name) for name in ("position", "velocity", "motor_torque")
+    }
+    assert np.allclose(repaired["position"].t, t)
+
+
+def test_a_clock_that_was_set_leaves_no_years_in_any_channel():
+    t = np.arange(COUNT) * PERIOD
+    years = np.where(np.arange(COUNT) < 50, 0.0, 1.7e9)
+    record = _record(t + years, command=t + years, position=t + 1e-3 + years)
+    repaired, faults = repair_stamps(record)
+    assert [f.kind for f in faults] == ["clock_jump"] * 3
+    assert repaired.stop - repaired.start < 2 * COUNT * PERIOD
+
+
+def test_a_second_look_finds_nothing_new():
+    t = np.arange(COUNT) * PERIOD
+    t[500] = t[499]
+    t[800:] += 0.5
+    repaired, faults = repair_stamps(_record(t))
+    assert {f.kind for f in faults} == {"duplicate_stamps", "clock_jump"}
+    told = Record(repaired.channels, faults=tuple(faults))
+    assert repair_stamps(told)[1] == []
+
+
+def test_few_stamps_far_from_all_others():
+    t = np.arange(1000) * 1.0
+    t[[0, 500, 501]] += 1e9
+    assert np.flatnonzero(far_apart(t, 3600.0)).tolist() == [0, 500, 501]
+    assert not far_apart(np.array([0.0, 1e9]), 3600.0).any()
+
+
+def test_stamps_that_nearly_repeat_are_repeats():
+    """Half the steps a nanosecond: a grid of the median step would have 7e9 places."""
+    t = np.arange(COUNT) * PERIOD
+    t[1::2] = t[::2] + 1e-9
+    repaired, faults = repair_stamps(_record(t))
+    assert len(repaired["ft"]) == COUNT // 2
+    assert [f.kind for f in faults] == ["duplicate_stamps"]
+
+
+def test_stamps_of_no_clock_are_refused():
+    t = np.concatenate([np.arange(COUNT - 50) * 1e-9, 1.0 + np.arange(50) * 60.0])
+    with pytest.raises(ChannelError, match="ft: 2000 stamps, half of them 1e-09 s apart"):
+        repair_stamps(_record(t))
+
+
+def test_a_sensor_that_was_silent_for_long_keeps_its_place():
+    """Eleven minutes without it, while all others went on: no clock was set."""
+    t = np.arange(0.0, 2000.0, 0.5)
+    silent = t[(t < 600.0) | (t > 1260.0)]
+    ones = {name: Channel(s.copy(), np.ones(len(s))) for name, s in (("command", t), ("ft", silent))}
+    repaired, faults = repair_stamps(Record(ones))
+    assert [f.kind for f in faults] == ["dropped_samples"]
+    assert np.array_equal(repaired["ft"].t, silent)
+
+
+def test_two_clocks_of_three_that_jump_alike_are_found():
+    t = np.arange(COUNT) * PERIOD
+    years = np.where(np.arange(COUNT) < 900, 0.0, 1e8)
+    repaired, faults = repair_stamps(_record(t + years, position=t + 1e-3 + years))
+    assert {(f.kind, f.channel) for f in faults} == {("clock_jump", "ft"), ("clock_jump", "position")}
+    assert repaired.stop < 2 * COUNT * PERIOD
