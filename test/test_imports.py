@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 BASE = {"errors", "signals", "progress", "wording"}
-CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
+CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors"},
@@ -22,7 +22,8 @@ OWN = {
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},
-    "diagnosis": BASE | {"effects", "model", "identification"},
+    "checks": BASE | {"effects", "model", "identification"},
+    "diagnosis": BASE | {"effects", "model", "identification", "checks"},
     "control": BASE | {"effects", "model"},
     "design": BASE | {"model"},
     "hardware": BASE,
@@ -46,6 +47,7 @@ FOREIGN = {
     "effects": NUMERIC,
     "model": NUMERIC | {"yaml"},
     "identification": NUMERIC | {"threadpoolctl"},
+    "checks": NUMERIC,
     "diagnosis": NUMERIC,
     "control": NUMERIC,
     "design": NUMERIC | {"yaml"},

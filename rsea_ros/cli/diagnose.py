@@ -79,7 +79,7 @@ def readable(bag: str, topics: TopicMap) -> Record:
 
     Raises BagError or IdentificationError for one that cannot be diagnosed at all.
     """
-    from rsea_ros.diagnosis.usable import check_diagnosable
+    from rsea_ros.checks.usable import check_diagnosable
 
     record = read_record([bag], topics=topics, strict=False)
     check_diagnosable(record)

@@ -1,0 +1,53 @@
+"""Dead channels: constant, or noise that has nothing to do with what the machine did."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.checks.expected import Side, quotients, sides
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, Fault, Record
+
+_VISIBLE = 3.0
+"""Times the sensor's noise: a smaller signal than that may well be lost in it."""
+_SHOWS = 0.3
+"""Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
+
+
+def dead_channels(record: Record, rig: Rig) -> list[Fault]:
+    """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
+
+    The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
+    called dead.
+    """
+    compared = sides(record, rig)
+    is_commanded = "command" not in record or float(np.ptp(record["command"].y)) > 0.0
+    found = {
+        n: _constant(record[n], n, compared.get(n), rig, is_commanded)
+        for n in record.channels
+        if n in _SENSORS
+    }
+    for n, q in quotients(compared).items():
+        shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
+        if n in found and not found[n] and shows and q.is_unrelated:
+            found[n] = "noise that has nothing to do with the command"
+    return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
+
+
+_SENSORS = ("ft", "position", "velocity", "motor_torque")
+
+
+def _constant(channel: Channel, name: str, side: Side | None, rig: Rig, is_commanded: bool) -> str:
+    """Return what is wrong with a channel that holds one value although there was something to measure."""
+    if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
+        return ""
+    if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
+        return ""
+    if side is None and not is_commanded:
+        return ""
+    return f"constant at {channel.y[0]:.4g}"
+
+
+def _noise(rig: Rig, name: str) -> float:
+    sensor = rig.sensors.get(name)
+    return max(sensor.noise, sensor.quantum) if sensor else 0.0
