@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 
-from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
+from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
 
 _SEGMENTS = 5
 """A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""
@@ -33,7 +33,8 @@ class Quotient:
 
     frequency: Hz, shape (n,). value: complex, shape (n,). coherence: 0 to 1, shape (n,).
     sd: standard deviation of ln(value), shape (n,). weight: share of the predicted power, shape (n,).
-    segments: how many independent ones. lines: how many lines bear the predicted power.
+    segments: how many independent ones. lines: how many lines bear the predicted power. related: coherence
+    of all lines, each by its share of the predicted power.
     measured, predicted: RMS without mean, in the channel's unit.
     """
 
@@ -54,7 +55,8 @@ class Quotient:
         """Whether the channel has no more in common with the prediction than noise has by chance."""
         single = 1.0 - FALSE_ALARM ** (1.0 / max(self.segments - 1.0, 1.0))
         chance = 1.0 / self.segments
-        return self.related < chance + (single - chance) / math.sqrt(max(self.lines, 1.0))
+        limit = chance + (single - chance) / math.sqrt(max(self.lines, 1.0))
+        return bool(self.related < limit)
 
 
 def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quotient | None:
@@ -73,7 +75,8 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     segments = len(yy) / (1.0 + 2.0 / 36.0) if len(yy) > 1 else 1.0
     share = power_p / power_p.sum()
     bands = _bands(len(cross))
-    s_yp, s_pp, s_yy = (np.add.reduceat(v, bands) for v in (cross, power_p, power_y))
+    s_yp: ComplexArray = np.add.reduceat(cross, bands)
+    s_pp, s_yy = (np.add.reduceat(v, bands) for v in (power_p, power_y))
     width = np.diff(np.append(bands, len(cross)))
     coherence = np.abs(s_yp) ** 2 / (s_pp * s_yy)
     averages = np.maximum(segments * width, 2.0)
@@ -106,7 +109,7 @@ def _segments(values: FloatArray, length: int) -> ComplexArray:
     return spectra[:, _FIRST : int(0.9 * spectra.shape[1])]
 
 
-def _bands(lines: int) -> FloatArray:
+def _bands(lines: int) -> IntArray:
     """Return where each band begins, shape (bands,)."""
     edges = np.geomspace(1.0, lines + 1.0, _LINES + 1)[:-1]
     return np.unique(np.floor(edges).astype(np.int64) - 1)
