@@ -17,13 +17,19 @@ from rsea_ros.checks.shape import Prior, Shape, ShapeFit
 from rsea_ros.checks.spectra import Quotient
 from rsea_ros.model.rig import Rig
 
-ALLOWED = 0.55
-"""Logarithm of a gain, either way, that a bench may have: a factor of 1.7."""
+ALLOWED = 1.1
+"""Logarithm of a gain, either way, that a bench may have: a factor of 3, that of a drive at its limit."""
+_RELATED = 0.8
+"""Coherence below which a gain may be that of a limit: a unit changes none."""
+_ALIKE = 0.15
+"""Logarithm: factors that lie so close cannot be told apart."""
 SHAPED = 0.35
 """Largest median of what is left of ln R for a channel to have the rig's shape."""
 _BETTER = 10.0
 """By how much a cost must fall for a sign or a factor to be reported, e^5 in likelihood."""
 _FREE = 3.0
+_CLEAR = 60.0
+"""Difference of phase costs from which the better sign needs no trial."""
 _NEAR = 0.7
 """Logarithm: so close to a factor's value a gain must be for the factor to be tried."""
 
@@ -32,7 +38,8 @@ _NEAR = 0.7
 class Reading:
     """How a channel is to be read. sign: -1 where it is turned. factor: None for SI at the gear output.
 
-    gain: what is left of the logarithm of its gain then. odd: the gain fits no factor.
+    also: other factors that these data cannot tell from it. gain: what is left of the logarithm of its gain
+    then. odd: the gain fits no factor.
     """
 
     channel: str
@@ -40,6 +47,7 @@ class Reading:
     factor: Factor | None
     gain: float
     odd: bool = False
+    also: tuple[Factor, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,10 +67,10 @@ def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
     plain = fit.fit({n: Prior() for n in fit.channels})
     if all(abs(plain.gain[n]) < ALLOWED and plain.error[n] < SHAPED for n in fit.channels):
         return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
-    return _tried(fit, plain, rig)
+    return _tried(fit, plain, quotients, rig)
 
 
-def _tried(fit: ShapeFit, plain: Shape, rig: Rig) -> Readings:
+def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: Rig) -> Readings:
     """Return the readings where something is off: signs first, then factors, then both against none."""
     signs = _signs(fit)
     free = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
@@ -71,19 +79,30 @@ def _tried(fit: ShapeFit, plain: Shape, rig: Rig) -> Readings:
     if command is not None:
         found["command"] = _named("command", command[0], command[1], rig)
     applied = fit.fit({n: _prior(n, found) for n in fit.channels})
-    if applied.cost > plain.cost - _BETTER:
+    shaped = float(np.median(list(applied.error.values()))) < SHAPED
+    if not shaped or applied.cost > plain.cost - _BETTER:
         return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
-    return Readings(found, plain, applied)
+    return Readings({n: _believed(r, quotients, applied) for n, r in found.items()}, plain, applied)
+
+
+def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: Shape) -> Reading:
+    """Return the reading, as it stands where the channel does not have the rig's shape, or may be limited."""
+    q = quotients.get(reading.channel)
+    if q is None:
+        q = max(quotients.values(), key=lambda one: one.related)
+    of_a_limit = reading.factor is not None and abs(math.log(reading.factor.value)) < 3.0
+    weak = q.related < _RELATED and of_a_limit
+    if weak or applied.error.get(reading.channel, 0.0) > SHAPED:
+        return Reading(reading.channel, 1.0, None, reading.gain)
+    return reading
 
 
 def _signs(fit: ShapeFit) -> dict[str, float]:
     """Return for each channel the sign under which its phases fit, the positive one unless much worse."""
-    signs = {
-        n: -1.0 if fit.phase_cost(n, -1.0) < fit.phase_cost(n, 1.0) - _BETTER / 2.0 else 1.0
-        for n in fit.channels
-    }
+    lead = {n: fit.phase_cost(n, 1.0) - fit.phase_cost(n, -1.0) for n in fit.channels}
+    signs = {n: -1.0 if lead[n] > _BETTER / 2.0 else 1.0 for n in fit.channels}
     best = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
-    for n in fit.channels:
+    for n in (n for n in fit.channels if abs(lead[n]) < _CLEAR):
         other = {**signs, n: -signs[n]}
         tried = fit.fit({c: Prior(other[c], 0.0, _FREE) for c in fit.channels})
         if tried.cost < best.cost - _BETTER:
@@ -120,11 +139,12 @@ def _named(channel: str, sign: float, gain: float, rig: Rig) -> Reading:
     """Return the reading with the factor that comes nearest to a gain, none for a gain that is allowed."""
     if abs(gain) < ALLOWED:
         return Reading(channel, sign, None, gain)
-    nearest = min(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
-    left = gain - math.log(nearest.value)
+    known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
+    left = gain - math.log(known[0].value)
     if abs(left) > _NEAR:
         return Reading(channel, sign, None, gain, odd=True)
-    return Reading(channel, sign, nearest, left)
+    also = tuple(f for f in known[1:] if abs(math.log(f.value / known[0].value)) < _ALIKE)
+    return Reading(channel, sign, known[0], left, also=also)
 
 
 def _prior(channel: str, found: Mapping[str, Reading]) -> Prior:

@@ -31,7 +31,7 @@ from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 TIMED = ("ft", "position", "velocity")
 """Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
-_ROUNDS = 5
+_ROUNDS = 4
 _PARTS = (1.0, 0.4, 0.15)
 """Of a step, tried until the loss falls."""
 _WORSE = 1.02
@@ -68,7 +68,8 @@ class Linear:
     """What the linearised fit says. offset: s at the start of the record, drift: s/s, by channel.
 
     misfit: RMS of the residual over the noise by channel. told: by value of the rig, the share of what is
-    known of it that these data bring (0 to 1). relative: its one sigma over its value then.
+    known of it that these data bring (0 to 1). relative: its one sigma over its value then. settled: whether
+    the clocks stood still at last; else their numbers mean nothing.
     """
 
     offset: Mapping[str, Number]
@@ -76,6 +77,7 @@ class Linear:
     misfit: Mapping[str, float]
     told: Mapping[str, float]
     relative: Mapping[str, float]
+    settled: bool
 
 
 def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape) -> Linear:
@@ -96,6 +98,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     setting = _Setting(record, start, case, rig, timed, values)
     rows = _rows(setting, state)
     step, sd = _solved(rows, setting, state)
+    settled = False
     for _ in range(_ROUNDS):
         tried = ((at, _rows(setting, at)) for at in (state.moved(part * step) for part in _PARTS))
         better = next((t for t in tried if t[1].loss < _WORSE * rows.loss), None)
@@ -105,8 +108,9 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
         step, sd = _solved(rows, setting, state)
         clocks_moved = slice(len(theta), len(theta) + 2 * len(timed))
         if np.all(np.abs(step[clocks_moved]) < _DONE * sd[clocks_moved]):
+            settled = True
             break
-    return _linear(setting, state.moved(step), rows, sd)
+    return _linear(setting, state.moved(step), rows, sd, settled)
 
 
 def _liveliest(command: Channel) -> tuple[float, float]:
@@ -126,7 +130,7 @@ def _cut(
     return record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items() if n in masked}
 
 
-def _linear(setting: _Setting, state: _State, rows: _Rows, sd: FloatArray) -> Linear:
+def _linear(setting: _Setting, state: _State, rows: _Rows, sd: FloatArray, settled: bool) -> Linear:
     n, m = len(setting.values), len(setting.timed)
     late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
     told, relative = _told(setting, rows)
@@ -136,6 +140,7 @@ def _linear(setting: _Setting, state: _State, rows: _Rows, sd: FloatArray) -> Li
         misfit=dict(zip(setting.timed, rows.misfit.tolist(), strict=True)),
         told=told,
         relative=relative,
+        settled=settled,
     )
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import read_record
-from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.identification_json import fault_json
@@ -29,11 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="JSON is what this verb prints anyway")
     add_topic_options(parser)
+    add_window_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Predict, print the errors, write the CSV."""
-    record = read_record([args.bag], topics=topic_map(args), strict=False)
+    record = cut(read_record([args.bag], topics=topic_map(args), strict=False), args)
     comparisons = predict(load_rig(args.model), record)
     if args.out:
         _write_csv(comparisons, Path(args.out))
