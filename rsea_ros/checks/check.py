@@ -14,6 +14,7 @@ from rsea_ros.checks.gain_findings import gain_findings
 from rsea_ros.checks.gains import Readings, readings_of
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
+from rsea_ros.checks.motion import is_commanded
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
@@ -25,6 +26,8 @@ from rsea_ros.signals import Channel, Fault, Record
 
 Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
+_WHOLE = 0.1
+"""Share of masked samples above which a channel's response is not compared."""
 FAULTY = ("sign", "scale", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
@@ -41,7 +44,7 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
         found += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             found += excitation(checked.record, rig)
-            found += _against_rig(checked, rig, axis)
+            found += _against_rig(checked, rig, axis) if is_commanded(checked.record) else []
         found += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
     return Findings(record.source, rig.name, tuple(found), faults)
@@ -78,7 +81,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
             )
         ]
     found = noises(record, rig)
-    compared = quotients(sides(record, rig))
+    whole = {n for n, bad in checked.masked.items() if bad.mean() < _WHOLE}
+    compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
     readings = readings_of(compared, rig)
     if readings is None:
         return found

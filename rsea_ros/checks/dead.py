@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.checks.expected import Side, quotients, sides
+from rsea_ros.checks.motion import is_commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 
@@ -20,13 +21,10 @@ def dead_channels(record: Record, rig: Rig) -> list[Fault]:
     The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
     called dead.
     """
+    if not is_commanded(record):
+        return []
     compared = sides(record, rig)
-    is_commanded = "command" not in record or float(np.ptp(record["command"].y)) > 0.0
-    found = {
-        n: _constant(record[n], n, compared.get(n), rig, is_commanded)
-        for n in record.channels
-        if n in _SENSORS
-    }
+    found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in _SENSORS}
     for n, q in quotients(compared).items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
         if n in found and not found[n] and shows and q.is_unrelated:
@@ -37,13 +35,11 @@ def dead_channels(record: Record, rig: Rig) -> list[Fault]:
 _SENSORS = ("ft", "position", "velocity", "motor_torque")
 
 
-def _constant(channel: Channel, name: str, side: Side | None, rig: Rig, is_commanded: bool) -> str:
+def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
     """Return what is wrong with a channel that holds one value although there was something to measure."""
     if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
         return ""
     if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
-        return ""
-    if side is None and not is_commanded:
         return ""
     return f"constant at {channel.y[0]:.4g}"
 

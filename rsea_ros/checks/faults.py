@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
-from rsea_ros.checks.motion import motion_beside
+from rsea_ros.checks.motion import is_commanded, motion_beside
 from rsea_ros.checks.stamps import repair_clock
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
@@ -52,9 +52,16 @@ def check(record: Record, rig: Rig) -> Checked:
     for name in repaired.channels:
         masked[name], found = _masked(repaired, name)
         faults += found
-    faults += [fault for n in repaired.channels if n in rig.sensors for fault in coarse(repaired[n], n, rig)]
+    faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     return Checked(_filled(alive, masked), masked, tuple(faults))
+
+
+def _has_steps(record: Record, name: str) -> bool:
+    """Tell whether a channel's steps are its sensor's: a torque repeats those of a command of few values."""
+    if name != "motor_torque" or "command" not in record:
+        return name in record
+    return name in record and len(np.unique(record["command"].y)) > _FEW * len(record["command"])
 
 
 def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
@@ -62,6 +69,8 @@ def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
     channel, faults = record[name], []
     bad = np.zeros(len(channel), bool)
     for kind, find in FINDERS.items():
+        if kind in _WHILE_MOVING and not is_commanded(record):
+            continue
         found = find(channel, name) & ~bad
         if kind in _WHILE_MOVING:
             found = while_others_moved(record, name, found, kind)
@@ -104,7 +113,8 @@ def not_finite(channel: Channel, name: str) -> BoolArray:
 def outliers(channel: Channel, name: str) -> BoolArray:
     """Return which samples stand alone: far from the median of the ten around them, which agree.
 
-    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours.
+    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours; the
+    first sample after a step of the torque has more neighbours that are like it.
     """
     if name == "command" or len(channel) < 2 * _AROUND or not np.isfinite(channel.y).any():
         return np.zeros(len(channel), bool)
@@ -112,11 +122,13 @@ def outliers(channel: Channel, name: str) -> BoolArray:
         np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect"
     )
     around = np.delete(np.lib.stride_tricks.sliding_window_view(padded, _AROUND + 1), _AROUND // 2, axis=1)
-    middle = np.median(around, axis=1)
+    around = np.sort(around, axis=1)
+    middle = 0.5 * (around[:, _AROUND // 2 - 1] + around[:, _AROUND // 2])
     spread = np.partition(np.abs(around - middle[:, None]), _AROUND - 3, axis=1)[:, _AROUND - 3]
     steps = np.abs(np.diff(channel.y))
     least = float(np.nanmedian(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    found: BoolArray = np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least)
+    alone = (channel.y > around[:, -3]) | (channel.y < around[:, 2])
+    found: BoolArray = alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least))
     return found
 
 
@@ -187,10 +199,17 @@ def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str)
     motion = motion_beside(record, name) if suspect.any() else None
     if motion is None or not motion.moved.any():
         return suspect if motion is None else np.zeros(len(suspect), bool)
-    clearly = motion.moved
-    if kind == "frozen_samples":
-        clearly = clearly & (motion.speed > np.median(motion.speed[motion.moved]))
-    return suspect if clearly[suspect].mean() > _MOVED else np.zeros(len(suspect), bool)
+    if kind != "frozen_samples":
+        return _mostly(suspect, motion.moved)
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
+    return _mostly(long, motion.moved) | _mostly(suspect & ~long, fast)
+
+
+def _mostly(suspect: BoolArray, clearly: BoolArray) -> BoolArray:
+    """Return the suspect samples if enough of them fall into motion, else none."""
+    enough = suspect.any() and clearly[suspect].mean() > _MOVED
+    return suspect if enough else np.zeros(len(suspect), bool)
 
 
 _MOVED = 0.3

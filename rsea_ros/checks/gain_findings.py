@@ -14,6 +14,8 @@ _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
 """Factor of a rig's value that is another machine's; that is worth a look; and spreads that go with both.
 
 A damping is no machine's mark: friction of any kind changes it."""
+_TOLD = 0.9
+"""Share of what is known of a value that the response must bring."""
 _STRANGE = 2.0 * SHAPED
 RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
 
@@ -100,8 +102,8 @@ def _of_rig(shape: Shape, rig: Rig) -> list[Finding]:
     for name, value in shape.values.items():
         factor, reach = value / rig[name] if rig[name] else 1.0, shape.reach[name]
         times = max(factor, 1.0 / max(factor, 1e-12))
-        soft = name.endswith(".damping")
-        if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE:
+        soft = name.endswith("damping")
+        if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE and shape.told[name] > _TOLD:
             light: Light = "red" if times > _FAR and not soft else "amber"
             found.append(
                 Finding(

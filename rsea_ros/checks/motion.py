@@ -39,6 +39,11 @@ def motion_beside(record: Record, name: str) -> Motion | None:
     return Motion(moves, np.nan_to_num(speed))
 
 
+def is_commanded(record: Record) -> bool:
+    """Tell whether the command of a record changes, if there is one."""
+    return "command" not in record or float(np.ptp(np.nan_to_num(record["command"].y))) > 0.0
+
+
 def at_rest(record: Record) -> float:
     """Return the share of the commands at which neither command nor machine moved."""
     t = record["command"].t

@@ -46,11 +46,13 @@ class Prior:
 class Shape:
     """A fit of the shape. gain: logarithm, delay: s, both by channel; error: RMS of what is left of ln R.
 
-    values: of the rig, by name. reach: how many of the rig's stated spreads each has moved.
+    values: of the rig, by name. reach: how many of the rig's stated spreads each has moved, told:
+    which share of what is known of it the response brings.
     """
 
     values: Mapping[str, float]
     reach: Mapping[str, float]
+    told: Mapping[str, float]
     gain: Mapping[str, float]
     delay: Mapping[str, float]
     error: Mapping[str, float]
@@ -83,7 +85,8 @@ class ShapeFit:
         centre = np.concatenate([self._start, gain, np.zeros(len(gain))])
         begin = [self._size(k) if priors[n].doubt > 1.0 else gain[k] for k, n in enumerate(self.channels)]
         theta = np.concatenate([self._start, begin, self._delays(sign)])
-        return self._shape(*self._least(theta, centre, np.array(doubt), sign))
+        theta, here, cost = self._least(theta, centre, np.array(doubt), sign)
+        return self._shape(theta, here, cost, self._told(theta, here, np.array(doubt), sign))
 
     def _size(self, k: int) -> float:
         """Return the logarithm of a channel's gain over all its lines."""
@@ -173,7 +176,14 @@ class ShapeFit:
                 response[of] = model_response(rig, name, self._frequency[of])
         return response
 
-    def _shape(self, theta: FloatArray, here: FloatArray, cost: float) -> Shape:
+    def _told(self, theta: FloatArray, here: FloatArray, doubt: FloatArray, sign: FloatArray) -> FloatArray:
+        """Return for each value the share of what is known of it that the lines bring."""
+        slope, weight = self._slope(theta, here, sign), 1.0 / (1.0 + here**2)
+        normal = ((slope * weight[:, None]).T @ slope) * np.outer(doubt, doubt) + np.eye(len(doubt))
+        told: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
+        return told
+
+    def _shape(self, theta: FloatArray, here: FloatArray, cost: float, told: FloatArray) -> Shape:
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         left = np.hypot(here[:lines], here[lines:]) * self._sd
         known = zip(self.unknowns, theta[:n], strict=True)
@@ -183,6 +193,7 @@ class ShapeFit:
                 u.name: abs(float(v) - u.inner(u.start)) / u.doubt
                 for u, v in zip(self.unknowns, theta, strict=False)
             },
+            told={u.name: float(share) for u, share in zip(self.unknowns, told, strict=False)},
             gain=dict(zip(self.channels, theta[n : n + m].tolist(), strict=True)),
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
             error={c: float(np.median(left[self._of == k])) for k, c in enumerate(self.channels)},
