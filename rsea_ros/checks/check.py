@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
-from rsea_ros.checks.gain_findings import gain_findings
+from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
@@ -28,6 +28,8 @@ Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
 _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
+_IN_COMMON = 0.3
+"""Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
 FAULTY = ("sign", "scale", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
@@ -84,6 +86,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
     whole = {n for n, bad in checked.masked.items() if bad.mean() < _WHOLE}
     compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
     readings = readings_of(compared, rig)
+    silent = set(compared) - set(readings.channels if readings else ())
+    found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
     if readings is None:
         return found
     found += gain_findings(readings, rig, axis)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from rsea_ros.checks.factors import Factor
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.gains import SHAPED, Reading, Readings
 from rsea_ros.checks.shape import Shape
+from rsea_ros.checks.spectra import Quotient
 from rsea_ros.model.rig import Rig
 
 _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
@@ -16,7 +18,10 @@ _FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
 A damping is no machine's mark: friction of any kind changes it."""
 _TOLD = 0.9
 """Share of what is known of a value that the response must bring."""
-_STRANGE = 2.0 * SHAPED
+_APART = 5.0
+"""Factor between the sizes of two signals that have nothing in common, from which the rig is another."""
+_STRANGE, _FOREIGN = 2.0 * SHAPED, 1.2
+"""What is left of ln R: play and friction on a coarse rig reach the first, another machine the second."""
 RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
 
 
@@ -24,6 +29,23 @@ def gain_findings(readings: Readings, rig: Rig, axis: str) -> list[Finding]:
     """Return findings for each channel's sign and scale, and for the rig. axis: of the wrench now."""
     found = [f for r in readings.channels.values() for f in _of_channel(r, axis)]
     return [*found, *_of_rig(readings.applied, rig)]
+
+
+def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
+    """Return findings for channels that move, but not as the rig would."""
+    return [
+        Finding(
+            "red" if max(q.measured / q.predicted, q.predicted / q.measured) > _APART else "amber",
+            "wrong_rig",
+            q.channel,
+            q.measured / q.predicted,
+            "1",
+            expected="about 1",
+            detail="times what the rig would give, and hardly anything in common with it",
+            remedy=RIGHT_RIG,
+        )
+        for q in quotients
+    ]
 
 
 def _of_channel(r: Reading, axis: str) -> list[Finding]:
@@ -119,9 +141,10 @@ def _of_rig(shape: Shape, rig: Rig) -> list[Finding]:
             )
     for name, error in shape.error.items():
         if error > _STRANGE:
+            far = error > _FOREIGN and not rig.rigid_spring
             found.append(
                 Finding(
-                    "red",
+                    "red" if far else "amber",
                     "wrong_rig",
                     name,
                     math.exp(error),

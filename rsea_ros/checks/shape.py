@@ -44,10 +44,11 @@ class Prior:
 
 @dataclass(frozen=True)
 class Shape:
-    """A fit of the shape. gain: logarithm, delay: s, both by channel; error: RMS of what is left of ln R.
+    """A fit of the shape. gain: logarithm, delay: s, both by channel.
 
-    values: of the rig, by name. reach: how many of the rig's stated spreads each has moved, told:
-    which share of what is known of it the response brings.
+    error: median of what is left of ln R, each line by its power, by channel. values: of the rig, by name.
+    reach: how many of the rig's stated spreads each has moved; told: which share of what is known of it the
+    response brings.
     """
 
     values: Mapping[str, float]
@@ -72,6 +73,7 @@ class ShapeFit:
             for what in ("frequency", "value", "sd")
         )
         self._sd = np.hypot(sd, MODEL_ERROR)
+        self._share = np.concatenate([q.weight[keep] for q, keep in kept.values()] or [np.empty(0)])
         self._rig, self.unknowns = rig, _movable(rig)
         self._start = start_vector(self.unknowns)
         self._nominal = self._response(rig)
@@ -176,6 +178,13 @@ class ShapeFit:
                 response[of] = model_response(rig, name, self._frequency[of])
         return response
 
+    def _middle(self, left: FloatArray, k: int) -> float:
+        """Return the median of what is left of a channel, each line by its share of the predicted power."""
+        of = self._of == k
+        rising = np.argsort(left[of])
+        share = np.cumsum(self._share[of][rising])
+        return float(left[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
+
     def _told(self, theta: FloatArray, here: FloatArray, doubt: FloatArray, sign: FloatArray) -> FloatArray:
         """Return for each value the share of what is known of it that the lines bring."""
         slope, weight = self._slope(theta, here, sign), 1.0 / (1.0 + here**2)
@@ -196,7 +205,7 @@ class ShapeFit:
             told={u.name: float(share) for u, share in zip(self.unknowns, told, strict=False)},
             gain=dict(zip(self.channels, theta[n : n + m].tolist(), strict=True)),
             delay=dict(zip(self.channels, theta[n + m :].tolist(), strict=True)),
-            error={c: float(np.median(left[self._of == k])) for k, c in enumerate(self.channels)},
+            error={c: self._middle(left, k) for k, c in enumerate(self.channels)},
             cost=cost,
         )
 

@@ -22,6 +22,10 @@ _SEGMENTS = 5
 _LONGEST = 8.0
 """s. Of a segment, where the record has more than five such."""
 _LINES = 48
+_ENOUGH = 0.3
+"""Of the predicted power: lines that hold less say nothing of a channel."""
+_ALIKE = 0.3
+"""Correlation with the prediction from which a channel measures something."""
 _FIRST = 2
 _TINY = 1e-300
 FALSE_ALARM = 1e-3
@@ -35,7 +39,8 @@ class Quotient:
     sd: standard deviation of ln(value), shape (n,). weight: share of the predicted power, shape (n,).
     segments: how many independent ones. lines: how many lines bear the predicted power. related: coherence
     of all lines, each by its share of the predicted power.
-    measured, predicted: RMS without mean, in the channel's unit.
+    measured, predicted: RMS without mean, in the channel's unit. captured: share of the predicted power that
+    these lines hold. alike: absolute correlation of measured and predicted.
     """
 
     channel: str
@@ -49,6 +54,8 @@ class Quotient:
     related: float
     measured: float
     predicted: float
+    captured: float
+    alike: float
 
     @property
     def is_unrelated(self) -> bool:
@@ -56,7 +63,7 @@ class Quotient:
         single = 1.0 - FALSE_ALARM ** (1.0 / max(self.segments - 1.0, 1.0))
         chance = 1.0 / self.segments
         limit = chance + (single - chance) / math.sqrt(max(self.lines, 1.0))
-        return bool(self.related < limit)
+        return bool(self.related < limit and self.alike < _ALIKE and self.captured > _ENOUGH)
 
 
 def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quotient | None:
@@ -66,10 +73,14 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     period = float(np.median(np.diff(t)))
     even = np.arange(t[0], t[-1], period)
     y, p = (np.interp(even, t, v) for v in (y, p))
-    length = min(len(even) // _SEGMENTS * 2 // 2, next_fast_len(int(_LONGEST / period)))
-    if length < 16 or not (np.std(p) > 0.0 and np.std(y) > 0.0):
+    if len(even) < 16 * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
         return None
-    yy, pp = _segments(y, length), _segments(p, length)
+    length = min(len(even) // _SEGMENTS, next_fast_len(int(_LONGEST / period)))
+    pp = _segments(p, length)
+    if _captured(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
+        length = len(even) // _SEGMENTS
+        pp = _segments(p, length)
+    yy = _segments(y, length)
     cross = np.sum(yy * pp.conj(), axis=0)
     power_y, power_p = (np.sum(np.abs(v) ** 2, axis=0) + _TINY for v in (yy, pp))
     segments = len(yy) / (1.0 + 2.0 / 36.0) if len(yy) > 1 else 1.0
@@ -92,7 +103,16 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
         related=float(np.sum(share * np.abs(cross) ** 2 / (power_y * power_p))),
         measured=float(np.std(y)),
         predicted=float(np.std(p)),
+        captured=_captured(pp, p),
+        alike=abs(float(np.corrcoef(y, p)[0, 1])),
     )
+
+
+def _captured(spectra: ComplexArray, values: FloatArray) -> float:
+    """Return the share of a signal's power that its segments' lines hold."""
+    length = 2.0 * spectra.shape[1]
+    power = 2.0 * float(np.mean(np.sum(np.abs(spectra) ** 2, axis=1))) / (0.375 * length**2)
+    return float(power / np.var(values))
 
 
 def usable(q: Quotient) -> BoolArray:
