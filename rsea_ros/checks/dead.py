@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from rsea_ros.checks.expected import Side, quotients, sides
@@ -16,9 +18,10 @@ _SHOWS = 0.3
 """Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
 
 
-def dead_channels(record: Record, rig: Rig) -> list[Fault]:
+def dead_channels(record: Record, rig: Rig, frozen: Collection[str] = ()) -> list[Fault]:
     """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
 
+    frozen: channels of which a part is held, which says why they have little to do with the command.
     The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
     called dead.
     """
@@ -29,7 +32,7 @@ def dead_channels(record: Record, rig: Rig) -> list[Fault]:
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
-        if n in found and not found[n] and shows and q.is_unrelated:
+        if n in found and not found[n] and n not in frozen and shows and q.is_unrelated:
             found[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
 

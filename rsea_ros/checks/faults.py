@@ -42,16 +42,17 @@ def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_clock(record)
-    dead = dead_channels(_filled(repaired, {n: not_finite(c, n) for n, c in repaired.channels.items()}), rig)
-    repaired = _without(repaired, {f.channel for f in dead})
-    faults += [
-        *clock_faults,
-        *(f for f in dead if not any(g.kind == f.kind and g.channel == f.channel for g in faults)),
-    ]
-    masked = {}
+    masked, found = {}, {}
     for name in repaired.channels:
-        masked[name], found = _masked(repaired, name)
-        faults += found
+        masked[name], found[name] = _masked(repaired, name)
+    frozen_ones = {n for n, own in found.items() if any(f.kind == "frozen_samples" for f in own)}
+    finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
+    dead = dead_channels(_filled(repaired, finite), rig, frozen_ones)
+    repaired = _without(repaired, {f.channel for f in dead})
+    known = {(f.kind, f.channel) for f in faults}
+    faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
+    faults += [f for n in repaired.channels for f in found[n]]
+    masked = {n: bad for n, bad in masked.items() if n in repaired}
     faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     return Checked(_filled(alive, masked), masked, tuple(faults))

@@ -31,13 +31,13 @@ from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 TIMED = ("ft", "position", "velocity")
 """Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
-_ROUNDS = 4
+_ROUNDS = 6
 _PARTS = (1.0, 0.4, 0.15)
 """Of a step, tried until the loss falls."""
 _WORSE = 1.02
 """Of the best loss so far: a round that leaves more is not taken."""
 _LEAST_MISFIT = 0.5
-_DONE = 0.2
+_DONE = 0.5
 """Of one sigma: smaller steps end the rounds."""
 LONGEST = 30.0
 """s. More of a record would only cost more time."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,19 @@ def motion_beside(record: Record, name: str) -> Motion | None:
 def is_commanded(record: Record) -> bool:
     """Tell whether the command of a record changes, if there is one."""
     return "command" not in record or float(np.ptp(np.nan_to_num(record["command"].y))) > 0.0
+
+
+def is_still(record: Record) -> bool:
+    """Tell whether no sensor shows anything but white noise: what fourth differences show is all of it."""
+    return all(_is_noise(record[n]) for n in ("position", "velocity", "ft") if n in record)
+
+
+def _is_noise(channel: Channel) -> bool:
+    y = channel.y[np.isfinite(channel.y)]
+    if len(y) < 64:
+        return False
+    white = float(np.std(np.diff(y, 4))) / math.sqrt(70.0)
+    return float(np.std(y)) <= 1.5 * white
 
 
 def at_rest(record: Record) -> float:

@@ -24,8 +24,6 @@ _LONGEST = 8.0
 _LINES = 48
 _ENOUGH = 0.3
 """Of the predicted power: lines that hold less say nothing of a channel."""
-_ALIKE = 0.3
-"""Correlation with the prediction from which a channel measures something."""
 _FIRST = 2
 _TINY = 1e-300
 FALSE_ALARM = 1e-3
@@ -40,7 +38,7 @@ class Quotient:
     segments: how many independent ones. lines: how many lines bear the predicted power. related: coherence
     of all lines, each by its share of the predicted power.
     measured, predicted: RMS without mean, in the channel's unit. captured: share of the predicted power that
-    these lines hold. alike: absolute correlation of measured and predicted.
+    these lines hold.
     """
 
     channel: str
@@ -55,7 +53,6 @@ class Quotient:
     measured: float
     predicted: float
     captured: float
-    alike: float
 
     @property
     def is_unrelated(self) -> bool:
@@ -63,7 +60,7 @@ class Quotient:
         single = 1.0 - FALSE_ALARM ** (1.0 / max(self.segments - 1.0, 1.0))
         chance = 1.0 / self.segments
         limit = chance + (single - chance) / math.sqrt(max(self.lines, 1.0))
-        return bool(self.related < limit and self.alike < _ALIKE and self.captured > _ENOUGH)
+        return bool(self.related < limit and self.captured > _ENOUGH)
 
 
 def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quotient | None:
@@ -104,7 +101,6 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
         measured=float(np.std(y)),
         predicted=float(np.std(p)),
         captured=_captured(pp, p),
-        alike=abs(float(np.corrcoef(y, p)[0, 1])),
     )
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.checks.motion import at_rest
+from rsea_ros.checks.motion import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Channel, Record
 
 SHORTEST = 4.0
 """s of commands: four blocks of every set (diagnosis/split.py) of a quarter of a second each."""
-
-_MOTIONLESS = 0.98
-"""Share of a record at rest from which nothing moves."""
 
 
 def check_diagnosable(record: Record) -> None:
@@ -40,7 +37,7 @@ def check_diagnosable(record: Record) -> None:
 
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
-    if "command" not in record or not _constant(record["command"]) or at_rest(record) < _MOTIONLESS:
+    if "command" not in record or not _constant(record["command"]) or not is_still(record):
         return
     raise IdentificationError(
         f"{record.source}: the command stays at {record['command'].y[0]:g} N m and nothing moves, "

@@ -33,8 +33,8 @@ def verdict_sentence(
     dead = [_CHANNELS.get(f.channel, f.channel) for f in faults if f.kind == "dead_channel"]
     if verdict == "nothing_wrong" and dead:
         return (
-            f"The {listed(dead)} measures nothing and is left out; with the model's values re-fitted the {name} "
-            f"residual is at the noise floor ({after:.2f} times the noise).{data}"
+            f"The {listed(dead)} measures nothing and is left out; with the model's values re-fitted "
+            f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "nothing_wrong":
         return (
