@@ -37,7 +37,7 @@ _PARTS = (1.0, 0.4, 0.15)
 _WORSE = 1.02
 """Of the best loss so far: a round that leaves more is not taken."""
 _LEAST_MISFIT = 0.5
-_DONE = 0.5
+_DONE = 0.8
 """Of one sigma: smaller steps end the rounds."""
 LONGEST = 30.0
 """s. More of a record would only cost more time."""
@@ -46,7 +46,7 @@ _OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
 _WIDER = 3.0
 _BLOCKS = 40
 """At least: with fewer than unknowns a sandwich is too thin."""
-_RESOLUTION = 1e-6
+_RESOLUTION = 3e-6
 """s. No clock is known better: the fixed step interpolates between its ends."""
 
 
@@ -106,8 +106,9 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
             break
         state, rows = better
         step, sd = _solved(rows, setting, state)
-        clocks_moved = slice(len(theta), len(theta) + 2 * len(timed))
-        if np.all(np.abs(step[clocks_moved]) < _DONE * sd[clocks_moved]):
+        clock_steps = slice(len(theta), len(theta) + 2 * len(timed))
+        finest = np.repeat([_RESOLUTION, _RESOLUTION / case.duration], len(timed))
+        if np.all(np.abs(step[clock_steps]) < _DONE * np.hypot(sd[clock_steps], finest)):
             settled = True
             break
     return _linear(setting, state.moved(step), rows, sd, settled)
