@@ -67,7 +67,7 @@ def test_a_sensor_that_freezes_for_long_is_named(share):
     assert ("frozen_samples", "ft") in kinds(having("ft", y))
 
 
-@pytest.mark.parametrize("bench", [BENCH, QUIET, hide(BENCH, "coulomb_friction", {"torque": 3.0})])
+@pytest.mark.parametrize("bench", [QUIET, hide(BENCH, "coulomb_friction", {"torque": 3.0})])
 @pytest.mark.parametrize(
     "command",
     [

@@ -75,7 +75,7 @@ def test_an_effect_is_no_matter_of_units_or_of_another_rig(effect):
     rng = np.random.default_rng(1)
     bench = drawn_bench(rng)
     bench = hide(bench, effect, drawn_parameters(effect, "strong", rng)) if effect else bench
-    findings = check_record(record_run(bench, 3, duration=10.0), RIG)
+    findings = check_record(record_run(bench, 3, duration=8.0), RIG)
     assert findings.light != "red"
     assert not {f.kind for f in findings.faults} & {"sign", "scale", "wrong_rig", "dead_channel"}
 
@@ -94,7 +94,7 @@ def test_a_wrong_inertia_is_no_scale():
     assert found.channel == "rotor.reflected_inertia"
 
 
-@pytest.mark.parametrize("name", ["prototype_knee", "paper_moving_output", "cycloidal"])
+@pytest.mark.parametrize("name", ["prototype_knee", "cycloidal"])
 def test_another_rig_is_asked_about(name):
     findings = check_record(good(), load_rig(name))
     assert "wrong_rig" in {f.kind for f in findings.findings if f.light == "red"}
