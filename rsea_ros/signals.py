@@ -39,46 +39,6 @@ reference     position asked for by a controller that ran during the record
 """
 
 
-FAULT_KINDS: Mapping[str, str] = MappingProxyType(
-    {
-        "checksum_mismatch": "a checksum of the file does not fit: some value may be wrong",
-        "cut_off": "the file breaks off, or a journal was left beside it",
-        "damaged_chunks": "chunks left out: checksum, size or compression do not fit, or they break off",
-        "damaged_file": "a file of the bag left out: it cannot be read at all",
-        "damaged_messages": "messages left out: they do not fit their type, or nothing declares them",
-        "damaged_metadata": "metadata.yaml is not understood, its counts are not compared",
-        "damaged_records": "stretches of the file that are no records",
-        "data_after_end": "records behind the end of the data; they are used",
-        "empty_fields": "a field is empty in some of the messages that should fill it",
-        "missing_messages": "fewer messages than the file's statistics or metadata.yaml say",
-        "surplus_messages": "more messages than the file's statistics or metadata.yaml say",
-        "unknown_records": "records of a kind that the format does not know, left out",
-        "zero_stamps": "header stamps that nobody set; the log time stands in",
-        "clock_jump": "the clock of the stamps jumped; taken out",
-        "clock_offset": "the clock of a channel differs from the command's",
-        "dropped_samples": "samples are missing: the stamps have gaps",
-        "duplicate_stamps": "stamps repeat; the first sample of each is kept",
-        "out_of_order": "samples out of order in the log, sorted by their stamps",
-        "stray_stamps": "samples left out because their stamps are not theirs",
-        "commands_left_out": "commands that the excitation did not send in time",
-        "device_fault": "the driver latched a fault: the torque was zero until it was cleared",
-        "late_commands": "commands that did not act at their stamps",
-        "limited_commands": "commands that the driver cut down to its limits",
-        "lost_cycles": "cycles of the bench that did not run, or without an answer of the device",
-        "lost_messages": "messages that the middleware lost before the recorder",
-        "refused_commands": "commands that the bench did not take",
-        "watchdog_trips": "the torque went to zero because no command came in time",
-        "clipping": "samples at the end of the sensor's range",
-        "coarse_steps": "values in much larger steps than the rig's sensor makes",
-        "frozen_samples": "samples that repeat while the machine moves",
-        "missing_topic": "a channel that the rig's sensors would give is not there",
-        "nan": "values that are not a number",
-        "outliers": "samples far from all around them",
-    }
-)
-"""Kinds of faults of the data: of the file, of the stamps, of the run (/diagnostics), of the values."""
-
-
 @dataclass(frozen=True)
 class Channel:
     """Values of one quantity at their own stamps.
@@ -118,7 +78,7 @@ class Channel:
 class Fault:
     """A fault of the data, found before any physics.
 
-    kind: one of FAULT_KINDS.
+    kind: one of fault_kinds.FAULT_KINDS.
     channel: the channel, or the topic or file where no channel is known.
     share: of the channel's samples, 0 to 1; NaN where the fault is not one of single samples.
     size: how large, in `unit`, where the fault has a size; detail: where and what, for people.

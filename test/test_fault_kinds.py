@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from msg_adapters.health import COUNTERS
-from rsea_ros.diagnosis.faults import FINDERS
-from rsea_ros.signals import FAULT_KINDS
+from rsea_ros.checks.faults import FINDERS
+from rsea_ros.fault_kinds import FAULT_KINDS
 
 ROOT = Path(__file__).resolve().parents[1]
 TELLING = {"Fault", "tell", "add"}
@@ -16,7 +16,7 @@ TELLING = {"Fault", "tell", "add"}
 
 def _literal_kinds() -> Iterator[str]:
     """Yield the kinds that stand in calls of Fault, tell and add in the readers and the core."""
-    for folder in ("msg_adapters", "rsea_ros/diagnosis", "rsea_ros/identification"):
+    for folder in ("msg_adapters", "rsea_ros/checks", "rsea_ros/diagnosis", "rsea_ros/identification"):
         for path in (ROOT / folder).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):

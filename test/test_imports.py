@@ -13,12 +13,13 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-BASE = {"errors", "signals", "stamps", "progress", "wording", "interrupts", "files", "new_files"} | YAML
-CORE = BASE | {"effects", "model", "identification", "diagnosis", "control", "design"}
+BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording", "interrupts", "files", "new_files"} | YAML
+CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
     "signals": {"errors", "arrays"},
     "stamps": {"errors", "signals"},
+    "fault_kinds": set(),
     "progress": set(),
     "wording": set(),
     "interrupts": set(),
@@ -32,7 +33,8 @@ OWN = {
     "effects": BASE,
     "model": BASE | {"effects"},
     "identification": BASE | {"effects", "model"},
-    "diagnosis": BASE | {"effects", "model", "identification"},
+    "checks": BASE | {"effects", "model", "identification"},
+    "diagnosis": BASE | {"effects", "model", "identification", "checks"},
     "control": BASE | {"effects", "model"},
     "design": BASE | {"model"},
     "hardware": BASE,
@@ -68,6 +70,7 @@ FOREIGN = {
     "effects": NUMERIC,
     "model": NUMERIC,
     "identification": NUMERIC | {"threadpoolctl"},
+    "checks": NUMERIC,
     "diagnosis": NUMERIC,
     "control": NUMERIC,
     "design": NUMERIC,

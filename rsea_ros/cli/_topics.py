@@ -1,11 +1,14 @@
-"""Options of every verb that reads or writes a bag: namespace, topic names, joint, axis."""
+"""Options of every verb that reads or writes a bag: namespace, topic names, joint, axis, window."""
 
 from __future__ import annotations
 
 import argparse
+import math
+from dataclasses import replace
 
 from msg_adapters.topics import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
+from rsea_ros.signals import Record
 
 
 def add_topic_options(parser: argparse.ArgumentParser) -> None:
@@ -33,3 +36,48 @@ def topic_map(args: argparse.Namespace) -> TopicMap:
         if not name.isprintable():
             raise ParameterError(f"{name!r}: holds what cannot be printed, expected a name of ROS")
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
+
+
+def add_window_options(parser: argparse.ArgumentParser) -> None:
+    """Declare --from, --to and --window."""
+    group = parser.add_argument_group("a part of the record, s since its first stamp")
+    group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out what comes before")
+    group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out what comes after")
+    group.add_argument("--window", metavar="A:B", help="the same as --from A --to B")
+
+
+def cut(record: Record, args: argparse.Namespace) -> Record:
+    """Return the part of a record that the options ask for; stamps keep their origin.
+
+    Raises ParameterError for a window that makes no sense or holds no sample.
+    """
+    begin, end = _window(args)
+    if begin == -math.inf and end == math.inf:
+        return record
+    part = record.between(record.start + begin, record.start + end)
+    channels = {name: channel for name, channel in part.channels.items() if len(channel)}
+    if not channels or ("command" in record and "command" not in channels):
+        length = record.stop - record.start
+        raise ParameterError(
+            f"window {begin:g} to {end:g} s: no sample of {record.source} (0 to {length:.3f} s), "
+            "expected some commands"
+        )
+    return replace(part, channels=channels)
+
+
+def _window(args: argparse.Namespace) -> tuple[float, float]:
+    begin, end = args.begin, args.end
+    if args.window is not None:
+        if begin is not None or end is not None:
+            raise ParameterError(f"--window {args.window}: expected it without --from and --to")
+        first, colon, last = args.window.partition(":")
+        try:
+            begin, end = (float(side) if side else None for side in (first, last))
+        except ValueError:
+            colon = ""
+        if not colon:
+            raise ParameterError(f"--window {args.window}: expected A:B in s, such as 5:20")
+    begin, end = -math.inf if begin is None else begin, math.inf if end is None else end
+    if not begin < end:
+        raise ParameterError(f"window {begin:g} to {end:g} s: expected a beginning before its end")
+    return begin, end

@@ -10,7 +10,7 @@ from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.signals import Record
@@ -45,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"exit status {FOUND} when the verdict is one of these: {', '.join(verdicts)}",
     )
     add_topic_options(parser)
+    add_window_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -56,15 +57,18 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        records = [readable(bag, topics) for bag in args.bags]
+        records = [cut(readable(bag, topics), args) for bag in args.bags]
         holdout = readable(args.holdout, topics) if args.holdout else None
+        from rsea_ros.cli._checks import checked
+
+        raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json)
         from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
         without = tuple(effect_named(name).name for name in args.without)
         result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
-        report = write_diagnosis(result, records[0], place, write_overlay)
+        report = write_diagnosis(result, raw, place, write_overlay)
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:
@@ -77,7 +81,7 @@ def readable(bag: str, topics: TopicMap) -> Record:
 
     Raises BagError or IdentificationError for one that cannot be diagnosed at all.
     """
-    from rsea_ros.diagnosis.usable import check_diagnosable
+    from rsea_ros.checks.usable import check_diagnosable
 
     record = read_record([bag], topics=topics, strict=False)
     check_diagnosable(record)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from msg_adapters import read_record
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--json", action="store_true", help="print identification.json to stdout and nothing else"
     )
     add_topic_options(parser)
+    add_window_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -48,7 +49,10 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
-        records = [read_record([bag], topics=topics) for bag in args.bags]
+        records = [cut(read_record([bag], topics=topics), args) for bag in args.bags]
+        from rsea_ros.cli._checks import checked
+
+        records = checked(records, rig, topics.axis, quiet=args.json)
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 

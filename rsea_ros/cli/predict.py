@@ -11,7 +11,7 @@ import numpy as np
 
 from msg_adapters import read_record
 from rsea_ros.cli._output import add_force
-from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, write_text
@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="JSON is what this verb prints anyway")
     add_topic_options(parser)
+    add_window_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -39,6 +40,7 @@ def run(args: argparse.Namespace) -> int:
         check_free([Path(args.out)], force=args.force, inputs=[args.bag, args.model])
     record = read_record([args.bag], topics=topic_map(args), strict=False)
     record, faults = repair_stamps(record)
+    record = cut(record, args)
     comparisons = predict(load_rig(args.model), record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)

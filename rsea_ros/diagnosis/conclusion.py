@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.compare import misfits, spectrum
 from rsea_ros.diagnosis.experiment import amplitude_series, separating
-from rsea_ros.diagnosis.faults import Checked
 from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.conclusion import conclusion
-from rsea_ros.diagnosis.faults import check
 from rsea_ros.diagnosis.pruning import pruned
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.search import search

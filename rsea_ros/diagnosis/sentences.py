@@ -31,6 +31,12 @@ def verdict_sentence(
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
+    dead = [_CHANNELS.get(f.channel, f.channel) for f in faults if f.kind == "dead_channel"]
+    if verdict == "nothing_wrong" and dead:
+        return (
+            f"The {listed(dead)} measures nothing and is left out; with the model's values re-fitted "
+            f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
+        )
     if verdict == "nothing_wrong":
         return (
             f"Nothing is wrong with the model: with its values re-fitted the {name} residual "

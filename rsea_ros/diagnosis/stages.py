@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from rsea_ros.diagnosis.faults import Checked
+from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.fitting import Model, fitted, rescored
 from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, score, score_on

@@ -94,8 +94,8 @@ def diagnose(
     progress: hears a step's name and the share done. Raises IdentificationError for records that cannot be
     diagnosed, RigError for the rig. Not to be confused with identify, which trusts the rig's structure.
     """
+    from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
-    from rsea_ros.diagnosis.usable import check_diagnosable
     from rsea_ros.library.inputs import records_of, rig_of
 
     records = records_of(data)

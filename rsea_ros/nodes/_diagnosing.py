@@ -7,8 +7,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 
 from msg_adapters.overlay import write_overlay
+from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.diagnosis.usable import check_diagnosable
 from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
 from rsea_ros.new_files import Place

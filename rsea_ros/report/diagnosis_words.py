@@ -59,6 +59,9 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as one short sentence."""
     d, n = diagnosis, main_channel(diagnosis)
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
+    dead = [words.channel(f.channel) for f in d.faults if f.kind == "dead_channel"]
+    if d.verdict == "nothing_wrong" and dead:
+        return f"{words.sentence(listed(dead))} measures nothing; in the other channels only noise is left"
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
     if d.verdict == "unexplained":

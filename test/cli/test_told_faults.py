@@ -44,8 +44,8 @@ def test_predict_tells(bag, capsys):
 
 def test_the_check_before_a_diagnosis_tells(bag):
     from msg_adapters import TopicMap
+    from rsea_ros.checks.faults import check
     from rsea_ros.cli.diagnose import readable
-    from rsea_ros.diagnosis.faults import check
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.identification_json import fault_json
 

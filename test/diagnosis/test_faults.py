@@ -7,8 +7,8 @@ import pytest
 from independent.bench import drawn_bench, record_run
 from independent.faults import FAULTS
 
+from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_rig
-from rsea_ros.diagnosis.faults import check
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel
 

@@ -5,11 +5,13 @@ Each takes a channel and returns which samples are bad, shape (n,). A sample tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.checks.dead import dead_channels
+from rsea_ros.checks.motion import is_commanded, motion_beside
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.stamps import repair_stamps
@@ -40,22 +42,47 @@ def check(record: Record, rig: Rig) -> Checked:
     """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
-    faults += clock_faults
-    masked: dict[str, BoolArray] = {}
-    for name, channel in repaired.channels.items():
-        bad = np.zeros(len(channel), bool)
-        for kind, find in FINDERS.items():
-            found = find(channel, name) & ~bad
-            if kind == "frozen_samples":
-                found = while_others_moved(repaired, name, found)
-            if found.mean() > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
-                faults.append(Fault(kind, name, float(found.mean())))
-                bad |= found
-        masked[name] = bad
-    faults += [fault for n in repaired.channels if n in rig.sensors for fault in coarse(repaired[n], n, rig)]
-    dead = {n for n, bad in masked.items() if bad.all() and n != "command"}
-    alive = replace(repaired, channels={n: c for n, c in repaired.channels.items() if n not in dead})
+    masked, found = {}, {}
+    for name in repaired.channels:
+        masked[name], found[name] = _masked(repaired, name)
+    frozen_ones = {n for n, own in found.items() if any(f.kind == "frozen_samples" for f in own)}
+    finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
+    dead = dead_channels(_filled(repaired, finite), rig, frozen_ones)
+    repaired = _without(repaired, {f.channel for f in dead})
+    known = {(f.kind, f.channel) for f in faults}
+    faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
+    faults += [f for n in repaired.channels for f in found[n]]
+    masked = {n: bad for n, bad in masked.items() if n in repaired}
+    faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
+    alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
     return Checked(_filled(alive, masked), masked, tuple(faults))
+
+
+def _has_steps(record: Record, name: str) -> bool:
+    """Tell whether a channel's steps are its sensor's: a torque repeats those of a command of few values."""
+    if name != "motor_torque" or "command" not in record:
+        return name in record
+    return name in record and len(np.unique(record["command"].y)) > _FEW * len(record["command"])
+
+
+def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
+    """Return which samples of a channel must not count, and its faults."""
+    channel, faults = record[name], []
+    bad = np.zeros(len(channel), bool)
+    for kind, find in FINDERS.items():
+        if kind in _WHILE_MOVING and not is_commanded(record):
+            continue
+        found = find(channel, name) & ~bad
+        if kind in _WHILE_MOVING:
+            found = while_others_moved(record, name, found, kind)
+        if found.mean() > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
+            faults.append(Fault(kind, name, float(found.mean())))
+            bad |= found
+    return bad, faults
+
+
+def _without(record: Record, names: Collection[str]) -> Record:
+    return replace(record, channels={n: c for n, c in record.channels.items() if n not in names})
 
 
 def missing(record: Record, rig: Rig) -> tuple[str, ...]:
@@ -87,7 +114,8 @@ def not_finite(channel: Channel, name: str) -> BoolArray:
 def outliers(channel: Channel, name: str) -> BoolArray:
     """Return which samples stand alone: far from the median of the ten around them, which agree.
 
-    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours.
+    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours; the
+    first sample after a step of the torque has more neighbours that are like it.
     """
     if name == "command" or len(channel) < 2 * _AROUND or not np.isfinite(channel.y).any():
         return np.zeros(len(channel), bool)
@@ -95,11 +123,13 @@ def outliers(channel: Channel, name: str) -> BoolArray:
         np.nan_to_num(channel.y, nan=float(np.nanmedian(channel.y))), _AROUND // 2, mode="reflect"
     )
     around = np.delete(np.lib.stride_tricks.sliding_window_view(padded, _AROUND + 1), _AROUND // 2, axis=1)
-    middle = np.median(around, axis=1)
+    around = np.sort(around, axis=1)
+    middle = 0.5 * (around[:, _AROUND // 2 - 1] + around[:, _AROUND // 2])
     spread = np.partition(np.abs(around - middle[:, None]), _AROUND - 3, axis=1)[:, _AROUND - 3]
     steps = np.abs(np.diff(channel.y))
     least = float(np.nanmedian(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    found: BoolArray = np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least)
+    alone = (channel.y > around[:, -3]) | (channel.y < around[:, 2])
+    found: BoolArray = alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least))
     return found
 
 
@@ -137,7 +167,7 @@ def frozen(channel: Channel, name: str) -> BoolArray:
 
     With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then, give or
     take three standard deviations. A sensor that repeats every other sample or more is slower than the log,
-    which is no fault.
+    which is no fault; but a few runs far longer than all others are.
     """
     if name in ("command", "reference"):
         return np.zeros(len(channel), bool)
@@ -149,31 +179,47 @@ def frozen(channel: Channel, name: str) -> BoolArray:
     by_chance = float((moving < 1.5 * float(moving.min())).sum()) / 2.0
     surplus = float(repeat.sum()) - 1.5 * by_chance - 3.0 * float(np.sqrt(repeat.sum()))
     is_fault = max(5.0, _SMALLEST_SHARE * len(channel)) < surplus < _SLOW * len(channel)
-    return repeat if is_fault else np.zeros(len(channel), bool)
+    return repeat if is_fault else repeat & in_long_runs(repeat, channel.rate)
 
 
-def while_others_moved(record: Record, name: str, repeat: BoolArray) -> BoolArray:
-    """Return the repeats while another sensor moved: a sensor that stands still with the machine is well.
+def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
+    """Return which samples lie in a run of repeats far longer than the usual one. rate: Hz."""
+    number = np.cumsum(~repeat)
+    length = np.bincount(number)
+    usual = float(np.quantile(length[length > 0], 0.95))
+    long: BoolArray = length[number] > max(_LONG_RUN * usual, _LONGEST_RUN * rate)
+    return long
 
-    Half of all samples move by more than the median; where a machine sticks few do.
+
+def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
+    """Return the suspect samples, none if the machine mostly stood still then.
+
+    A sensor that holds a value while nothing moves is well: at rest, at a limit of the torque, stuck. One
+    that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
     """
-    witness = next((n for n in _WITNESSES.get(name, ()) if n in record and len(record[n]) > 1), None)
-    if witness is None or not repeat.any():
-        return repeat
-    t = record[name].t
-    seen = np.abs(np.diff(np.interp(t, record[witness].t, np.nan_to_num(record[witness].y)), prepend=np.nan))
-    moved = repeat & (seen > np.nanmedian(seen))
-    return repeat if moved.sum() > _MOVED * repeat.sum() else np.zeros(len(t), bool)
+    motion = motion_beside(record, name) if suspect.any() else None
+    if motion is None or not motion.moved.any():
+        return suspect if motion is None else np.zeros(len(suspect), bool)
+    if kind != "frozen_samples":
+        return _mostly(suspect, motion.moved)
+    long = suspect & in_long_runs(suspect, record[name].rate)
+    fast = motion.moved & (motion.speed > np.median(motion.speed[motion.moved]))
+    return _mostly(long, motion.moved) | _mostly(suspect & ~long, fast)
 
 
-_WITNESSES = {
-    "position": ("ft", "velocity"),
-    "ft": ("position", "velocity"),
-    "velocity": ("ft", "position"),
-    "motor_torque": ("command",),
-}
+def _mostly(suspect: BoolArray, clearly: BoolArray) -> BoolArray:
+    """Return the suspect samples if enough of them fall into motion, else none."""
+    enough = suspect.any() and clearly[suspect].mean() > _MOVED
+    return suspect if enough else np.zeros(len(suspect), bool)
+
+
 _MOVED = 0.3
-"""Share of the repeats that fall into motion when a sensor freezes at any time; by chance 0.5."""
+"""Share of the suspect samples that must fall into motion; a sensor that freezes at any time reaches more."""
+_LONG_RUN = 20.0
+"""Times the usual run of equal values: a longer one is no slow sensor."""
+_LONGEST_RUN = 0.5
+"""s. No coarse quantum holds a value so long while the machine moves."""
+_WHILE_MOVING = ("clipping", "frozen_samples")
 
 FINDERS: Mapping[str, Callable[[Channel, str], BoolArray]] = {
     "nan": not_finite,

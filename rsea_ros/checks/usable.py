@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.checks.motion import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Channel, Record
 
 SHORTEST = 4.0
-"""s of commands: four blocks of every set (see split.py) of a quarter of a second each."""
+"""s of commands: four blocks of every set (diagnosis/split.py) of a quarter of a second each."""
 
 
 def check_diagnosable(record: Record) -> None:
@@ -31,6 +32,17 @@ def check_diagnosable(record: Record) -> None:
     measured = [c for n, c in record.channels.items() if n not in ("command", "reference")]
     if all(_constant(c) for c in measured):
         raise IdentificationError(f"{record.source}: every measured channel holds one value, expected motion")
+    require_motion(record)
+
+
+def require_motion(record: Record) -> None:
+    """Raise IdentificationError for a record in which the command never changes and nothing moves."""
+    if "command" not in record or not _constant(record["command"]) or not is_still(record):
+        return
+    raise IdentificationError(
+        f"{record.source}: the command stays at {record['command'].y[0]:g} N m and nothing moves, "
+        "expected a run in which the command excites the machine"
+    )
 
 
 def _constant(channel: Channel) -> bool:

@@ -1,0 +1,153 @@
+"""Everything that can be said of a record before physics is fitted to it, in tenths of a second."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
+from rsea_ros.checks.faults import Checked, check
+from rsea_ros.checks.finding import Finding, Findings
+from rsea_ros.checks.gain_findings import gain_findings, strangers
+from rsea_ros.checks.gains import Readings, readings_of
+from rsea_ros.checks.linear import linear_of
+from rsea_ros.checks.linear_findings import clock_findings, identifiability
+from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.signal_findings import excitation, noises
+from rsea_ros.checks.spectra import Quotient, quotient
+from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.errors import RseaError
+from rsea_ros.identification.threads import one_blas_thread
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, Fault, Record
+
+Wrench = Callable[[], Mapping[str, Channel]]
+"""Reads the other axes of the wrench, by their names for --axis."""
+_WHOLE = 0.1
+"""Share of masked samples above which a channel's response is not compared."""
+_IN_COMMON = 0.3
+"""Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
+FAULTY = ("sign", "scale", "clock_offset", "clock_drift", "wrong_rig")
+"""Kinds of findings that every result made from the record repeats, where they are not green."""
+
+
+def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrench | None = None) -> Findings:
+    """Return what a record is worth for a rig: a traffic light for each thing that was looked at.
+
+    Nothing is changed or masked by it. axis: of the wrench that `ft` was read from. wrench: the other axes,
+    tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
+    """
+    with one_blas_thread(), np.errstate(all="ignore"):
+        checked = check(record, rig)
+        found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
+        found += [*order(record), *rates(record, rig)]
+        if "command" in checked.record and len(checked.record["command"]) > 2:
+            found += excitation(checked.record, rig)
+            found += _against_rig(checked, rig, axis) if is_commanded(checked.record) else []
+        found += _other_axes(checked, rig, axis, wrench)
+    faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
+    return Findings(record.source, rig.name, tuple(found), faults)
+
+
+def _topics(record: Record) -> list[Finding]:
+    have = ", ".join(record.channels)
+    if "command" in record:
+        return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
+    return [
+        Finding(
+            "red",
+            "topics",
+            "command",
+            expected="the torques that drove the run",
+            detail=f"only {have}",
+            remedy="record the commands, or name their topic with --topic",
+        )
+    ]
+
+
+def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
+    """Return what holding the record against the rig's simulation shows."""
+    record = checked.record
+    if is_full_of_gaps(record):
+        return [
+            Finding(
+                "red",
+                "gaps",
+                "",
+                expected="a record without long gaps",
+                detail="it is mostly gaps",
+                remedy="cut it with --from and --to",
+            )
+        ]
+    found = noises(record, rig)
+    whole = {n for n, bad in checked.masked.items() if bad.mean() < _WHOLE}
+    compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
+    readings = readings_of(compared, rig)
+    silent = set(compared) - set(readings.channels if readings else ())
+    found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
+    if readings is None:
+        return found
+    found += gain_findings(readings, rig, axis)
+    return found if _is_elsewhere(found) else [*found, *_linearised(checked, rig, readings)]
+
+
+def _is_elsewhere(found: list[Finding]) -> bool:
+    """Tell whether clocks and sensitivities mean nothing: another rig, signs or scales."""
+    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in found)
+
+
+def _linearised(checked: Checked, rig: Rig, readings: Readings) -> list[Finding]:
+    if is_inverse(rig):
+        return []
+    try:
+        linear = linear_of(checked.record, checked.masked, rig, readings.applied)
+    except (RseaError, ValueError, np.linalg.LinAlgError):
+        return []
+    duration = checked.record.stop - checked.record.start
+    return [*clock_findings(linear, duration), *identifiability(linear, rig)]
+
+
+def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> list[Finding]:
+    """Return which other axis of the wrench follows the command, where this one does not."""
+    dead = any(f.kind == "dead_channel" and f.channel == "ft" for f in checked.faults)
+    if wrench is None or not dead:
+        return []
+    tried = {
+        n: q
+        for n, c in wrench().items()
+        if n != axis.removeprefix("-")
+        for q in [_beside(checked, rig, c)]
+        if q
+    }
+    alive = {n: q for n, q in tried.items() if not q.is_unrelated}
+    if not alive:
+        return []
+    best = max(alive, key=lambda n: alive[n].related)
+    turned = "-" if float(np.sum(alive[best].weight * alive[best].value.real)) < 0.0 else ""
+    return [
+        Finding(
+            "amber",
+            "sign",
+            "ft",
+            alive[best].related,
+            "1",
+            expected="the actuator's axis",
+            detail=f"{best} follows the command",
+            remedy=f"--axis {turned}{best}",
+        )
+    ]
+
+
+def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
+    """Return the quotient of another channel taken for the F/T torque."""
+    record = checked.record.with_channels(ft=channel)
+    side: Side | None = sides(replace(record, faults=()), rig).get("ft")
+    return None if side is None else quotient("ft", side.t, side.y, side.p)
+
+
+def _fault(f: Finding) -> Fault:
+    detail = "; ".join(filter(None, (f.detail, f.remedy)))
+    return Fault(f.kind, f.channel, float("nan"), detail, f.value, f.unit)

@@ -1,0 +1,54 @@
+"""Dead channels: constant, or noise that has nothing to do with what the machine did."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from rsea_ros.checks.expected import Side, quotients, sides
+from rsea_ros.checks.motion import is_commanded
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, Fault, Record
+
+_VISIBLE = 3.0
+"""Times the sensor's noise: a smaller signal than that may well be lost in it."""
+_SHOWS = 0.3
+"""Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
+
+
+def dead_channels(record: Record, rig: Rig, frozen: Collection[str] = ()) -> list[Fault]:
+    """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
+
+    frozen: channels of which a part is held, which says why they have little to do with the command.
+    The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
+    called dead.
+    """
+    if not is_commanded(record):
+        return []
+    compared = sides(record, rig)
+    found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in _SENSORS}
+    judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
+    for n, q in judged.items():
+        shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
+        if n in found and not found[n] and n not in frozen and shows and q.is_unrelated:
+            found[n] = "noise that has nothing to do with the command"
+    return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
+
+
+_SENSORS = ("ft", "position", "velocity", "motor_torque")
+
+
+def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
+    """Return what is wrong with a channel that holds one value although there was something to measure."""
+    if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
+        return ""
+    if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
+        return ""
+    return f"constant at {channel.y[0]:.4g}"
+
+
+def _noise(rig: Rig, name: str) -> float:
+    sensor = rig.sensors.get(name)
+    return max(sensor.noise, sensor.quantum) if sensor else 0.0

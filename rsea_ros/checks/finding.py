@@ -1,0 +1,62 @@
+"""Findings of a check: one line of a traffic light each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rsea_ros.signals import Fault
+
+Light = Literal["green", "amber", "red"]
+LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    kind: `topics`, `rate`, `gaps`, `order`, `clock_offset`, `clock_drift`, `noise`, `quantum`, `sign`,
+    `scale`, `wrong_rig`, `excitation`, `rest`, `identifiability`, or the kind of a fault of the data.
+    channel: the channel or rig value that it is about, empty for the whole record.
+    value, low, high: the number with its 95 % interval, in `unit`, where one belongs to it.
+    expected: what would be green. detail: what and where. remedy: what would help, or the option to give.
+    """
+
+    light: Light
+    kind: str
+    channel: str = ""
+    value: float | None = None
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    expected: str = ""
+    detail: str = ""
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All findings of a record held against a rig, in the order in which they are worth reading.
+
+    faults: those of the data, of which every result made from the record repeats the whole list.
+    """
+
+    source: str
+    rig_name: str
+    findings: tuple[Finding, ...]
+    faults: tuple[Fault, ...] = ()
+
+    @property
+    def light(self) -> Light:
+        """The worst light of all."""
+        return worst([f.light for f in self.findings])
+
+    def of(self, kind: str) -> tuple[Finding, ...]:
+        """Return the findings of a kind."""
+        return tuple(f for f in self.findings if f.kind == kind)
+
+
+def worst(lights: Sequence[Light]) -> Light:
+    """Return the worst of some lights, green for none."""
+    return max(lights, key=LIGHTS.index, default="green")

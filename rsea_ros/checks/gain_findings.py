@@ -1,0 +1,161 @@
+"""Findings about sign, scale and the rig, from the readings that were tried (gains.py)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rsea_ros.checks.factors import Factor
+from rsea_ros.checks.finding import Finding, Light
+from rsea_ros.checks.gains import SHAPED, Reading, Readings
+from rsea_ros.checks.shape import Shape
+from rsea_ros.checks.spectra import Quotient
+from rsea_ros.model.rig import Rig
+
+_FAR, _MOVED, _ELSEWHERE = 4.0, 1.6, 4.0
+"""Factor of a rig's value that is another machine's; that is worth a look; and spreads that go with both.
+
+A damping is no machine's mark: friction of any kind changes it."""
+_TOLD = 0.9
+"""Share of what is known of a value that the response must bring."""
+_APART = 5.0
+"""Factor between the sizes of two signals that have nothing in common, from which the rig is another."""
+_STRANGE, _FOREIGN = 2.0 * SHAPED, 1.2
+"""What is left of ln R: play and friction on a coarse rig reach the first, another machine the second."""
+RIGHT_RIG = "is this the right rig? name another with --rig, or another joint with --joint"
+
+
+def gain_findings(readings: Readings, rig: Rig, axis: str) -> list[Finding]:
+    """Return findings for each channel's sign and scale, and for the rig. axis: of the wrench now."""
+    found = [f for r in readings.channels.values() for f in _of_channel(r, axis)]
+    return [*found, *_of_rig(readings.applied, rig)]
+
+
+def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
+    """Return findings for channels that move, but not as the rig would."""
+    return [
+        Finding(
+            "red" if max(q.measured / q.predicted, q.predicted / q.measured) > _APART else "amber",
+            "wrong_rig",
+            q.channel,
+            q.measured / q.predicted,
+            "1",
+            expected="about 1",
+            detail="times what the rig would give, and hardly anything in common with it",
+            remedy=RIGHT_RIG,
+        )
+        for q in quotients
+    ]
+
+
+def _of_channel(r: Reading, axis: str) -> list[Finding]:
+    found = []
+    if r.sign < 0.0:
+        found.append(
+            Finding(
+                "red",
+                "sign",
+                r.channel,
+                -1.0,
+                "1",
+                expected="1",
+                detail="turned against the rig",
+                remedy=_turn(r.channel, axis),
+            )
+        )
+    if r.factor is not None:
+        meant = " or ".join(f.meaning for f in (r.factor, *r.also))
+        found.append(
+            Finding(
+                "red",
+                "scale",
+                r.channel,
+                r.factor.value,
+                "1",
+                expected="1, SI at the gear output",
+                detail=f"looks like {meant}",
+                remedy=_unit(r.channel, r.factor),
+            )
+        )
+    if r.odd:
+        found.append(
+            Finding(
+                "red",
+                "wrong_rig",
+                r.channel,
+                math.exp(r.gain),
+                "1",
+                expected="1",
+                detail="times what the rig would give, which fits no unit",
+                remedy=RIGHT_RIG,
+            )
+        )
+    if not found:
+        found.append(
+            Finding(
+                "green",
+                "scale",
+                r.channel,
+                math.exp(r.gain),
+                "1",
+                expected="about 1",
+                detail="times what the rig would give",
+            )
+        )
+    return found
+
+
+def _turn(channel: str, axis: str) -> str:
+    if channel == "ft":
+        return f"--axis {axis.removeprefix('-') if axis.startswith('-') else f'-{axis}'}"
+    return f"`sign: -1` for {channel} in the import map, or turn it where it is published"
+
+
+def _unit(channel: str, factor: Factor) -> str:
+    if factor.at_motor or factor.unit in ("counts", "N cm", "lbf in"):
+        scale = f"`scale: {1.0 / factor.value:.6g}`"
+        return f"{scale} for {channel} in the import map, or publish SI at the gear output"
+    return f"`unit: {factor.unit}` for {channel} in the import map, or publish SI"
+
+
+def _of_rig(shape: Shape, rig: Rig) -> list[Finding]:
+    """Return how far the rig is from the machine: its values, and the shape of its response."""
+    found = []
+    for name, value in shape.values.items():
+        factor, reach = value / rig[name] if rig[name] else 1.0, shape.reach[name]
+        times = max(factor, 1.0 / max(factor, 1e-12))
+        soft = name.endswith("damping")
+        if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE and shape.told[name] > _TOLD:
+            light: Light = "red" if times > _FAR and not soft else "amber"
+            found.append(
+                Finding(
+                    light,
+                    "wrong_rig",
+                    name,
+                    value,
+                    rig.unit(name),
+                    expected=f"{rig[name]:.4g}",
+                    detail=f"{factor:.2g} times the rig's value",
+                    remedy=RIGHT_RIG,
+                )
+            )
+    for name, error in shape.error.items():
+        if error > _STRANGE:
+            far = error > _FOREIGN and not rig.rigid_spring
+            found.append(
+                Finding(
+                    "red" if far else "amber",
+                    "wrong_rig",
+                    name,
+                    math.exp(error),
+                    "1",
+                    expected="about 1",
+                    detail="off: its response has another shape than the rig's",
+                    remedy=RIGHT_RIG,
+                )
+            )
+    if not found:
+        found.append(
+            Finding("green", "wrong_rig", "", None, "", detail=f"the response has the shape of {rig.name}")
+        )
+    return found

@@ -1,0 +1,159 @@
+"""Sign and scale of every channel, tried: the rig is fitted with and without each factor (shape.py).
+
+A factor is reported only where the fit with it is much better than the fit without, and leaves a response
+that has the rig's shape. Gains within ALLOWED are no matter of units: a torque constant, a calibration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.checks.factors import Factor, factors
+from rsea_ros.checks.shape import Prior, Shape, ShapeFit
+from rsea_ros.checks.spectra import Quotient
+from rsea_ros.model.rig import Rig
+
+ALLOWED = 1.1
+"""Logarithm of a gain, either way, that a bench may have: a factor of 3, that of a drive at its limit."""
+_RELATED = 0.8
+"""Coherence below which a gain may be that of a limit: a unit changes none."""
+_ALIKE = 0.15
+"""Logarithm: factors that lie so close cannot be told apart."""
+SHAPED = 0.35
+"""Largest median of what is left of ln R for a channel to have the rig's shape."""
+_BETTER = 10.0
+"""By how much a cost must fall for a sign or a factor to be reported, e^5 in likelihood."""
+_FREE = 3.0
+_CLEAR = 60.0
+"""Difference of phase costs from which the better sign needs no trial."""
+_NEAR = 0.7
+"""Logarithm: so close to a factor's value a gain must be for the factor to be tried."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a channel is to be read. sign: -1 where it is turned. factor: None for SI at the gear output.
+
+    also: other factors that these data cannot tell from it. gain: what is left of the logarithm of its gain
+    then. odd: the gain fits no factor.
+    """
+
+    channel: str
+    sign: float
+    factor: Factor | None
+    gain: float
+    odd: bool = False
+    also: tuple[Factor, ...] = ()
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings by channel, the command's too; the fit as the data stand, and with the readings applied."""
+
+    channels: Mapping[str, Reading]
+    plain: Shape
+    applied: Shape
+
+
+def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
+    """Return how the channels of a record are to be read, None where no line of any can be used."""
+    fit = ShapeFit(quotients, rig)
+    if not fit.channels:
+        return None
+    plain = fit.fit({n: Prior() for n in fit.channels})
+    if all(abs(plain.gain[n]) < ALLOWED and plain.error[n] < SHAPED for n in fit.channels):
+        return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
+    return _tried(fit, plain, quotients, rig)
+
+
+def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: Rig) -> Readings:
+    """Return the readings where something is off: signs first, then factors, then both against none."""
+    signs = _signs(fit)
+    free = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
+    command, signs, gains = _command_apart(fit.channels, signs, free.gain)
+    found = {n: _named(n, signs[n], gains[n], rig) for n in fit.channels}
+    if command is not None:
+        found["command"] = _named("command", command[0], command[1], rig)
+    applied = fit.fit({n: _prior(n, found) for n in fit.channels})
+    shaped = float(np.median(list(applied.error.values()))) < SHAPED
+    if not shaped or applied.cost > plain.cost - _BETTER:
+        return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
+    return Readings({n: _believed(r, quotients, applied) for n, r in found.items()}, plain, applied)
+
+
+def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: Shape) -> Reading:
+    """Return the reading, as it stands where the channel does not have the rig's shape, or may be limited."""
+    q = quotients.get(reading.channel)
+    if q is None:
+        q = max(quotients.values(), key=lambda one: one.related)
+    of_a_limit = reading.factor is not None and abs(math.log(reading.factor.value)) < 3.0
+    weak = q.related < _RELATED and of_a_limit
+    if weak or applied.error.get(reading.channel, 0.0) > SHAPED:
+        return Reading(reading.channel, 1.0, None, reading.gain)
+    return reading
+
+
+def _signs(fit: ShapeFit) -> dict[str, float]:
+    """Return for each channel the sign under which its phases fit, the positive one unless much worse."""
+    lead = {n: fit.phase_cost(n, 1.0) - fit.phase_cost(n, -1.0) for n in fit.channels}
+    signs = {n: -1.0 if lead[n] > _BETTER / 2.0 else 1.0 for n in fit.channels}
+    best = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
+    for n in (n for n in fit.channels if abs(lead[n]) < _CLEAR):
+        other = {**signs, n: -signs[n]}
+        tried = fit.fit({c: Prior(other[c], 0.0, _FREE) for c in fit.channels})
+        if tried.cost < best.cost - _BETTER:
+            signs, best = other, tried
+    return signs
+
+
+def _command_apart(
+    channels: tuple[str, ...], signs: Mapping[str, float], gains: Mapping[str, float]
+) -> tuple[tuple[float, float] | None, dict[str, float], dict[str, float]]:
+    """Return sign and gain that all that follow the command share, and the channels' without it.
+
+    One odd command is likelier than several sensors that are odd alike. The motor torque may be odd with
+    the command: both come from the drive.
+    """
+    answer = [n for n in channels if n != "motor_torque"]
+    if len(answer) < 2:
+        return None, dict(signs), dict(gains)
+    turned = all(signs[n] < 0.0 for n in answer)
+    low, high = min(gains[n] for n in answer), max(gains[n] for n in answer)
+    common = 0.5 * (low + high) if low * high > 0.0 and high - low < _NEAR else 0.0
+    common = common if min(abs(low), abs(high)) > ALLOWED else 0.0
+    if not turned and common == 0.0:
+        return None, dict(signs), dict(gains)
+    sign = -1.0 if turned else 1.0
+    return (
+        (sign, -common),
+        {n: sign * signs[n] for n in channels},
+        {n: gains[n] - common for n in channels},
+    )
+
+
+def _named(channel: str, sign: float, gain: float, rig: Rig) -> Reading:
+    """Return the reading with the factor that comes nearest to a gain, none for a gain that is allowed."""
+    if abs(gain) < ALLOWED:
+        return Reading(channel, sign, None, gain)
+    known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
+    left = gain - math.log(known[0].value)
+    if abs(left) > _NEAR:
+        return Reading(channel, sign, None, gain, odd=True)
+    also = tuple(f for f in known[1:] if abs(math.log(f.value / known[0].value)) < _ALIKE)
+    return Reading(channel, sign, known[0], left, also=also)
+
+
+def _prior(channel: str, found: Mapping[str, Reading]) -> Prior:
+    """Return what the readings say of a channel's quotient: its factor over the command's."""
+    sign, mean, doubt = 1.0, 0.0, Prior().doubt
+    for name, side in ((channel, 1.0), ("command", -1.0)):
+        if name in found:
+            reading = found[name]
+            sign *= reading.sign
+            mean += side * (math.log(reading.factor.value) if reading.factor else 0.0)
+            mean += side * reading.gain if reading.odd else 0.0
+    return Prior(sign, float(np.clip(mean, -60.0, 60.0)), doubt)

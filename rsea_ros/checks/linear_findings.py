@@ -1,0 +1,110 @@
+"""Findings about clocks and about what the data can determine (linear.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rsea_ros.checks.finding import Finding, Light
+from rsea_ros.checks.linear import Linear, Number
+from rsea_ros.identification.unknowns import CLOCK_DOUBT
+from rsea_ros.model.rig import Rig
+
+_ALLOWED = 3.0 * CLOCK_DOUBT
+"""s. As far as a fit lets a sensor's clock move."""
+_SURE = 4.0
+"""Sigmas."""
+_BESIDE = 2.0
+"""Residual over noise above which something in the machine may stand behind a clock."""
+_TOLD = 0.5
+JOINT = ("velocity", "position")
+_RELATIVE = "against the model; a delay of the drive looks the same"
+
+
+def clock_findings(linear: Linear, duration: float) -> list[Finding]:
+    """Return offset and drift of every sensor's stamps against the command's. duration: of the record, s."""
+    if not linear.settled:
+        return [Finding("green", "clock_offset", "", detail="not determined beside what the rig leaves")]
+    found = []
+    for name, offset in linear.offset.items():
+        found.append(_offset(name, offset, linear))
+        found.append(_drift(name, linear.drift[name], linear, duration))
+    return found
+
+
+def _offset(name: str, offset: Number, linear: Linear) -> Finding:
+    """Return the finding of an offset; only sensors that disagree with each other make a fault."""
+    others = [n for n in linear.offset if (n in JOINT) != (name in JOINT)]
+    low, high = offset.ci95
+    light: Light = "green"
+    detail = _RELATIVE
+    if name == "ft" and others:
+        best = min(others, key=lambda n: linear.offset[n].sd)
+        apart = offset.value - linear.offset[best].value
+        sure = abs(apart) > _SURE * (offset.sd**2 + linear.offset[best].sd ** 2) ** 0.5
+        if sure and abs(apart) > _ALLOWED and _is_clear(linear, tuple(linear.misfit)):
+            light, detail = "amber", f"{1e6 * apart:.4g} µs later than {best}, {_RELATIVE}"
+    remedy = "stamp both at acquisition by one clock" if light == "amber" else ""
+    return Finding(
+        light,
+        "clock_offset",
+        name,
+        1e6 * offset.value,
+        "µs",
+        1e6 * low,
+        1e6 * high,
+        expected=f"within {1e6 * _ALLOWED:.0f} µs of the others",
+        detail=detail + _beside(linear, name),
+        remedy=remedy,
+    )
+
+
+def _drift(name: str, drift: Number, linear: Linear, duration: float) -> Finding:
+    low, high = drift.ci95
+    sure = abs(drift.value) > _SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
+    amber = sure and _is_clear(linear, (name,))
+    return Finding(
+        "amber" if amber else "green",
+        "clock_drift",
+        name,
+        1e6 * drift.value,
+        "ppm",
+        1e6 * low,
+        1e6 * high,
+        expected=f"within {1e6 * _ALLOWED / duration:.3g} ppm",
+        detail=f"of its clock against the command's{_beside(linear, name)}",
+        remedy="discipline the clocks (PTP, chrony), or stamp by one" if amber else "",
+    )
+
+
+def _is_clear(linear: Linear, names: Sequence[str]) -> bool:
+    return all(linear.misfit[n] < _BESIDE for n in names)
+
+
+def _beside(linear: Linear, name: str) -> str:
+    misfit = linear.misfit[name]
+    return (
+        ""
+        if misfit < _BESIDE
+        else f"; beside a misfit of {misfit:.0f} times the noise a cause may stand in for it"
+    )
+
+
+def identifiability(linear: Linear, rig: Rig) -> list[Finding]:
+    """Return for each value that a fit may move whether these data tell it."""
+    found = []
+    for name, told in linear.told.items():
+        percent = 100.0 * linear.relative[name]
+        amber = told < _TOLD
+        found.append(
+            Finding(
+                "amber" if amber else "green",
+                "identifiability",
+                name,
+                percent,
+                "%",
+                expected="below the rig's spread",
+                detail="one sigma that these data leave",
+                remedy="measure it apart, or excite it more" if amber else "",
+            )
+        )
+    return found

@@ -1,0 +1,115 @@
+"""Findings about messages: channels, rates, gaps, order; and the faults that masking already told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rsea_ros.checks.finding import Finding, Light
+from rsea_ros.model.propagator import state_space
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, Fault, Record
+
+_RED_SHARE = 0.2
+"""Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
+_PER_CYCLE = 4.0
+"""Samples to a cycle of the rig's natural frequency, at least."""
+_SLOW = 0.6
+"""Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
+_REMEDIES = {
+    "missing_topic": "record it, or name its topic with --topic",
+    "frozen_samples": "look at the sensor's driver: it repeats its last value",
+    "dropped_samples": "record with a deeper queue, on a quieter machine",
+    "duplicate_stamps": "stamp at acquisition, not on arrival",
+    "clock_jump": "keep the clocks from being set during a run",
+    "out_of_order": "sort by the stamps of the headers; nothing else to do",
+    "outliers": "look for a loose cable; they are masked",
+    "clipping": "widen the sensor's range, or excite less",
+    "nan": "look at the driver; they are masked",
+    "coarse_steps": "let the driver send full resolution",
+    "dead_channel": "check cable, power and axis (--axis) of the sensor",
+}
+
+
+def fault_finding(fault: Fault) -> Finding:
+    """Return the finding of a fault of the data."""
+    bad = fault.kind == "dead_channel" or (fault.kind != "missing_topic" and fault.share > _RED_SHARE)
+    whole = fault.kind in ("missing_topic", "coarse_steps", "clock_jump")
+    light: Light = "red" if bad and not whole else "amber"
+    share = None if whole or not math.isfinite(fault.share) else 100.0 * fault.share
+    value, unit = (fault.size, fault.unit) if fault.size is not None else (share, "%" if share else "")
+    return Finding(
+        light,
+        fault.kind,
+        fault.channel,
+        value,
+        unit,
+        expected="none",
+        detail=fault.detail,
+        remedy=_REMEDIES.get(fault.kind, ""),
+    )
+
+
+def rates(record: Record, rig: Rig) -> list[Finding]:
+    """Return the sample rate of every channel, and where it is too low for the rig."""
+    natural, command = natural_frequency(rig), record["command"].rate if "command" in record else math.nan
+    return [_rate(n, c, natural, command) for n, c in record.channels.items() if len(c) > 2]
+
+
+def _rate(name: str, channel: Channel, natural: float | None, command: float) -> Finding:
+    steps = np.diff(channel.t)
+    rate = channel.rate
+    longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
+    if natural is not None and rate < _PER_CYCLE * natural:
+        expected = f"> {_PER_CYCLE * natural:.3g} Hz, four samples to a cycle of the rig's {natural:.3g} Hz"
+        return Finding(
+            "red",
+            "rate",
+            name,
+            rate,
+            "Hz",
+            expected=expected,
+            detail=longest,
+            remedy="record faster, or name the right rig with --rig",
+        )
+    if rate < _SLOW * command:
+        return Finding(
+            "amber",
+            "rate",
+            name,
+            rate,
+            "Hz",
+            expected=f"{command:.4g} Hz as the commands",
+            detail="slower than the commands: what is faster folds",
+            remedy="record it faster",
+        )
+    return Finding("green", "rate", name, rate, "Hz", detail=longest)
+
+
+def natural_frequency(rig: Rig) -> float | None:
+    """Return the lowest natural frequency of a rig, Hz; None where nothing oscillates."""
+    roots = np.linalg.eigvals(state_space(rig).a)
+    sizes = np.abs(roots[np.abs(roots.imag) > 1e-6 * np.abs(roots)])
+    return float(sizes.min()) / (2.0 * math.pi) if len(sizes) else None
+
+
+def order(record: Record) -> list[Finding]:
+    """Return the channels whose stamps go back."""
+    found = []
+    for name, channel in record.channels.items():
+        back = int(np.count_nonzero(np.diff(channel.t) < 0.0))
+        if back:
+            found.append(
+                Finding(
+                    "amber",
+                    "order",
+                    name,
+                    float(back),
+                    "1",
+                    expected="rising stamps",
+                    detail="stamps go back",
+                    remedy=_REMEDIES["out_of_order"],
+                )
+            )
+    return found

@@ -1,0 +1,92 @@
+"""`rsea check`: a traffic light for every thing that a record must have before a fit is worth its time."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from msg_adapters import TopicMap, read_record
+from msg_adapters.topics import AXES
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
+from rsea_ros.errors import RseaError
+from rsea_ros.signals import Channel
+
+if TYPE_CHECKING:
+    from rsea_ros.checks.finding import Findings
+
+HELP = "topics, rates, clocks, noise, sign, scale, rig: a traffic light a line, in seconds"
+RIG = "paper_high_impedance"
+FOUND = 1
+"""Exit status when a light is one that --fail-on names, or worse."""
+NARROWEST = 140
+"""Columns of the table where no terminal says how many it has."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add = parser.add_argument
+    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3")
+    add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
+    add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
+    add(
+        "--fail-on",
+        choices=("red", "amber"),
+        help=f"exit status {FOUND} when a light is this one or worse",
+    )
+    add_topic_options(parser)
+    add_window_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and print."""
+    from rsea_ros.model.rig_file import load_rig
+
+    rig, topics = load_rig(args.rig), topic_map(args)
+    records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
+    from rsea_ros.checks.check import check_record  # after the bags: a bad one is refused at once
+    from rsea_ros.checks.finding import LIGHTS, worst
+
+    checks = [
+        check_record(record, rig, topics.axis, partial(other_axes, bag, topics, args))
+        for bag, record in zip(args.bags, records, strict=True)
+    ]
+    if args.json:
+        from rsea_ros.report.check_json import check_json
+
+        print(json.dumps(check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
+    else:
+        _print(checks)
+    light = worst([c.light for c in checks])
+    fails = args.fail_on is not None and LIGHTS.index(light) >= LIGHTS.index(args.fail_on)
+    return FOUND if fails else 0
+
+
+def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[str, Channel]:
+    """Return every axis of a bag's wrench by its name, for a check whose own axis is dead."""
+    found = {}
+    for axis in AXES:
+        try:
+            record = read_record([bag], topics=replace(topics, axis=axis), strict=False)
+        except RseaError:
+            continue
+        if "ft" in record:
+            found[axis] = cut(record, args)["ft"]
+    return found
+
+
+def _print(checks: list[Findings]) -> None:
+    from rich.console import Console
+
+    from rsea_ros.report.check_text import check_table, summary
+
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=NARROWEST)
+    for findings in checks:
+        console.print(findings.source, markup=False, highlight=False, soft_wrap=True)
+        console.print(check_table(findings))
+    print(summary(checks))

@@ -1,0 +1,52 @@
+"""The kinds of faults of the data: what each means, once for the code and the docs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+FAULT_KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "checksum_mismatch": "a checksum of the file does not fit: some value may be wrong",
+        "cut_off": "the file breaks off, or a journal was left beside it",
+        "damaged_chunks": "chunks left out: checksum, size or compression do not fit, or they break off",
+        "damaged_file": "a file of the bag left out: it cannot be read at all",
+        "damaged_messages": "messages left out: they do not fit their type, or nothing declares them",
+        "damaged_metadata": "metadata.yaml is not understood, its counts are not compared",
+        "damaged_records": "stretches of the file that are no records",
+        "data_after_end": "records behind the end of the data; they are used",
+        "empty_fields": "a field is empty in some of the messages that should fill it",
+        "missing_messages": "fewer messages than the file's statistics or metadata.yaml say",
+        "surplus_messages": "more messages than the file's statistics or metadata.yaml say",
+        "unknown_records": "records of a kind that the format does not know, left out",
+        "zero_stamps": "header stamps that nobody set; the log time stands in",
+        "missing_values": "cells of a table that are empty or no number, left out",
+        "rows_left_out": "rows of a table that do not have the columns of the others, left out",
+        "clock_jump": "the clock of the stamps jumped; taken out",
+        "clock_offset": "the clock of a channel differs from the command's",
+        "clock_drift": "the clock of a channel runs faster or slower than the command's",
+        "dropped_samples": "samples are missing: the stamps have gaps",
+        "duplicate_stamps": "stamps repeat; the first sample of each is kept",
+        "out_of_order": "samples out of order in the log, sorted by their stamps",
+        "stray_stamps": "samples left out because their stamps are not theirs",
+        "commands_left_out": "commands that the excitation did not send in time",
+        "device_fault": "the driver latched a fault: the torque was zero until it was cleared",
+        "late_commands": "commands that did not act at their stamps",
+        "limited_commands": "commands that the driver cut down to its limits",
+        "lost_cycles": "cycles of the bench that did not run, or without an answer of the device",
+        "lost_messages": "messages that the middleware lost before the recorder",
+        "refused_commands": "commands that the bench did not take",
+        "watchdog_trips": "the torque went to zero because no command came in time",
+        "clipping": "samples at the end of the sensor's range",
+        "dead_channel": "a sensor that does not answer to the machine; no result uses it",
+        "sign": "a channel has the other sign than the rig",
+        "scale": "a channel is in another unit than the rig",
+        "wrong_rig": "the record does not fit the rig it is held against",
+        "coarse_steps": "values in much larger steps than the rig's sensor makes",
+        "frozen_samples": "samples that repeat while the machine moves",
+        "missing_topic": "a channel that the rig's sensors would give is not there",
+        "nan": "values that are not a number",
+        "outliers": "samples far from all around them",
+    }
+)
+"""Kinds of faults of the data: of the file, of the stamps, of the run (/diagnostics), of the values."""

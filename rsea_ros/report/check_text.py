@@ -1,0 +1,77 @@
+"""What a check says on a terminal: a line for each finding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from rsea_ros.checks.finding import Finding, Findings
+from rsea_ros.report import words
+
+_STYLES = {"green": "green", "amber": "yellow", "red": "bold red"}
+_KINDS = {
+    "wrong_rig": "right rig",
+    "dead_channel": "dead channel",
+    "clock_offset": "clock offset",
+    "clock_drift": "clock drift",
+    "identifiability": "told by data",
+    "missing_topic": "missing",
+}
+SAID_ELSEWHERE = ("identifiability", "noise", "excitation", "rest")
+"""Kinds that identify and diagnose speak of in their results anyway."""
+
+
+def check_table(findings: Findings) -> Table:
+    """Return all findings of a record: light, what, value, expected, what would help."""
+    table = Table(box=None, pad_edge=False, header_style="dim", title_justify="left")
+    for name in ("", "what", "channel", "value", "expected", "where, and what would help"):
+        table.add_column(name, no_wrap=name in ("", "what", "channel", "value"))
+    for f in findings.findings:
+        note = "; ".join(filter(None, (f.detail, f.remedy)))
+        row = (Text(f.light, style=_STYLES[f.light]), kind(f), _channel(f), number(f), f.expected, note)
+        table.add_row(*(cell if isinstance(cell, Text) else Text(cell) for cell in row))
+    return table
+
+
+def warnings(findings: Findings) -> list[str]:
+    """Return a line for each amber or red finding that a fit's results would not repeat; rig first."""
+    told = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
+    reported = {(f.kind, f.channel) for f in findings.faults}
+    told = [f for f in told if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
+    return [sentence(f) for f in sorted(told, key=lambda f: f.kind != "wrong_rig")]
+
+
+def sentence(f: Finding) -> str:
+    """Return a finding as one line."""
+    what = " ".join(filter(None, (f"{f.light}:", kind(f), _channel(f))))
+    said = " ".join(filter(None, (number(f), f.detail))) or "none"
+    parts = (f"{what}: {said}", f"expected {f.expected}" if f.expected else "", f.remedy)
+    return "; ".join(filter(None, parts))
+
+
+def kind(f: Finding) -> str:
+    """Return the plain name of what was looked at."""
+    return _KINDS.get(f.kind, f.kind.replace("_", " "))
+
+
+def number(f: Finding) -> str:
+    """Return the number of a finding with its interval and unit."""
+    if f.value is None:
+        return ""
+    shown = words.number(f.value, 3)
+    if f.low is not None and f.high is not None:
+        shown = " ± ".join(filter(None, words.with_interval(f.value, f.low, f.high)))
+    return f"{shown} {words.unit(f.unit)}".rstrip()
+
+
+def _channel(f: Finding) -> str:
+    return words.channel(f.channel) if f.channel in words.CHANNELS else f.channel
+
+
+def summary(checks: Sequence[Findings]) -> str:
+    """Return one line that counts the lights."""
+    lights = [f.light for c in checks for f in c.findings]
+    counts = ", ".join(f"{lights.count(light)} {light}" for light in ("red", "amber", "green"))
+    return f"checked against rig {checks[0].rig_name}: {counts}"

@@ -1,0 +1,52 @@
+"""Offset and drift of a sensor's stamps: the truth lies within the stated interval."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
+
+RIG = load_rig("paper_high_impedance")
+
+
+def late(record, offset, drift, *names):
+    """Stamp some channels so much later (s), and more and more (s/s)."""
+    return record.with_channels(
+        **{n: Channel(record[n].t + offset + drift * record[n].t, record[n].y) for n in names}
+    )
+
+
+def clock(findings, kind, channel):
+    return next(f for f in findings.of(kind) if f.channel == channel)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_offset_and_drift_are_recovered(seed):
+    record = record_run(drawn_bench(np.random.default_rng(seed)), seed, duration=15.0)
+    findings = check_record(late(record, 2e-4, 40e-6, "ft"), RIG)
+    offset, drift = (clock(findings, kind, "ft") for kind in ("clock_offset", "clock_drift"))
+    for found, truth in ((offset, 200.0), (drift, 40.0)):
+        half = 0.5 * (found.high - found.low)
+        assert abs(found.value - truth) < 1.5 * half  # three sigma: five seeds, two numbers
+    assert offset.high - offset.low < 150.0 and drift.high - drift.low < 10.0
+    assert drift.light == "amber" and "clock_drift" in {f.kind for f in findings.faults}
+    assert clock(findings, "clock_offset", "velocity").value == pytest.approx(0.0, abs=10.0)
+
+
+def test_a_large_offset_of_one_sensor_is_a_fault():
+    record = record_run(drawn_bench(np.random.default_rng(1)), 1, duration=15.0)
+    findings = check_record(late(record, 8e-3, 0.0, "ft"), RIG)
+    assert clock(findings, "clock_offset", "ft").value == pytest.approx(8000.0, abs=60.0)
+    assert "clock_offset" in {f.kind for f in findings.faults}
+
+
+def test_what_all_sensors_share_is_a_delay_as_well():
+    record = record_run(drawn_bench(np.random.default_rng(1)), 1, duration=15.0)
+    findings = check_record(late(record, 2e-3, 0.0, "ft", "position", "velocity"), RIG)
+    assert clock(findings, "clock_offset", "ft").value == pytest.approx(2000.0, abs=60.0)
+    assert "a delay of the drive looks the same" in clock(findings, "clock_offset", "ft").detail
+    assert not {f.kind for f in findings.faults}

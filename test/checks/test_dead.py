@@ -1,0 +1,96 @@
+"""Dead and frozen channels are named; rest, standstill and plateaus are neither."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_command, record_run
+from independent.excitations import chirp_noise
+from independent.hidden import hide
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.checks.usable import check_diagnosable
+from rsea_ros.errors import IdentificationError
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
+
+RIG = load_rig("paper_high_impedance")
+BENCH = drawn_bench(np.random.default_rng(2))
+QUIET = BENCH.having(ft_noise=0.0, velocity_noise=0.0, motor_noise=0.0)
+N = 280 * 12
+COMMAND = chirp_noise(12.0, np.random.default_rng(3))
+IN_TURNS = (np.arange(N) // 600) % 2 == 0
+
+
+@functools.cache
+def good():
+    return record_run(BENCH, 4, duration=12.0)
+
+
+def having(channel, y):
+    return good().with_channels(**{channel: Channel(good()[channel].t, np.asarray(y, float))})
+
+
+def kinds(record):
+    return {(f.kind, f.channel) for f in check_record(record, RIG).faults}
+
+
+RNG = np.random.default_rng(0)
+DEAD = {
+    "zero": np.zeros(N),
+    "constant": np.full(N, 3.2),
+    "its own noise": 0.03 * RNG.normal(size=N),
+    "loud noise": 30.0 * RNG.normal(size=N),
+    "a walk": np.cumsum(RNG.normal(size=N)),
+    "mains": 0.5 * np.sin(2.0 * np.pi * 50.0 * np.arange(N) / 280.0) + 0.03 * RNG.normal(size=N),
+}
+
+
+@pytest.mark.parametrize("name", DEAD)
+def test_a_dead_sensor_is_named(name):
+    assert kinds(having("ft", DEAD[name])) == {("dead_channel", "ft")}
+
+
+@pytest.mark.parametrize(
+    ("channel", "noise"), [("position", 1e-5), ("velocity", 2e-4), ("motor_torque", 0.05)]
+)
+def test_so_is_every_other_dead_channel(channel, noise):
+    assert ("dead_channel", channel) in kinds(having(channel, noise * RNG.normal(size=N)))
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_a_sensor_that_freezes_for_long_is_named(share):
+    y = good()["ft"].y.copy()
+    y[N // 3 : N // 3 + int(share * N)] = y[N // 3]
+    assert ("frozen_samples", "ft") in kinds(having("ft", y))
+
+
+@pytest.mark.parametrize("bench", [QUIET, hide(BENCH, "coulomb_friction", {"torque": 3.0})])
+@pytest.mark.parametrize(
+    "command",
+    [
+        np.where(IN_TURNS, COMMAND, 0.0),
+        np.where(IN_TURNS, np.abs(COMMAND), 0.0),
+        np.where(np.arange(N) > N // 2, COMMAND, 0.0),
+        np.where(np.arange(N) < N // 2, COMMAND, 0.0),
+        np.clip(COMMAND, -12.0, 12.0),
+    ],
+    ids=["rests in turns", "one-sided", "rests first", "rests last", "plateaus"],
+)
+def test_rest_and_plateaus_are_no_faults(bench, command):
+    assert kinds(record_command(bench, command, np.random.default_rng(5))) == set()
+
+
+@pytest.mark.parametrize("level", [0.0, 10.0])
+@pytest.mark.parametrize("bench", [BENCH, QUIET])
+def test_a_command_that_never_changes_is_one_red_line(bench, level):
+    findings = check_record(record_command(bench, np.full(N, level), np.random.default_rng(5)), RIG)
+    assert [f.kind for f in findings.findings if f.light == "red"] == ["excitation"]
+
+
+def test_a_record_in_which_nothing_moves_is_refused_in_one_line():
+    record = record_command(BENCH, np.zeros(N), np.random.default_rng(5))
+    with pytest.raises(IdentificationError, match="the command stays at 0 N m and nothing moves"):
+        check_diagnosable(record)

@@ -1,0 +1,101 @@
+"""Sign and scale: what was put in is reported with its remedy; benches with an effect raise no alarm."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+from independent.hidden import CATALOGUE, hide
+from independent.severities import drawn_parameters
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
+
+RIG = load_rig("paper_high_impedance")
+
+
+@functools.cache
+def good():
+    return record_run(drawn_bench(np.random.default_rng(2)), 4, duration=12.0)
+
+
+def scaled(record, **factors):
+    return record.with_channels(**{n: Channel(record[n].t, f * record[n].y) for n, f in factors.items()})
+
+
+def told(findings, *kinds):
+    return {(f.kind, f.channel) for f in findings.findings if f.light == "red" and f.kind in kinds}
+
+
+@pytest.mark.parametrize("channel", ["command", "ft", "position", "velocity", "motor_torque"])
+def test_a_turned_channel_is_named(channel):
+    findings = check_record(scaled(good(), **{channel: -1.0}), RIG)
+    assert told(findings, "sign", "scale", "wrong_rig") == {("sign", channel)}
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "meaning"),
+    [
+        ("ft", 1e3, "mN m or N mm"),
+        ("ft", 1e-3, "kN m"),
+        ("command", 1e3, "mN m"),
+        ("motor_torque", 1 / 502, "at the motor"),
+        ("position", 57.29578, "deg"),
+        ("position", 502.0, "rad at the motor"),
+        ("position", 1 / 1.2518225e-5, "counts"),
+        ("velocity", 57.29578, "deg/s"),
+        ("velocity", 9.549297, "rpm"),
+        ("velocity", 502 * 9.549297, "rpm at the motor"),
+    ],
+)
+def test_a_unit_is_named_with_its_factor(channel, factor, meaning):
+    findings = check_record(scaled(good(), **{channel: factor}), RIG)
+    assert told(findings, "sign", "scale", "wrong_rig") == {("scale", channel)}
+    (found,) = (f for f in findings.of("scale") if f.light == "red")
+    assert found.value == pytest.approx(factor, rel=0.01)
+    assert meaning in found.detail
+    assert ("scale", channel) in {(f.kind, f.channel) for f in findings.faults}
+
+
+def test_the_remedy_of_a_turned_sensor_is_the_option():
+    (found,) = check_record(scaled(good(), ft=-1.0), RIG, axis="-torque.z").of("sign")
+    assert found.remedy == "--axis torque.z"
+
+
+def test_drive_values_of_the_motors_side_go_together():
+    findings = check_record(scaled(good(), command=1 / 502, motor_torque=1 / 502), RIG)
+    assert told(findings, "scale") == {("scale", "command"), ("scale", "motor_torque")}
+
+
+@pytest.mark.parametrize("effect", [None, *CATALOGUE])
+def test_an_effect_is_no_matter_of_units_or_of_another_rig(effect):
+    rng = np.random.default_rng(1)
+    bench = drawn_bench(rng)
+    bench = hide(bench, effect, drawn_parameters(effect, "strong", rng)) if effect else bench
+    findings = check_record(record_run(bench, 3, duration=8.0), RIG)
+    assert findings.light != "red"
+    assert not {f.kind for f in findings.faults} & {"sign", "scale", "wrong_rig", "dead_channel"}
+
+
+def test_a_drive_that_saturates_early_is_not_one_of_other_units():
+    bench = hide(drawn_bench(np.random.default_rng(1)), "torque_saturation", {"limit": 15.0})
+    findings = check_record(record_run(bench, 3, "white_noise", 10.0), RIG)
+    assert told(findings, "scale", "sign") == set()
+
+
+def test_a_wrong_inertia_is_no_scale():
+    rig = RIG.with_values({"rotor.reflected_inertia": 2.0 * RIG["rotor.reflected_inertia"]})
+    findings = check_record(good(), rig)
+    assert findings.light != "red"
+    (found,) = (f for f in findings.of("wrong_rig") if f.light != "green")
+    assert found.channel == "rotor.reflected_inertia"
+
+
+@pytest.mark.parametrize("name", ["prototype_knee", "cycloidal"])
+def test_another_rig_is_asked_about(name):
+    findings = check_record(good(), load_rig(name))
+    assert "wrong_rig" in {f.kind for f in findings.findings if f.light == "red"}
+    assert findings.rig_name == name
