@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rsea_ros.diagnosis.settings import DiagnosisSettings
     from rsea_ros.errors import RseaError
     from rsea_ros.library.bags import read_bag
+    from rsea_ros.library.checking import check
     from rsea_ros.library.diagnosed import diagnose
     from rsea_ros.library.fit import identify
     from rsea_ros.library.simulating import simulate
@@ -36,6 +37,7 @@ DOOR = {
     "Rig": "model.rig",
     "RseaError": "errors",
     "TorqueController": "control.controller",
+    "check": "library.checking",
     "diagnose": "library.diagnosed",
     "effects": "effects",
     "identify": "library.fit",
@@ -47,8 +49,8 @@ DOOR = {
 """The names that `import rsea_ros` offers, and the module of each."""
 
 __all__ = [
-    "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "diagnose", "effects",
-    "identify", "load_rig", "predict", "read_bag", "simulate",
+    "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "check", "diagnose",
+    "effects", "identify", "load_rig", "predict", "read_bag", "simulate",
 ]  # fmt: skip
 
 choose_cache()

@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording", "interrupts", "files", "new_files"} | YAML
+FILES = {"interrupts", "files", "new_files"}
+BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),

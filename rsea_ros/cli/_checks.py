@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
+from rsea_ros.checks.carried import with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.usable import require_motion
@@ -23,7 +23,7 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool) -> l
     found = [check_record(record, rig, axis) for record in records]
     if not quiet:
         print_warnings(found, rig)
-    return [_with_faults(r, f) for r, f in zip(records, found, strict=True)]
+    return [with_faults(r, f) for r, f in zip(records, found, strict=True)]
 
 
 def print_warnings(found: Sequence[Findings], rig: Rig) -> None:
@@ -33,15 +33,3 @@ def print_warnings(found: Sequence[Findings], rig: Rig) -> None:
         print(f"held against rig {rig.name}:")
     for line in lines:
         print(line)
-
-
-def _with_faults(record: Record, found: Findings) -> Record:
-    dead = {f.channel for f in found.faults if f.kind == "dead_channel"}
-    channels = {n: c for n, c in record.channels.items() if n not in dead}
-    kept = (*record.faults, *(f for f in found.faults if f.kind not in _AGAIN and f not in record.faults))
-    return replace(record, channels=channels, faults=kept)
-
-
-_AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
-          "clipping", "nan", "coarse_steps")  # fmt: skip
-"""Faults that the diagnosis finds and masks itself."""

@@ -19,13 +19,14 @@ HELP = "what the simulation gets wrong, the cause, the extended model and the ga
 RIG = "paper_high_impedance"
 FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
 FOUND = 1
-"""Exit status when the verdict is one that --fail-on names."""
+"""Exit status for a finding that --fail-on names."""
+FAULTS = "faults"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    verdicts = get_args(Verdict)
+    findings = (*get_args(Verdict), FAULTS)
     add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
     add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
     add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
@@ -40,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         action="extend",
         default=[],
-        choices=verdicts,
-        metavar="VERDICT",
-        help=f"exit status {FOUND} when the verdict is one of these: {', '.join(verdicts)}",
+        choices=findings,
+        metavar="FINDING",
+        help=f"exit status {FOUND} for any of these: {', '.join(findings)} (of the data)",
     )
     add_topic_options(parser)
     add_window_options(parser)
@@ -73,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:
         _print(result, report)
-    return FOUND if result.verdict in args.fail_on else 0
+    findings = {result.verdict, *([FAULTS] if result.faults else [])}
+    return FOUND if findings.intersection(args.fail_on) else 0
 
 
 def readable(bag: str, topics: TopicMap) -> Record:

@@ -96,10 +96,11 @@ def diagnose(
     """
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
-    from rsea_ros.library.inputs import records_of, rig_of
+    from rsea_ros.library.inputs import checked, records_of, rig_of
 
-    records = records_of(data)
+    rig, records = rig_of(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
-    result = diagnose_records(records, rig_of(rig), holdout, progress, settings=settings)
+    carrying = [checked(record, rig) for record in records]
+    result = diagnose_records(carrying, rig, holdout, progress, settings=settings)
     return Diagnosed(result, records[0])

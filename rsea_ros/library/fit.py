@@ -85,6 +85,8 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     Raises IdentificationError for records from which the rig cannot be identified, RigError for the rig.
     """
     from rsea_ros.identification.identify import identify as identify_records
-    from rsea_ros.library.inputs import records_of, rig_of
+    from rsea_ros.library.inputs import checked, records_of, rig_of
 
-    return Fit(identify_records(records_of(data), rig_of(rig), progress))
+    rig = rig_of(rig)
+    records = [checked(record, rig) for record in records_of(data)]
+    return Fit(identify_records(records, rig, progress))

@@ -22,6 +22,16 @@ def records_of(data: Record | Sequence[Record]) -> list[Record]:
     return records
 
 
+def checked(record: Record, rig: Rig) -> Record:
+    """Return a record that carries what the checks find wrong with it into the result."""
+    from rsea_ros.checks.carried import with_faults
+    from rsea_ros.checks.check import check_record
+    from rsea_ros.checks.usable import require_motion
+
+    require_motion(record)
+    return with_faults(record, check_record(record, rig))
+
+
 def rig_of(rig: Rig | str) -> Rig:
     """Return a rig given as such, by file or by name."""
     return rig if isinstance(rig, Rig) else load_rig(rig)

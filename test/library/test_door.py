@@ -12,6 +12,7 @@ import pytest
 import rsea_ros as rsea
 from rsea_ros import DOOR
 from rsea_ros.errors import ChannelError, ParameterError
+from rsea_ros.signals import Channel
 
 RATE = 280.0
 SECONDS = 12.0
@@ -166,3 +167,13 @@ def test_the_catalogue_shows_equation_parameters_and_source():
     assert "gap" in page._repr_html_() and "gap" in repr(page)
     for name in rsea.effects:
         assert name in rsea.effects._repr_html_()
+
+
+def test_a_check_says_what_is_wrong_and_a_fit_carries_it(record):
+    dead = record.with_channels(ft=Channel(record["ft"].t, np.full(len(record["ft"]), 0.25)))
+    checks = rsea.check(dead, "paper_high_impedance")
+    assert checks.light != "green"
+    assert "dead_channel ft" in repr(checks) and "ft" in checks.summary()
+    assert rsea.check(record, "paper_high_impedance").light == "green"
+    fit = rsea.identify(dead, "paper_high_impedance")
+    assert [fault.kind for fault in fit.result.faults if fault.channel == "ft"] == ["dead_channel"]

@@ -1,0 +1,20 @@
+"""A record that carries what the checks found into every result made from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rsea_ros.checks.finding import Findings
+from rsea_ros.signals import Record
+
+_AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
+          "clipping", "nan", "coarse_steps")  # fmt: skip
+"""Faults that the diagnosis finds and masks itself."""
+
+
+def with_faults(record: Record, found: Findings) -> Record:
+    """Return a record with the faults that were found; a dead channel is left out."""
+    dead = {f.channel for f in found.faults if f.kind == "dead_channel"}
+    channels = {n: c for n, c in record.channels.items() if n not in dead}
+    kept = (*record.faults, *(f for f in found.faults if f.kind not in _AGAIN and f not in record.faults))
+    return replace(record, channels=channels, faults=kept)
