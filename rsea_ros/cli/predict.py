@@ -15,7 +15,7 @@ from msg_adapters import read_record
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.identification_json import fault_json
+from rsea_ros.report.identification_json import fault_json, numbers
 
 HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"
 
@@ -37,7 +37,9 @@ def run(args: argparse.Namespace) -> int:
     comparisons = predict(load_rig(args.model), record)
     if args.out:
         _write_csv(comparisons, Path(args.out))
-    errors = {n: {"rms_error": c.rms_error, "fit_percent": c.fit_percent} for n, c in comparisons.items()}
+    errors = {
+        n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
+    }
     faults = [fault_json(fault) for fault in record.faults]
     print(json.dumps({"channels": errors, "data": {"faults": faults}}, indent=2))
     return 0
