@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain, combinations
+from itertools import chain, combinations, product
 from pathlib import Path
 from typing import Any
 
@@ -57,13 +57,13 @@ def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
     """Return the cases that play a bag, and a sentence on what they cover."""
     rng = random.Random(seed)
     factors = bag_factors(rigs())
-    verb_names = factors["verb"]
     whole = {"stamps": "even", "dead": "none"}
-    must = [{"rig": r, "verb": v, "channels": c, **whole} for r in factors["rig"] for v in verb_names for c in SUBSETS]
+    triples = product(factors["rig"], factors["verb"], SUBSETS)
+    must = [{"rig": r, "verb": v, "channels": c, **whole} for r, v, c in triples]
     cases, pairs = covering(factors, rng, must)
-    said = f"{len(must)} of every rig, verb and subset of channels; {pairs} pairs of values of {len(factors)} factors"
+    said = f"each of {len(must)} rigs × verbs × subsets of channels; {pairs} pairs of {len(factors)} factors"
+    rng.shuffle(cases)
     if quick:
-        rng.shuffle(cases)
         cases = [c for c in cases if c["duration"] <= 12.0 and c["rate"] <= 280.0][:60]
     return cases, said
 

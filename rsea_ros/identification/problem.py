@@ -64,6 +64,8 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     if is_inverse(rig):
         return _inverse_case(record)
     channels = _channels_that_tell(record, rig)
+    beside = [n for n in record.channels if n not in OUTPUTS]
+    record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
     in_loop = rig.controller is not None and "reference" in record
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
     quanta = {n: rig.sensors[n].quantum if n in rig.sensors else 0.0 for n in channels}
