@@ -20,14 +20,14 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
-
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
 import inputs_matrix as matrix
 import inputs_mutations as mutations
 from inputs_outcome import FAULTS, REFUSED, RESULT, Outcome
 from inputs_server import Work, serve, warm
+
+import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 
 PARTS = ("matrix", "mutations")
 
@@ -88,7 +88,7 @@ def play(title: str, work: Iterable[Work], args: argparse.Namespace, folder: Pat
 
 
 def damage(args: argparse.Namespace, count: int, folder: Path) -> int:
-    """Read mutated files, print how each format fared and the table, and return how many broke the promise."""
+    """Read mutated files, print each format and the table; return how many broke the promise."""
     began, outcomes = time.monotonic(), []
     for name, outcome in mutations.run(args.seed, count, folder, args.jobs, args.only):
         outcomes.append((name, outcome))
@@ -102,7 +102,9 @@ def damage(args: argparse.Namespace, count: int, folder: Path) -> int:
     for form in dict.fromkeys(form for form, _ in kinds):
         total = sum(n for (f, _), n in kinds.items() if f == form)
         faults = sum(n for (f, kind), n in kinds.items() if f == form and kind in FAULTS)
-        print(f"  {form:<12} {total:6d} files, {kinds[form, REFUSED]:6d} refused, {faults:4d} broken promises")
+        print(
+            f"  {form:<12} {total:6d} files, {kinds[form, REFUSED]:6d} refused, {faults:4d} broken promises"
+        )
     return table(outcomes, args.verbose)
 
 

@@ -7,6 +7,7 @@ import sqlite3
 import struct
 import tempfile
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 from inputs_bytes import ODD_DOUBLES, ODD_NUMBERS, damaged
@@ -69,7 +70,7 @@ def _chunk(rng: random.Random, body: bytes) -> bytes:
     """Return a chunk with other content, its checksum made right or left wrong, compressed or so called."""
     if len(body) < CHUNK_HEAD.size + 4:
         return body
-    start, stop, size, _ = CHUNK_HEAD.unpack_from(body)
+    start, stop, *_ = CHUNK_HEAD.unpack_from(body)
     text = struct.unpack_from("<I", body, CHUNK_HEAD.size)[0]
     inner = body[CHUNK_HEAD.size + 4 + text + 8 :]
     inside = records_of(inner) if text == 0 else None
@@ -137,13 +138,18 @@ def damaged_message(rng: random.Random, raw: bytes, other: bytes = b"") -> bytes
     if kind == 3:
         return raw[:at] + struct.pack("<d", rng.choice(ODD_DOUBLES)) + raw[at + 8 :]
     if kind == 4:
-        return raw[:4] + struct.pack("<iI", rng.choice((-1, 0, 2**31 - 1, -(2**31))), rng.choice((0, 10**9, 2**32 - 1))) + raw[12:]
+        return (
+            raw[:4]
+            + struct.pack("<iI", rng.choice((-1, 0, 2**31 - 1, -(2**31))), rng.choice((0, 10**9, 2**32 - 1)))
+            + raw[12:]
+        )
     return raw + rng.randbytes(rng.choice((1, 4, 1000)))
 
 
 _VALUES = (
-    "NULL", "''", "'x'", "0", "-1", "9223372036854775807", "-9223372036854775808", "1e308", "x'00'", "zeroblob(8)",
-    "zeroblob(50000000)", "randomblob(64)", "'/rsea/ft'", "char(0)", "char(27)", "x'fffe'", "'sensor_msgs/msg/JointState'",
+    "NULL", "''", "'x'", "0", "-1", "9223372036854775807", "-9223372036854775808", "1e308", "x'00'",
+    "zeroblob(8)", "zeroblob(50000000)", "randomblob(64)", "'/rsea/ft'", "char(0)", "char(27)", "x'fffe'",
+    "'sensor_msgs/msg/JointState'",
 )  # fmt: skip
 _COLUMNS = {
     "messages": ("topic_id", "timestamp", "data"),
@@ -166,10 +172,8 @@ def damaged_sqlite(rng: random.Random, data: bytes, other: bytes = b"") -> bytes
                 database.execute(_statement(rng))
             except sqlite3.Error:
                 continue
-        try:
+        with suppress(sqlite3.Error):
             database.commit()
-        except sqlite3.Error:
-            pass
         database.close()
         return path.read_bytes()
 
@@ -193,7 +197,8 @@ def _statement(rng: random.Random) -> str:
         "type_description_hash FROM topics",
         "UPDATE messages SET topic_id = topic_id + 100",
         f"CREATE VIEW {rng.choice(('messages', 'topics', 'x'))} AS WITH RECURSIVE c(x) AS "
-        "(SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT x AS id, x AS topic_id, x AS timestamp, x AS data FROM c",
+        "(SELECT 1 UNION ALL SELECT x + 1 FROM c) "
+        "SELECT x AS id, x AS topic_id, x AS timestamp, x AS data FROM c",
         "PRAGMA user_version = 99",
     ))  # fmt: skip
 

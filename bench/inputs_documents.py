@@ -14,17 +14,20 @@ from inputs_bytes import damaged
 ODD_VALUES: tuple[Any, ...] = (
     None, True, False, 0, 1, -1, 2, 10**30, 10**400, 0.0, -0.0, 1e308, -1e308, 5e-324, 1e-300, 1e30,
     float("nan"), float("inf"), -float("inf"), "", " ", "x", "nan", "1e5", "0x10", "1:30", "-", "null", "~",
-    "a" * 100_000, "\u0000", "\x1b[2J", "ä", "\ud7ff", "2026-01-01", "[1]", "{", "*a", "&a", "!!python/none", "%",
-    [], {}, [None], [1, 2], [[]], {"a": 1}, {"": ""}, {1: 2}, [float("nan")], list(range(1000)),
+    "a" * 100_000, "\u0000", "\x1b[2J", "ä", "\ud7ff", "2026-01-01", "[1]", "{", "*a", "&a", "!!python/none",
+    "%",    [], {}, [None], [1, 2], [[]], {"a": 1}, {"": ""}, {1: 2}, [float("nan")], list(range(1000)),
 )  # fmt: skip
 ODD_LINES = (
-    "a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]", "? [a]\n: b", "<<: {a: 1}", "!!binary |\n  x",
+    "a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\nd: [*c, *c]", "? [a]\n: b", "<<: {a: 1}",
+    "!!binary |\n  x",
     "!!python/object/apply:os.getcwd []", "--- {}\n---", "\t- x", "x: 2026-13-45", "x: 0o777", "x: .nan",
-    "x: 1_000", "x: 190:20:30", "x: " + "[" * 2000, "{" * 500, "- " * 500, "%YAML 3.0", "\ufeffx: 1", "x: 'open",
+    "x: 1_000", "x: 190:20:30", "x: " + "[" * 2000, "{" * 500, "- " * 500, "%YAML 3.0", "\ufeffx: 1",
+    "x: 'open",
 )  # fmt: skip
 ODD_CELLS = (
-    "", " ", "nan", "inf", "-inf", "1e999", "1e308", "NA", "x", "1,5", "0x1F", "1 2", '"', '"1"', "\x00", "ä", "1e",
-    "--1", "+1", "1_0", "٣", "9" * 400, "#1", "\ufeff1", "1;2", "1\t", "\r", "=1+1", "1" + " " * 10_000,
+    "", " ", "nan", "inf", "-inf", "1e999", "1e308", "NA", "x", "1,5", "0x1F", "1 2", '"', '"1"', "\x00", "ä",
+    "1e", "--1", "+1", "1_0", "٣", "9" * 400, "#1", "\ufeff1", "1;2", "1\t", "\r", "=1+1",
+    "1" + " " * 10_000,
 )  # fmt: skip
 
 
@@ -36,7 +39,9 @@ def damaged_yaml(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
         return damaged(rng, data, other)
     kind = rng.random()
     if kind < 0.6:
-        return yaml.safe_dump(changed(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5).encode()
+        return yaml.safe_dump(
+            changed(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
+        ).encode()
     return damaged_text(rng, data, other) if kind < 0.85 else damaged(rng, data, other)
 
 
@@ -115,7 +120,9 @@ def damaged_text(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
     return text.encode(encoding, "replace")
 
 
-def _line(change: Callable[[random.Random, list[str], int], None]) -> Callable[[random.Random, list[str]], None]:
+def _line(
+    change: Callable[[random.Random, list[str], int], None],
+) -> Callable[[random.Random, list[str]], None]:
     return lambda rng, lines: change(rng, lines, rng.randrange(len(lines))) if lines else None
 
 

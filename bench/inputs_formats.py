@@ -63,7 +63,9 @@ def _record() -> Record:
     t = np.arange(400) / 280.0
     rng = np.random.default_rng(0)
     names = ("command", "motor_torque", "position", "velocity", "ft")
-    return Record({n: Channel(t, rng.standard_normal(400)) for n in names}, epoch_ns=1_700_000_000_000_000_000)
+    return Record(
+        {n: Channel(t, rng.standard_normal(400)) for n in names}, epoch_ns=1_700_000_000_000_000_000
+    )
 
 
 @cache
@@ -157,7 +159,11 @@ def _mat() -> list[bytes]:
     return files
 
 
-_CSV_AS = {"run.csv": CSV.encode(), "run.tsv": CSV.replace(",", "\t").encode(), "run.csv.gz": gzip.compress(CSV.encode())}
+_CSV_AS = {
+    "run.csv": CSV.encode(),
+    "run.tsv": CSV.replace(",", "\t").encode(),
+    "run.csv.gz": gzip.compress(CSV.encode()),
+}
 
 
 def _gzipped(rng: random.Random, data: bytes, other: bytes) -> bytes:
@@ -207,7 +213,9 @@ def _play_noise(folder: Path, data: bytes, number: int) -> Outcome:
 
 
 def _settings() -> list[bytes]:
-    return [f"{n}:{','.join(f'{k}={v}' for k, v in e.typical.items())}".encode() for n, e in effects().items()]
+    return [
+        f"{n}:{','.join(f'{k}={v}' for k, v in e.typical.items())}".encode() for n, e in effects().items()
+    ]
 
 
 def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
@@ -215,17 +223,35 @@ def _play_setting(folder: Path, data: bytes, number: int) -> Outcome:
     outcome = tried(lambda: parse_effect(text))
     if outcome.kind != RESULT:
         return outcome
-    return call(["simulate", RIG, f"--effect={text}", "--duration", "0.5", "--out", str(folder / f"{number}.mcap")])
+    return call(
+        ["simulate", RIG, f"--effect={text}", "--duration", "0.5", "--out", str(folder / f"{number}.mcap")]
+    )
 
 
 def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
     text = data.decode("utf-8", "replace")
-    odd = ("nan", "inf", "-inf", "-1", "1e308", "1e-300", "0", "0x1", "1_0", "", "x", "=", "1,1", "1e999", "9" * 400)
+    odd = (
+        "nan",
+        "inf",
+        "-inf",
+        "-1",
+        "1e308",
+        "1e-300",
+        "0",
+        "0x1",
+        "1_0",
+        "",
+        "x",
+        "=",
+        "1,1",
+        "1e999",
+        "9" * 400,
+    )
     kind = rng.randrange(4)
     if kind == 0 and "=" in text:
         parts = text.split("=")
         at = rng.randrange(1, len(parts))
-        value, comma, rest = parts[at].partition(",")
+        _, comma, rest = parts[at].partition(",")
         parts[at] = rng.choice(odd) + comma + rest
         return "=".join(parts).encode()
     if kind == 1:
@@ -235,7 +261,12 @@ def _damaged_setting(rng: random.Random, data: bytes, other: bytes) -> bytes:
 
 FORMATS = (
     Format("mcap", lambda: [_bag(".mcap")], damaged_mcap, _play_bag(".mcap")),
-    Format("sqlite", lambda: [*[_bag(".db3")] * 30, bag_of_views(_bag(".db3"))], damaged_sqlite, _play_bag(".db3")),
+    Format(
+        "sqlite",
+        lambda: [*[_bag(".db3")] * 30, bag_of_views(_bag(".db3"))],
+        damaged_sqlite,
+        _play_bag(".db3"),
+    ),
     Format("metadata", _metadata, damaged_yaml, _play_metadata),
     Format("rig", _rigs, damaged_yaml, _play_rig),
     Format("map", lambda: [MAP.encode()], damaged_yaml, _play_import("run.csv", True)),

@@ -89,16 +89,18 @@ def other_cases(seed: int, quick: bool) -> list[Case]:
     rng = random.Random(seed)
     names = rigs()
     simulate = covering(
-        {"rig": names, "verb": ["simulate"], "excitation": sorted(KINDS), "rate": [280.0, 1.0, 10.0, 1000.0, 2000.0],
-         "duration": [10.0, 2.0, 0.001, 60.0], "effect": [None, *catalogue()], "amplitude": [20.0, 0.0, -5.0, 1e-300],
+        {"rig": names, "verb": ["simulate"], "excitation": sorted(KINDS),
+         "rate": [280.0, 1.0, 10.0, 1000.0, 2000.0],
+         "duration": [10.0, 2.0, 0.001, 60.0], "effect": [None, *catalogue()],
+         "amplitude": [20.0, 0.0, -5.0, 1e-300],
          "period": [4.0, 0.001, 10.0, 1e9], "low": [0.05, 1e-9, 100.0], "high": [100.0, 1e-3, 1e9],
          "no_noise": [False, True]}, rng)[0]  # fmt: skip
     control = covering({"verb": ["control"], "rig": names, "rate": [280.0, 1000.0, 50.0, 10000.0],
                         "free": [None, *names]}, rng)[0]  # fmt: skip
     export = [{"verb": "export", "rig": r} for r in names]
     odd = [1e-300, 1e-3, 1.0, 1e3, 1e300, 0.0, -1.0, "nan", "inf"]
-    options = ("torque", "bandwidth", "inertia", "mass", "diameter", "separation", "spring-radius", "deflection",
-               "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip
+    options = ("torque", "bandwidth", "inertia", "mass", "diameter", "separation", "spring-radius",
+               "deflection",               "tolerance-db", "tolerance-deg", "stiffness")  # fmt: skip
     design = [{"verb": "design", "option": o, "value": v} for o in options for v in odd]
     design += [{"verb": "design", "option": "tolerance-deg", "value": v} for v in (89.9, 90, 90.1, 180)]
     groups = [simulate, control, export, design]

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 
 from inputs_formats import FORMATS, SHARES, Format
-from inputs_outcome import Outcome, limit_child, limit_memory, more_memory, place
+from inputs_outcome import Outcome, ended, limit_memory, limit_seconds, more_memory, place
 
 BATCH = 50
 SLOW = 20
@@ -50,14 +50,17 @@ def files_of(form: Format, seed: int, answers: dict[str, bytes]) -> Iterator[tup
     for number in range(BATCH):
         kept = list(answers.values())
         base = rng.choice(kept) if kept and rng.random() < 0.5 else rng.choice(seeds)
-        yield number, (base if number < len(seeds) and seed % 7 == 0 else form.damage(rng, base, rng.choice(seeds)))
+        yield (
+            number,
+            (base if number < len(seeds) and seed % 7 == 0 else form.damage(rng, base, rng.choice(seeds))),
+        )
 
 
 def read_batch(form: Format, seed: int, folder: Path, log: Path, after: int = -1) -> None:
     """Make and read the files of a batch; write a line of JSON for each. after: the last one already read."""
     signal.signal(signal.SIGVTALRM, _stop)
     signal.alarm(WALL)
-    limit_child(BATCH * SLOW)
+    limit_memory()
     answers: dict[str, bytes] = {}
     with log.open("a", encoding="utf-8") as file:
         for number, data in files_of(form, seed, answers):
@@ -75,6 +78,7 @@ def read_batch(form: Format, seed: int, folder: Path, log: Path, after: int = -1
 
 def _read(form: Format, folder: Path, data: bytes, number: int) -> Outcome:
     signal.setitimer(signal.ITIMER_VIRTUAL, SLOW)
+    limit_seconds(SLOW + 5)
     began = time.process_time()
     try:
         outcome = form.play(folder, data, number)
@@ -121,12 +125,15 @@ def run(seed: int, count: int, folder: Path, jobs: int, only: list[str]) -> Iter
         done = list(_lines(inside / "log"))
         unfinished = [k for k, outcome in done if outcome is None]
         if unfinished:
-            _finish(inside / "log", Outcome("crash", f"status {status}: {form.name}", megabytes=usage.ru_maxrss / 1024))
+            _finish(inside / "log", ended(status, usage))
             (inside / f"fault-{unfinished[-1]}").write_bytes((inside / "last").read_bytes())
             waiting.insert(0, (form, number, unfinished[-1]))
             continue
         if not done:
-            yield f"{form.name} {number}", Outcome("gate", f"batch ended with status {status} before its first file")
+            yield (
+                f"{form.name} {number}",
+                Outcome("gate", f"batch ended with status {status} before its first file"),
+            )
         for k, outcome in done:
             if outcome is not None:
                 yield f"{form.name} {number} {k} ({inside}/fault-{k})", outcome
@@ -137,7 +144,6 @@ def _forked(form: Format, seed: int, inside: Path, after: int) -> int:
     if pid:
         return pid
     try:
-        os.setpgid(0, 0)
         read_batch(form, seed, inside, inside / "log", after)
         os._exit(0)
     except BaseException:

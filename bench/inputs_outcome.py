@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import resource
 import signal
 import sys
@@ -45,11 +46,16 @@ class Outcome:
 
 def limit_child(seconds: int = SECONDS) -> None:
     """Put the ceilings on this process, counted from now."""
+    limit_seconds(seconds)
+    limit_memory()
+
+
+def limit_seconds(seconds: int) -> None:
+    """Let this process end after so many seconds of processor from now."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     cpu = int(used.ru_utime + used.ru_stime) + seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (cpu, cpu + 5))
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu, resource.getrlimit(resource.RLIMIT_CPU)[1]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    limit_memory()
 
 
 def limit_memory() -> None:
@@ -155,7 +161,7 @@ def place(error: BaseException) -> str:
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "bench" not in f.filename]
     inside = [f for f in frames if "rsea_ros" in f.filename or "msg_adapters" in f.filename]
     at = f"{_short(inside[-1].filename)}:{inside[-1].lineno} {inside[-1].name}" if inside else "?"
-    return f"{type(error).__name__} at {at}: {str(error)[:80]}"
+    return f"{type(error).__name__} at {at}: {_pattern(str(error)[:80])}"
 
 
 def _short(filename: str) -> str:
@@ -163,7 +169,7 @@ def _short(filename: str) -> str:
 
 
 def _pattern(message: str) -> str:
-    return "".join("#" if c.isdigit() else c for c in message)[:160]
+    return re.sub(r"\b[0-9][0-9a-fx.e+-]*|'[^']*'", "#", message)[:160]
 
 
 def forked(work: Callable[[], Outcome], answer: Path) -> int:
@@ -175,7 +181,6 @@ def forked(work: Callable[[], Outcome], answer: Path) -> int:
         return pid
     status = 70
     try:
-        os.setpgid(0, 0)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         outcome = work()
         answer.write_text(json.dumps(asdict(outcome)), encoding="utf-8")
@@ -191,16 +196,22 @@ def forked(work: Callable[[], Outcome], answer: Path) -> int:
 
 def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
     """Return what a child that ended has left."""
-    number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    if late or number == signal.SIGXCPU:
-        outcome = Outcome("time-out", f"more than {SECONDS} s")
-    elif number:
-        kind = "memory" if number == signal.SIGKILL else "crash"
-        outcome = Outcome(kind, f"ended by {signal.Signals(number).name}")
-    elif not answer.exists():
-        outcome = Outcome("crash", f"ended with status {os.WEXITSTATUS(status)} without an answer")
-    else:
-        outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
+    if late:
+        return Outcome("time-out", "neither done nor at work")
+    if not answer.exists():
+        return ended(status, usage)
+    outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
     outcome.seconds = usage.ru_utime + usage.ru_stime
     outcome.megabytes = usage.ru_maxrss / 1024
+    return outcome
+
+
+def ended(status: int, usage: resource.struct_rusage) -> Outcome:
+    """Return what a child that ended without an answer came to."""
+    outcome = Outcome("crash", f"ended with status {os.waitstatus_to_exitcode(status)} without an answer")
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        kind = {signal.SIGXCPU: "time-out", signal.SIGKILL: "memory"}.get(number, "crash")
+        outcome = Outcome(kind, f"ended by {signal.Signals(number).name}")
+    outcome.seconds, outcome.megabytes = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
     return outcome

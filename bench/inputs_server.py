@@ -59,7 +59,7 @@ def _ended(running: dict[int, tuple[str, Path, float]], wall: float) -> Iterator
         for pid, (name, answer, since) in list(running.items()):
             late = time.monotonic() - since > wall
             if late:
-                os.killpg(pid, signal.SIGKILL)
+                os.kill(pid, signal.SIGKILL)
             done, status, usage = _waited(pid, block=late)
             if done:
                 del running[pid]

@@ -149,7 +149,7 @@ def _band_noise(settings: Settings, deviation: float) -> FloatArray:
     inside = (frequency >= settings.low) & (frequency <= settings.top)
     if not inside.any():
         raise ParameterError(
-            f"excitation: no line of {settings.duration:g} s between {settings.low:g} and {settings.top:g} Hz, "
+            f"excitation: no line of {settings.duration:g} s in {settings.low:g} to {settings.top:g} Hz, "
             "expected a longer duration or a wider band"
         )
     spectrum[~inside] = 0.0

@@ -59,6 +59,10 @@ def check_command(record: Record) -> None:
     bad = ~np.isfinite(command.y)
     back = np.diff(command.t, prepend=-np.inf) <= 0.0
     for k in np.flatnonzero(bad | back)[:1]:
-        value = f"{command.y[k]} N m" if bad[k] else f"stamped {command.t[k]:.6g} s after {command.t[k - 1]:.6g} s"
+        value = (
+            f"{command.y[k]} N m"
+            if bad[k]
+            else f"stamped {command.t[k]:.6g} s after {command.t[k - 1]:.6g} s"
+        )
         expected = f"a number up to {LARGEST:g}" if bad[k] else "rising stamps"
         raise IdentificationError(f"{record.source}: command[{k}] is {value}, expected {expected}")

@@ -19,8 +19,8 @@ from numba import njit
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.extent import check_extent
 from rsea_ros.model.equations import mechanics, train_ratio
+from rsea_ros.model.extent import check_extent
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
 from rsea_ros.model.step import call_port
