@@ -20,14 +20,15 @@ from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+
+# isort: split
 import inputs_matrix as matrix
 import inputs_mutations as mutations
 from inputs_outcome import FAULTS, REFUSED, RESULT, Outcome
 from inputs_server import Work, serve, warm
-
-import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
 
 PARTS = ("matrix", "mutations")
 
