@@ -135,6 +135,13 @@ channels:
 """
 
 
+RATED = """delimiter: ","
+time: {rate: 100}
+where: {column: load, from: 3}
+channels: {velocity: {column: phi, unit: rpm}, position: [{column: i, unit: mrad, scale: 1, constant: 0}]}
+"""
+
+
 def _play_import(file_name: str, is_map: bool) -> Play:
     def play(folder: Path, data: bytes, number: int) -> Outcome:
         table, maps = folder / file_name, folder / "map.yaml"
@@ -269,7 +276,7 @@ FORMATS = (
     ),
     Format("metadata", _metadata, damaged_yaml, _play_metadata),
     Format("rig", _rigs, damaged_yaml, _play_rig),
-    Format("map", lambda: [MAP.encode()], damaged_yaml, _play_import("run.csv", True)),
+    Format("map", lambda: [MAP.encode(), RATED.encode()], damaged_yaml, _play_import("run.csv", True)),
     Format("csv", lambda: [CSV.encode()], damaged_table, _play_import("run.csv", False)),
     Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, _play_import("run.tsv", False)),
     Format("csv.gz", lambda: [gzip.compress(CSV.encode())], _gzipped, _play_import("run.csv.gz", False)),

@@ -108,8 +108,8 @@ def test_what_is_refused_in_one_line(played, name):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--duration", "0.001", "--excitation", "steps"], "expected 1 to 2e+07 samples"),
-        (["--duration", "1e9"], "expected 1 to 2e+07 samples"),
+        (["--duration", "0.001", "--excitation", "steps"], "expected 10 to 2e+07 samples"),
+        (["--duration", "1e9"], "expected 10 to 2e+07 samples"),
         (["--duration", "0.05", "--low", "5", "--high", "6"], "expected a longer duration or a wider band"),
     ],
 )

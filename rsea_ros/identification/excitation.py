@@ -18,6 +18,8 @@ from rsea_ros.signals import FloatArray, IntArray
 
 NYQUIST_SHARE = 0.95
 """No excitation goes above this share of half the sample rate."""
+FEWEST_SAMPLES = 10
+"""Of a command that a simulation can be driven with (see drive_from)."""
 MOST_SAMPLES = 2e7
 """Of a command: 10 hours at 500 Hz; more is a slip of the pen that would take all memory."""
 _DETECTION_GROUP = 4
@@ -46,10 +48,10 @@ class Settings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"excitation: {name} = {value:g} {unit}, expected > 0 {unit}")
-        if not 1.0 <= self.duration * self.rate <= MOST_SAMPLES:
+        if not FEWEST_SAMPLES <= self.duration * self.rate <= MOST_SAMPLES:
             raise ParameterError(
                 f"excitation: duration = {self.duration:g} s at {self.rate:g} Hz, "
-                f"expected 1 to {MOST_SAMPLES:g} samples"
+                f"expected {FEWEST_SAMPLES} to {MOST_SAMPLES:g} samples"
             )
         if not self.low < self.top:
             raise ParameterError(f"excitation: low = {self.low:g} Hz, expected below {self.top:g} Hz")
