@@ -68,6 +68,12 @@ class Channel:
         """Median sample rate, Hz."""
         return float(1.0 / np.median(np.diff(self.t)))
 
+    @property
+    def is_still(self) -> bool:
+        """Whether it holds one value throughout, numbers that are not finite aside."""
+        finite = self.y[np.isfinite(self.y)]
+        return not len(finite) or bool(np.all(finite == finite[0]))
+
     def between(self, start: float, stop: float) -> Channel:
         """Return the samples with start <= t < stop (s)."""
         keep = (self.t >= start) & (self.t < stop)

@@ -6,6 +6,7 @@ import numpy as np
 
 from rsea_ros.checks.motion import is_still
 from rsea_ros.errors import IdentificationError
+from rsea_ros.fault_kinds import FAULT_KINDS
 from rsea_ros.signals import Channel, Record
 
 SHORTEST = 4.0
@@ -30,6 +31,10 @@ def check_diagnosable(record: Record) -> None:
             f"{record.source}: {length:.3g} s of commands, expected {SHORTEST:g} s or more"
         )
     measured = [c for n, c in record.channels.items() if n not in ("command", "reference")]
+    if not measured:
+        left_out = "; ".join(f"{f.channel}: {FAULT_KINDS[f.kind]}" for f in record.faults)
+        reason = f" ({left_out})" if left_out else ""
+        raise IdentificationError(f"{record.source}: no measurement beside the command{reason}, expected one")
     if all(_constant(c) for c in measured):
         raise IdentificationError(f"{record.source}: every measured channel holds one value, expected motion")
     require_motion(record)

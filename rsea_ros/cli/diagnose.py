@@ -84,8 +84,9 @@ def readable(bag: str, topics: TopicMap) -> Record:
     Raises BagError or IdentificationError for one that cannot be diagnosed at all.
     """
     from rsea_ros.checks.usable import check_diagnosable
+    from rsea_ros.model.extent import bounded
 
-    record = read_record([bag], topics=topics, strict=False)
+    record = bounded(read_record([bag], topics=topics, strict=False))
     check_diagnosable(record)
     return record
 

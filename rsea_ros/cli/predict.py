@@ -15,7 +15,7 @@ from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, top
 from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, write_text
-from rsea_ros.report.identification_json import fault_json
+from rsea_ros.report.identification_json import fault_json, numbers
 from rsea_ros.stamps import repair_stamps
 
 HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"
@@ -44,7 +44,9 @@ def run(args: argparse.Namespace) -> int:
     comparisons = predict(load_rig(args.model), record)
     if args.out:
         write_text(args.out, _table(comparisons), force=args.force)
-    errors = {n: {"rms_error": c.rms_error, "fit_percent": c.fit_percent} for n, c in comparisons.items()}
+    errors = {
+        n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
+    }
     told = [fault_json(fault) for fault in (*record.faults, *faults)]
     print(json.dumps({"channels": errors, "data": {"faults": told}}, indent=2))
     return 0

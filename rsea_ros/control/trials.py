@@ -48,8 +48,8 @@ class Trial:
 
     @property
     def met(self) -> bool | None:
-        """Whether the value is as asked; None where nothing is."""
-        if self.asked is None:
+        """Whether the value is as asked; None where nothing is, or where the rig gives no value."""
+        if self.asked is None or math.isnan(self.value):
             return None
         return self.value >= self.asked if self.least else self.value <= self.asked
 
@@ -76,7 +76,7 @@ class Compensated:
     @property
     def gain(self) -> float:
         """1 - error with the model / error without it."""
-        return 1.0 - self.with_model / self.without
+        return 1.0 - self.with_model / self.without if self.without > 0.0 else math.nan
 
 
 def trials(rig: Rig, free: Rig, design: Design, resonance: float, seen: Responses) -> Iterator[Trial]:
@@ -140,8 +140,11 @@ def sine(
 def restlessness(rig: Rig, design: Design, gap: float = 5.0 * ARCMIN) -> float:
     """Return the torque's RMS about its mean with backlash, over that without, worst of a few torques held.
 
-    Each is held after a sine has shaken the gap. 1 is the noise of the sensor alone.
+    Each is held after a sine has shaken the gap. 1 is the noise of the sensor alone; NaN for a rig whose F/T
+    sensor has no noise stated, beside which there is nothing to compare with.
     """
+    if "ft" not in rig.sensors or rig.sensors["ft"].noise <= 0.0:
+        return math.nan
     worn = rig.with_effects(EffectSetting("backlash", {"gap": gap}))
     ratios = []
     for torque in (0.0, 0.3, 2.0):

@@ -23,6 +23,8 @@ _LOST = 0.5
 """Coherence^2 below which more than half of a channel's power has nothing to do with the command."""
 _MOST = 0.75
 _LINES = 1024
+_SHORTEST = 8
+"""Samples of a segment: a shorter one has no band to speak of."""
 _LOWEST = 2.0
 
 
@@ -51,8 +53,11 @@ def lost_above(case: Case, channel: str) -> float | None:
     t = case.t[channel]
     u, y = command_at(case.drive, t), case.measured[channel]
     rate, length = 1.0 / float(np.median(np.diff(t))), min(_LINES, len(t) // _FEWEST_SEGMENTS)
+    if length < _SHORTEST:
+        return None
     frequency, power = signal.welch(u, rate, nperseg=length)
-    coherence = signal.coherence(u, y, rate, nperseg=length)[1]
+    cross = np.abs(signal.csd(u, y, rate, nperseg=length)[1]) ** 2
+    coherence = cross / np.maximum(power * signal.welch(y, rate, nperseg=length)[1], 1e-300)
     there = (power > 1e-3 * np.median(power)) & (frequency > _LOWEST)
     is_lost, frequency = (coherence < _LOST)[there], frequency[there]
     count = np.arange(1, len(is_lost) + 1)

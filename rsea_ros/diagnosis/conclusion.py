@@ -33,7 +33,7 @@ from rsea_ros.signals import Record
 
 MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
-PRIMARY = ("ft", "position", "motor_torque")
+PRIMARY = ("ft", "position", "velocity", "motor_torque")
 """The channel that gains and verdicts speak of: the first of these that is there."""
 
 

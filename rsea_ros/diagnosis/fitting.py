@@ -19,6 +19,8 @@ from rsea_ros.signals import FloatArray
 AT_FLOOR = 1.04
 """RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
 DELAY = "command_delay.delay"
+_ROUNDING = 1e-9
+"""Of a channel's standard deviation: a residual below it is rounding, not noise."""
 _ITERATIONS = 12
 _SEARCH_GAIN = 2e-4
 """Relative fall of the cost below which a fit of the search is done; what is judged is fitted further."""
@@ -174,7 +176,8 @@ def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> C
         if n in out:
             residual = np.where(case.mask[n], case.measured[n] - out[n], 0.0)
             quantum = problem.rig.sensors[n].quantum if n in problem.rig.sensors else 0.0
-            floor = max(residual_floor(residual), 0.5 * quantum)
+            least = max(0.5 * quantum, _ROUNDING * float(np.std(case.measured[n])))
+            floor = max(residual_floor(residual), least)
             noise[n] = min(noise[n], floor)
     return replace(case, noise=noise)
 

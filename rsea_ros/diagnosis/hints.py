@@ -86,8 +86,9 @@ def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     if not isinstance(seen.case.drive, Drive):
         return own
     asked = float(np.max(np.abs(seen.case.drive.command)))
-    measured = np.abs(seen.case.measured.get("motor_torque", np.zeros(0)))
-    limits = [float(np.quantile(measured, 0.999))] * bool(len(measured)) + [s * asked for s in _LIMITS]
+    limits = [s * asked for s in _LIMITS]
+    if "motor_torque" in seen.case.measured:
+        limits.insert(0, float(np.quantile(np.abs(seen.case.measured["motor_torque"]), 0.999)))
     return [{**effect.typical, "limit": limit} for limit in limits]
 
 
@@ -135,6 +136,8 @@ def _torque_constant(effect: Effect, own: list[Start], seen: Seen) -> list[Start
         return own
     mask = seen.case.mask["ft"]
     measured, simulated = seen.case.measured["ft"][mask], seen.outputs["ft"][mask]
+    if not simulated.any():
+        return own
     gain = float(simulated @ measured / (simulated @ simulated))
     gain = min(max(gain, effect.main.low), effect.main.high)
     return [{**effect.typical, effect.main.name: gain, **{n: gain * seen.rig[n] for n in seen.rig.free()}}]

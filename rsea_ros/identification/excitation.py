@@ -18,6 +18,10 @@ from rsea_ros.signals import FloatArray, IntArray
 
 NYQUIST_SHARE = 0.95
 """No excitation goes above this share of half the sample rate."""
+FEWEST_SAMPLES = 10
+"""Of a command that a simulation can be driven with (see drive_from)."""
+MOST_SAMPLES = 2e7
+"""Of a command: 10 hours at 500 Hz; more is a slip of the pen that would take all memory."""
 _DETECTION_GROUP = 4
 
 
@@ -44,6 +48,11 @@ class Settings:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ParameterError(f"excitation: {name} = {value:g} {unit}, expected > 0 {unit}")
+        if not FEWEST_SAMPLES <= self.duration * self.rate <= MOST_SAMPLES:
+            raise ParameterError(
+                f"excitation: duration = {self.duration:g} s at {self.rate:g} Hz, "
+                f"expected {FEWEST_SAMPLES} to {MOST_SAMPLES:g} samples"
+            )
         if not self.low < self.top:
             raise ParameterError(f"excitation: low = {self.low:g} Hz, expected below {self.top:g} Hz")
 
@@ -130,11 +139,21 @@ def _period_samples(settings: Settings) -> int:
 
 
 def _band_noise(settings: Settings, deviation: float) -> FloatArray:
-    """Return Gaussian noise that is white from low to top and nothing elsewhere. deviation: N m."""
+    """Return Gaussian noise that is white from low to top and nothing elsewhere. deviation: N m.
+
+    Raises ParameterError where the band has no line: it is narrower than 1 / duration.
+    """
     n = settings.samples
+    if deviation == 0.0:
+        return np.zeros(n)
     spectrum = np.fft.rfft(np.random.default_rng(settings.seed).standard_normal(n))
     frequency = np.fft.rfftfreq(n, 1.0 / settings.rate)
     inside = (frequency >= settings.low) & (frequency <= settings.top)
+    if not inside.any():
+        raise ParameterError(
+            f"excitation: no line of {settings.duration:g} s in {settings.low:g} to {settings.top:g} Hz, "
+            "expected a longer duration or a wider band"
+        )
     spectrum[~inside] = 0.0
     share = 2.0 * np.count_nonzero(inside) / n
     noise: FloatArray = np.fft.irfft(spectrum, n) * (deviation / math.sqrt(share))

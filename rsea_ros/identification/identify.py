@@ -26,6 +26,7 @@ from rsea_ros.identification.unknowns import (
     unknowns_of_effect,
     unknowns_of_rig,
 )
+from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -45,6 +46,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     report("reading", 0.0)
     for record in records:
         check_usable(record)
+    records = [bounded(record) for record in records]
     cases = tuple(case_from(record, rig) for record in records)
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
@@ -62,12 +64,12 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
 def check_usable(record: Record) -> None:
     """Raise IdentificationError for values that are not finite or stamps that do not rise."""
     for name, channel in record.channels.items():
-        bad = ~(np.isfinite(channel.y) & np.isfinite(channel.t))
+        bad = ~((np.abs(channel.y) <= LARGEST) & np.isfinite(channel.t))
         if bad.any():
             k = int(np.argmax(bad))
             raise IdentificationError(
                 f"{record.source}: {name}[{k}] at {channel.t[k]:.4f} s = {channel.y[k]}, "
-                "expected a finite value"
+                f"expected a finite value up to {LARGEST:g}"
             )
         back = np.diff(channel.t) <= 0.0
         if back.any():

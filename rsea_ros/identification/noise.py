@@ -55,8 +55,9 @@ def _spectra(values: FloatArray) -> ComplexArray:
 
 
 def _top(lines: FloatArray) -> slice:
-    """Return where the top of the band lies."""
-    return slice(math.ceil(TOP_OF_BAND[0] * len(lines)), math.floor(TOP_OF_BAND[1] * len(lines)))
+    """Return where the top of the band lies: one line at least."""
+    first, last = math.ceil(TOP_OF_BAND[0] * len(lines)), math.floor(TOP_OF_BAND[1] * len(lines))
+    return slice(first, max(last, first + 1))
 
 
 def _finite(channel: Channel) -> tuple[FloatArray, FloatArray]:

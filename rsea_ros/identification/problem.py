@@ -19,6 +19,8 @@ from rsea_ros.model.simulation import simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import BoolArray, FloatArray, Record
 
+FEWEST = 64
+"""Samples of a channel: fewer show no spectrum, so no noise to weigh them by."""
 SETTLE = 0.3
 """s at the start of a record that no fit looks at: the bench may not have been at rest."""
 
@@ -61,11 +63,9 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     """
     if is_inverse(rig):
         return _inverse_case(record)
-    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
-    if not set(channels) - {"motor_torque"}:
-        raise IdentificationError(
-            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
-        )
+    channels = _channels_that_tell(record, rig)
+    beside = [n for n in record.channels if n not in OUTPUTS]
+    record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
     in_loop = rig.controller is not None and "reference" in record
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
     quanta = {n: rig.sensors[n].quantum if n in rig.sensors else 0.0 for n in channels}
@@ -84,12 +84,43 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     )
 
 
+def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
+    """Return the channels to be simulated: those of the rig that have samples enough and are not still.
+
+    A sensor that holds one value throughout is dead or unplugged: it has no noise to weigh it by.
+    Raises IdentificationError when none of them shows the motion.
+    """
+    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
+    if not set(channels) - {"motor_torque"}:
+        raise IdentificationError(
+            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+        )
+    start = float(record["command"].t[0]) + SETTLE
+    counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
+    alive = [n for n in channels if counts[n] >= FEWEST and not record[n].is_still]
+    if set(alive) - {"motor_torque"}:
+        return alive
+    have = "; ".join(
+        f"{n} {'holds one value' if record[n].is_still else f'has {counts[n]} samples'}" for n in channels
+    )
+    raise IdentificationError(
+        f"{record.source}: {have}; expected ft, position or velocity with motion in it and {FEWEST} samples "
+        f"or more later than {SETTLE:g} s after the first command"
+    )
+
+
 def _inverse_case(record: Record) -> Case:
     """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
 
     Noise: what the filter lets through of the white noise that the torque has at the top of its band.
     """
     motion, torque = motion_from(record), acted(record)
+    for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
+        if channel.is_still:
+            raise IdentificationError(
+                f"{record.source}: {name} holds one value, expected motion: "
+                "a rig without a spring is judged by what moves it"
+            )
     noise = residual_floor(torque.y) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     edges = (motion.t < motion.t[0] + SETTLE) | (motion.t > motion.t[-1] - SETTLE)
     return Case(

@@ -13,8 +13,11 @@ from rsea_ros.signals import ComplexArray, FloatArray, Record
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
-    """Return the measured responses of a record's sensors to the command."""
+    """Return the measured responses of a record's sensors to the command, of those that move."""
     outputs = [n for n in ("ft", "position") if n in record and not (n == "ft" and rig.rigid_spring)]
+    if record["command"].is_still:
+        return ()
+    outputs = [n for n in outputs if not record[n].is_still]
     return tuple(estimate_response(record, n) for n in outputs)
 
 

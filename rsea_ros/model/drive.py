@@ -13,6 +13,7 @@ from numba import njit
 from scipy.interpolate import CubicHermiteSpline
 
 from rsea_ros.errors import IdentificationError
+from rsea_ros.model.extent import check_extent
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import Channel, FloatArray, Record
 
@@ -87,6 +88,7 @@ def drive_from(
     step = period / hold
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
+    check_extent(record, start, stop)
     count = math.ceil((stop - start) / step - 1e-6)
     knots, torque = _in_steps(command.t, start, step), command.y
     if closed_loop:

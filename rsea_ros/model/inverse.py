@@ -20,6 +20,7 @@ from numba import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics, train_ratio
+from rsea_ros.model.extent import check_extent
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build
 from rsea_ros.model.step import call_port
@@ -30,6 +31,9 @@ CUT_OFF = 20.0
 
 FINE = 5e-4
 """s. Longest step of the grid on which motions are differentiated and torques held."""
+
+FEWEST = 64
+"""Samples of a position, from which the filter has settled somewhere in the middle."""
 
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
@@ -63,6 +67,11 @@ def motion_from(record: Record) -> Motion:
     from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
 
     position = record["position"]
+    if len(position) < FEWEST:
+        raise IdentificationError(
+            f"{record.source}: position has {len(position)} samples, expected at least {FEWEST}"
+        )
+    check_extent(record, float(position.t[0]), record.stop)
     period = 1.0 / position.rate
     finer = max(1, math.ceil(period / FINE))
     step = period / finer

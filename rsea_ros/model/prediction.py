@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
@@ -29,12 +31,16 @@ class Comparison:
 
     @property
     def rms_error(self) -> float:
-        """RMS of predicted - measured, in the channel's unit."""
+        """RMS of predicted - measured, in the channel's unit; NaN where no sample counts."""
+        if not self.counts.any():
+            return math.nan
         return float(np.sqrt(np.mean((self.predicted - self.measured)[self.counts] ** 2)))
 
     @property
     def fit_percent(self) -> float:
-        """100 (1 - ||e|| / ||y - mean y||), %."""
+        """100 (1 - ||e|| / ||y - mean y||), %; NaN where no sample counts."""
+        if not self.counts.any():
+            return math.nan
         y = self.measured[self.counts]
         scale = float(np.sqrt(np.mean((y - y.mean()) ** 2)))
         return 100.0 * (1.0 - self.rms_error / scale) if scale > 0.0 else 0.0
@@ -46,6 +52,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
     A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
     whose zero is unknown by its changes.
     """
+    record = bounded(record)
+    check_command(record)
     if is_inverse(rig):
         motion = motion_from(record)
         torque = inverse_torque(rig, motion)
@@ -56,6 +64,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
 
 
 def _on_measured_zero(c: Comparison) -> Comparison:
+    if not c.counts.any():
+        return c
     return replace(c, predicted=c.predicted + float(np.mean((c.measured - c.predicted)[c.counts])))
 
 

@@ -17,6 +17,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.loop import control
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
@@ -179,8 +180,21 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     asked = Record({"command": command, **{n: Channel(stamps, blank) for n in names}}, source=rig.name)
     rng = np.random.default_rng([seed, _SENSORS])
     true = simulate(rig, asked)
+    _check_bounded(rig, true)
     measured = {n: Channel(stamps, measure(rig, n, true[n], rng) if noise else true[n]) for n in names}
     return asked.with_channels(**measured)
+
+
+def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
+    """Raise RigError for a simulation that runs away: no sensor could measure it, no file should hold it."""
+    for name, y in true.items():
+        bad = ~(np.abs(y) <= LARGEST)
+        if bad.any():
+            k = int(np.argmax(bad))
+            raise RigError(
+                f"rig {rig.name}: its simulation runs away, {name} is {y[k]:g} at sample {k}, "
+                f"expected at most {LARGEST:g}: check the rig's values and effects"
+            )
 
 
 def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -189,7 +203,7 @@ def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator)
     if sensor is None:
         return value
     noisy = value + sensor.noise * rng.standard_normal(np.shape(value))
-    return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum else noisy
+    return np.round(noisy / sensor.quantum) * sensor.quantum if sensor.quantum > SMALLEST else noisy
 
 
 @dataclass(frozen=True)

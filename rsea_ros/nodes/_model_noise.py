@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.model.extent import LARGEST
 from rsea_ros.model.observer import Noise, noise_of
 from rsea_ros.model.rig import Rig
 
@@ -26,7 +27,7 @@ def noise_from(rig: Rig, path: str) -> Noise:
 def _document(path: str) -> Mapping[str, Any]:
     try:
         document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ParameterError(f"parameter identification = {path!r}: {error}") from None
     if not isinstance(document, dict):
         raise ParameterError(f"parameter identification = {path!r}, expected an identification.json")
@@ -37,4 +38,8 @@ def _numbers(document: Mapping[str, Any], name: str, path: str) -> dict[str, flo
     values = document.get(name)
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: {name} = {values!r}, expected numbers by channel")
-    return {channel: float(v) for channel, v in values.items() if isinstance(v, (int, float))}
+    numbers = {channel: v for channel, v in values.items() if isinstance(v, (int, float))}
+    for channel, value in numbers.items():
+        if not 0 <= value <= LARGEST:
+            raise ParameterError(f"{path}: {name}.{channel} = {str(value)[:40]}, expected 0 to {LARGEST:g}")
+    return {channel: float(value) for channel, value in numbers.items()}

@@ -47,7 +47,7 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
         "margins": {n: {k: _finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
         "friction_left": at.design.friction_left,
         "trials": [
-            {"what": t.what, "value": t.value, "unit": t.unit, "asked": t.asked, "met": t.met}
+            {"what": t.what, "value": _finite(t.value), "unit": t.unit, "asked": t.asked, "met": t.met}
             for t in at.trials
         ],
         "compensation": [

@@ -63,6 +63,15 @@ def numbers(values: Mapping[str, float | None]) -> dict[str, float | None]:
     return {name: None if value is None else finite(value) for name, value in values.items()}
 
 
+def strict(value: Any) -> Any:
+    """Return what JSON can hold: None for each number that is infinite or NaN, however deep."""
+    if isinstance(value, Mapping):
+        return {key: strict(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [strict(item) for item in value]
+    return finite(value) if isinstance(value, float) else value
+
+
 def finite(value: float) -> float | None:
     """Return a number as JSON can hold it: None when it is infinite or NaN."""
     return float(value) if math.isfinite(value) else None

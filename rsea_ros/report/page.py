@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rsea_ros.errors import RseaError
 from rsea_ros.report.figure import Figure
+from rsea_ros.report.identification_json import strict
 
 _HERE = Path(__file__).parent
 
@@ -80,9 +81,9 @@ def _block(block: Block, index: int) -> str:
     if isinstance(block, str):
         return block
     name = f"figure-{index}"
-    values = json.dumps(asdict(block), allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace(
-        "</", "<\\/"
-    )
+    values = json.dumps(
+        strict(asdict(block)), allow_nan=False, ensure_ascii=False, separators=(",", ":")
+    ).replace("</", "<\\/")
     drawing = (
         f'<div class="figure" id="{name}" style="height:{block.height}px" role="img" '
         f'aria-label="{escape(block.title)}"></div>'

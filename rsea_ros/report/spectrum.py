@@ -15,6 +15,7 @@ from rsea_ros.signals import UNITS, FloatArray
 _PER_DECADE = 40
 _LONGEST = 4096
 _ABOVE = 2.0
+_TINY = 1e-300
 _LABEL = 0.06
 """Height of a label, of the figure's."""
 
@@ -79,7 +80,7 @@ def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
 def finding(frequency: FloatArray, values: FloatArray, noise: float, what: str) -> str:
     """Return the sentence: at the noise floor, or where above it the most."""
     f, d = in_bands(frequency, values)
-    ratio = d / noise
+    ratio = d / max(noise, _TINY)
     worst = int(np.argmax(ratio))
     if ratio[worst] < _ABOVE:
         return words.sentence(f"{what}: the residual lies at the noise floor at all frequencies")
@@ -89,9 +90,14 @@ def finding(frequency: FloatArray, values: FloatArray, noise: float, what: str) 
     return words.sentence(f"{what}: the residual stands above the noise floor from {band}, most at {most}")
 
 
+def _exponent(value: float) -> float:
+    """Return the decimal logarithm of a density; a residual that is exactly zero has a low one."""
+    return float(np.log10(max(float(value), _TINY)))
+
+
 def _range(values: Sequence[FloatArray]) -> list[float]:
     """Return the exponents between which the values lie, two decades at least."""
-    exponents = np.log10(np.maximum(np.concatenate(values), 1e-300))
+    exponents = np.log10(np.maximum(np.concatenate(values), _TINY))
     low, high = float(exponents.min()), float(exponents.max())
     lacking = max(0.0, 2.0 - (high - low)) / 2.0
     return [low - lacking - 0.1, high + lacking + 0.3]
@@ -100,7 +106,7 @@ def _range(values: Sequence[FloatArray]) -> list[float]:
 def _at_peak(curve: Curve, frequency: FloatArray, values: FloatArray) -> Json:
     """Return the label of the highest curve, above its peak; lower ones have theirs at their right end."""
     k = int(np.argmax(values))
-    x, y = float(np.log10(frequency[k])), float(np.log10(values[k]))
+    x, y = float(np.log10(frequency[k])), _exponent(values[k])
     return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor="center", yanchor="bottom", yshift=4)
 
 
@@ -110,7 +116,7 @@ def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:
     order = sorted(items, key=lambda item: item[2])
     lowest = -np.inf
     for text, colour, value in order:
-        height = max(float(np.log10(value)), lowest)
+        height = max(_exponent(value), lowest)
         lowest = height + gap
         placed.append(label(text, 1.01, height, colour, xref="paper", yref="y"))
     return placed

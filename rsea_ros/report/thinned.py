@@ -10,13 +10,15 @@ from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.signals import ComplexArray, FloatArray
 
 _PER_DECADE = 50
+_SMALLEST = 1e-100
+"""Standard deviation whose inverse square is still a number."""
 
 
 def thinned(
     measured: FrequencyResponse, model: ComplexArray | None
 ) -> tuple[FrequencyResponse, ComplexArray | None]:
     """Return measurement and model averaged in the same bands, weighted by 1/sd²."""
-    weight = 1.0 / np.maximum(measured.sd, 1e-9 * np.abs(measured.response).max()) ** 2
+    weight = 1.0 / np.maximum(measured.sd, max(1e-9 * np.abs(measured.response).max(), _SMALLEST)) ** 2
     bands = np.floor(np.log10(measured.frequency) * _PER_DECADE)
     starts = np.flatnonzero(np.diff(bands, prepend=-np.inf))
     total = np.add.reduceat(weight, starts)

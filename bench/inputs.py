@@ -1,0 +1,147 @@
+"""Bad and unusual inputs: what a bench or a recorder may bring, through the command line, with ceilings.
+
+    python bench/inputs.py                    all parts, a table
+    python bench/inputs.py --quick            a few minutes of them
+    python bench/inputs.py --part matrix --only "verb=diagnose"
+
+matrix: every rig, verb and subset of channels, pairwise rates, lengths, commands, clocks and dead sensors.
+mutations: damaged files of every format that is read. The promise: a result, or status 2 and one line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import rsea_ros  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+
+# isort: split
+import inputs_matrix as matrix
+import inputs_mutations as mutations
+from inputs_outcome import FAULTS, REFUSED, RESULT, Outcome
+from inputs_server import Work, serve, warm
+
+PARTS = ("matrix", "mutations")
+
+
+def main() -> int:
+    """Play what is asked for and print the table; status 1 when a promise was broken."""
+    args = _arguments()
+    folder = Path(tempfile.mkdtemp(prefix="rsea-inputs-"))
+    warm()
+    broken = 0
+    try:
+        if "matrix" in args.part:
+            cases, said = matrix.bag_cases(args.seed, args.quick)
+            broken += play("bags", matrix.works(cases, matrix.play_bag, "b"), args, folder, said)
+            others = matrix.other_cases(args.seed, args.quick)
+            broken += play("rigs and numbers", matrix.works(others, matrix.play_other, "r"), args, folder, "")
+        if "mutations" in args.part:
+            count = 300 if args.quick else args.count
+            broken += damage(args, count, folder)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return 1 if broken else 0
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="a small part of each")
+    parser.add_argument("--part", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--jobs", type=int, default=2, help="children at a time (default %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="of design and mutations (default %(default)s)")
+    parser.add_argument("--count", type=int, default=6000, help="of mutated files (default %(default)s)")
+    parser.add_argument("--only", nargs="+", default=[], metavar="TEXT", help="lines that hold all of these")
+    parser.add_argument("--log", type=Path, help="JSON lines: every case with its outcome")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="copy mutated files that broke a promise")
+    parser.add_argument("--verbose", action="store_true", help="what went wrong in full")
+    return parser.parse_args()
+
+
+def play(title: str, work: Iterable[Work], args: argparse.Namespace, folder: Path, said: str) -> int:
+    """Play the cases of a part, print its table, and return how many broke the promise."""
+    chosen = [w for w in work if all(text in w[0] for text in args.only)]
+    if not chosen:
+        return 0
+    inside = folder / title.replace(" ", "_")
+    inside.mkdir()
+    began, outcomes = time.monotonic(), []
+    for number, (name, outcome) in enumerate(serve(chosen, inside, args.jobs)):
+        outcomes.append((name, outcome))
+        _log(args.log, outcomes[-1:])
+        if sys.stderr.isatty():
+            print(f"\r{title}: {number + 1} of {len(chosen)}", end="", file=sys.stderr)
+    if sys.stderr.isatty():
+        print("\r\033[K", end="", file=sys.stderr)
+    print(f"\n{title}: {len(outcomes)} in {time.monotonic() - began:.0f} s" + (f" ({said})" if said else ""))
+    return table(outcomes, args.verbose)
+
+
+def damage(args: argparse.Namespace, count: int, folder: Path) -> int:
+    """Read mutated files, print each format and the table; return how many broke the promise."""
+    began, outcomes = time.monotonic(), []
+    for name, outcome in mutations.run(args.seed, count, folder, args.jobs, args.only):
+        outcomes.append((name, outcome))
+        _log(args.log, outcomes[-1:])
+        if args.keep is not None and outcome.is_fault:
+            _keep(args.keep, name)
+    if not outcomes:
+        return 0
+    print(f"\nmutated files: {len(outcomes)} in {time.monotonic() - began:.0f} s")
+    kinds = Counter((name.split()[0], outcome.kind) for name, outcome in outcomes)
+    for form in dict.fromkeys(form for form, _ in kinds):
+        total = sum(n for (f, _), n in kinds.items() if f == form)
+        faults = sum(n for (f, kind), n in kinds.items() if f == form and kind in FAULTS)
+        print(
+            f"  {form:<12} {total:6d} files, {kinds[form, REFUSED]:6d} refused, {faults:4d} broken promises"
+        )
+    return table(outcomes, args.verbose)
+
+
+def _keep(folder: Path, name: str) -> None:
+    """Copy the file that broke a promise."""
+    source = Path(name.partition("(")[2].rstrip(")"))
+    folder.mkdir(parents=True, exist_ok=True)
+    if source.exists():
+        shutil.copy(source, folder / "-".join(name.split()[:3]))
+
+
+def _log(path: Path | None, outcomes: list[tuple[str, Outcome]]) -> None:
+    if path is not None:
+        with path.open("a", encoding="utf-8") as file:
+            for name, outcome in outcomes:
+                file.write(json.dumps({"case": name, **vars(outcome)}) + "\n")
+
+
+def table(outcomes: list[tuple[str, Outcome]], verbose: bool) -> int:
+    """Print how many there are of each kind, then each broken promise once, with a case that shows it."""
+    kinds = Counter(outcome.kind for _, outcome in outcomes)
+    for kind in (RESULT, REFUSED, *FAULTS):
+        print(f"  {kind:<12} {kinds[kind]:6d}")
+    slowest = max(outcomes, key=lambda item: item[1].seconds)
+    largest = max(outcomes, key=lambda item: item[1].megabytes)
+    print(f"  longest {slowest[1].seconds:.1f} s of processor: {slowest[0]}")
+    print(f"  largest {largest[1].megabytes:.0f} MB: {largest[0]}")
+    broken = [(name, outcome) for name, outcome in outcomes if outcome.is_fault]
+    places = Counter((outcome.kind, outcome.where) for _, outcome in broken)
+    for (kind, where), count in places.most_common():
+        name, example = next((n, o) for n, o in broken if (o.kind, o.where) == (kind, where))
+        print(f"  {count:4d} × {kind}: {where}\n         {name}")
+        if verbose:
+            print("         " + example.detail.replace("\n", "\n         "))
+    return len(broken)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

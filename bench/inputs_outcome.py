@@ -1,0 +1,217 @@
+"""One call of `main()` in a forked child with ceilings of memory and time, and what came of it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import resource
+import signal
+import sys
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+MEMORY = 1_500 * 1024**2
+"""Bytes of private writable memory (RLIMIT_DATA): address space alone says nothing with compiled code."""
+SPARE = 256 * 1024**2
+SECONDS = 60
+"""s of processor time, all threads together: a busy machine does not change it."""
+LAST_NET = "this is a fault of rsea"
+RESULT, REFUSED = "result", "refused"
+TOLERATED = (0, 1)
+"""Exit statuses of a result: done, and a finding that was asked for by status."""
+FAULTS = ("traceback", "warning", "time-out", "memory", "crash", "last net", "message", "json", "gate")
+
+
+@dataclass
+class Outcome:
+    """kind: result, refused, or one of FAULTS. where: the place in the code, or the message's pattern."""
+
+    kind: str
+    where: str = ""
+    detail: str = ""
+    seconds: float = 0.0
+    megabytes: float = 0.0
+    warned: list[str] = field(default_factory=list)
+
+    @property
+    def is_fault(self) -> bool:
+        """Whether the promise was broken."""
+        return self.kind in FAULTS
+
+
+def limit_child(seconds: int = SECONDS) -> None:
+    """Put the ceilings on this process, counted from now."""
+    limit_seconds(seconds)
+    limit_memory()
+
+
+def limit_seconds(seconds: int) -> None:
+    """Let this process end after so many seconds of processor from now."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    cpu = int(used.ru_utime + used.ru_stime) + seconds
+    resource.setrlimit(resource.RLIMIT_CPU, (cpu, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def limit_memory() -> None:
+    """Put the ceiling of memory on this process, or back on it."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY + SPARE))
+
+
+def more_memory() -> None:
+    """Let this process write down that its memory was used up."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY + SPARE, MEMORY + SPARE))
+
+
+def call(arguments: list[str]) -> Outcome:
+    """Run `rsea ARGUMENTS` in this process and judge status and output."""
+    from rsea_ros.cli.main import main
+
+    warned: list[str] = []
+
+    def note(message, category, filename, lineno, file=None, line=None):  # type: ignore[no-untyped-def]
+        if issubclass(category, RuntimeWarning):
+            warned.append(f"{_short(filename)}:{lineno} {message}")
+
+    with warnings.catch_warnings(), captured() as (out, err):
+        warnings.simplefilter("always")
+        warnings.showwarning = note
+        try:
+            status: int | str | None = main(arguments)
+        except SystemExit as error:
+            status = error.code
+        except MemoryError as error:
+            more_memory()
+            return Outcome("memory", place(error), repr(error)[:300])
+        except BaseException as error:
+            return Outcome("traceback", place(error), "".join(traceback.format_exception(error))[-3000:])
+    outcome = judge(status, read(out), read(err), "--json" in arguments)
+    outcome.warned = sorted(set(warned))
+    if warned and not outcome.is_fault:
+        outcome.kind, outcome.where = "warning", outcome.warned[0]
+    return outcome
+
+
+@contextlib.contextmanager
+def captured() -> Iterator[tuple[int, int]]:
+    """Point stdout and stderr to files, libraries that are no Python included; give their descriptors."""
+    kept, files = [os.dup(1), os.dup(2)], [os.memfd_create("out"), os.memfd_create("err")]
+    sys.stdout.flush()
+    sys.stderr.flush()
+    for number, file in zip((1, 2), files, strict=True):
+        os.dup2(file, number)
+    streams = [open(n, "w", encoding="utf-8", closefd=False) for n in (1, 2)]  # noqa: SIM115
+    with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
+        try:
+            yield files[0], files[1]
+        finally:
+            for number, stream, old in zip((1, 2), streams, kept, strict=True):
+                stream.flush()
+                os.dup2(old, number)
+                os.close(old)
+
+
+def read(file: int) -> str:
+    """Return what a captured stream holds."""
+    os.lseek(file, 0, os.SEEK_SET)
+    with open(file, encoding="utf-8", errors="replace") as stream:
+        return stream.read()
+
+
+def judge(status: int | str | None, out: str, err: str, is_json: bool) -> Outcome:
+    """Hold status and output to the promise: a result, or status 2 and one line that says what is wrong."""
+    lines = err.strip().splitlines()
+    last = lines[-1] if lines else ""
+    if LAST_NET in err:
+        return Outcome("last net", _pattern(last), err[-3000:])
+    if "Traceback" in err:
+        return Outcome("traceback", last, err[-3000:])
+    if status in TOLERATED:
+        return _result(out, err, is_json)
+    if status != 2:
+        return Outcome("message", f"status {status}", err[-300:])
+    message = last.partition(": ")[2].strip()
+    if not message or not last.startswith("rsea") or (len(lines) > 1 and not err.startswith("usage:")):
+        return Outcome("message", "not one line that says what is wrong", err[-600:])
+    return Outcome(REFUSED, "", last)
+
+
+def _result(out: str, err: str, is_json: bool) -> Outcome:
+    if is_json:
+        try:
+            json.loads(out, parse_constant=_no_constant)
+        except ValueError as error:
+            return Outcome("json", str(error), out[-300:])
+    if err.strip():
+        return Outcome("warning", f"on stderr: {_pattern(err.strip().splitlines()[0])}", err[-600:])
+    return Outcome(RESULT, "", (out.strip().splitlines() or [""])[0])
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is no JSON")
+
+
+def place(error: BaseException) -> str:
+    """Return type, the innermost line of the project, and the text, for counting equal ones together."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if "bench" not in f.filename]
+    inside = [f for f in frames if "rsea_ros" in f.filename or "msg_adapters" in f.filename]
+    at = f"{_short(inside[-1].filename)}:{inside[-1].lineno} {inside[-1].name}" if inside else "?"
+    return f"{type(error).__name__} at {at}: {_pattern(str(error)[:80])}"
+
+
+def _short(filename: str) -> str:
+    return "/".join(Path(filename).parts[-2:])
+
+
+def _pattern(message: str) -> str:
+    return re.sub(r"\b[0-9][0-9a-fx.e+-]*|'[^']*'", "#", message)[:160]
+
+
+def forked(work: Callable[[], Outcome], answer: Path) -> int:
+    """Start a child that writes the outcome of `work` to a file; return its process id."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    pid = os.fork()
+    if pid:
+        return pid
+    status = 70
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        outcome = work()
+        answer.write_text(json.dumps(asdict(outcome)), encoding="utf-8")
+        status = 0
+    except BaseException:
+        with contextlib.suppress(BaseException):
+            text = traceback.format_exc()
+            answer.write_text(json.dumps(asdict(Outcome("gate", text.splitlines()[-1], text[-3000:]))))
+            status = 0
+    finally:
+        os._exit(status)
+
+
+def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bool) -> Outcome:
+    """Return what a child that ended has left."""
+    if late:
+        return Outcome("time-out", "neither done nor at work")
+    if not answer.exists():
+        return ended(status, usage)
+    outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
+    outcome.seconds = usage.ru_utime + usage.ru_stime
+    outcome.megabytes = usage.ru_maxrss / 1024
+    return outcome
+
+
+def ended(status: int, usage: resource.struct_rusage) -> Outcome:
+    """Return what a child that ended without an answer came to."""
+    outcome = Outcome("crash", f"ended with status {os.waitstatus_to_exitcode(status)} without an answer")
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        kind = {signal.SIGXCPU: "time-out", signal.SIGKILL: "memory"}.get(number, "crash")
+        outcome = Outcome(kind, f"ended by {signal.Signals(number).name}")
+    outcome.seconds, outcome.megabytes = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return outcome

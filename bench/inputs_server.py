@@ -1,0 +1,73 @@
+"""A fork server: this process has imported everything and forks once for each piece of work."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import resource
+import shutil
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from inputs_outcome import Outcome, collected, forked
+
+WALL = 600.0
+"""s, after which a child that does not even compute is ended."""
+MODULES = (
+    "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
+    "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
+    "rsea_ros.cli.check", "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
+    "rsea_ros.report.results", "rsea_ros.report.diagnosis_files", "rsea_ros.report.diagnosis_terminal",
+    "rsea_ros.report.terminal", "rsea_ros.report.control_page", "rsea_ros.report.design_page",
+    "rsea_ros.control.study", "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records",
+    "msg_adapters.overlay", "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
+)  # fmt: skip
+
+Work = tuple[str, Callable[[Path], Outcome]]
+"""A name, and what to do in a folder of its own."""
+
+
+def warm() -> None:
+    """Import what the verbs import, so that no child pays for it; a verb that is missing is left out."""
+    for name in MODULES:
+        try:
+            importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name != name:
+                raise
+
+
+def serve(work: Iterable[Work], folder: Path, jobs: int, wall: float = WALL) -> Iterator[tuple[str, Outcome]]:
+    """Do the work in at most `jobs` children at a time; yield name and outcome as they end."""
+    running: dict[int, tuple[str, Path, float]] = {}
+    for number, (name, one) in enumerate(work):
+        while len(running) >= jobs:
+            yield from _ended(running, wall)
+        inside = folder / str(number)
+        inside.mkdir()
+        pid = forked(lambda one=one, inside=inside: one(inside), folder / f"{number}.json")
+        running[pid] = (name, folder / f"{number}.json", time.monotonic())
+    while running:
+        yield from _ended(running, wall)
+
+
+def _ended(running: dict[int, tuple[str, Path, float]], wall: float) -> Iterator[tuple[str, Outcome]]:
+    """Wait until at least one child ends, or a late one is ended."""
+    while True:
+        for pid, (name, answer, since) in list(running.items()):
+            late = time.monotonic() - since > wall
+            if late:
+                os.kill(pid, signal.SIGKILL)
+            done, status, usage = _waited(pid, block=late)
+            if done:
+                del running[pid]
+                shutil.rmtree(answer.with_suffix(""), ignore_errors=True)
+                yield name, collected(status, usage, answer, late)
+                return
+        time.sleep(0.01)
+
+
+def _waited(pid: int, block: bool) -> tuple[int, int, resource.struct_rusage]:
+    return os.wait4(pid, 0 if block else os.WNOHANG)

@@ -1,0 +1,68 @@
+"""How far a record may reach: in its values, and in time, where a grid lies over its stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rsea_ros.errors import IdentificationError
+from rsea_ros.signals import Channel, FloatArray, Record
+
+LARGEST = 1e30
+"""In any unit: a larger number is no measurement, and squares and sums of it overflow."""
+SMALLEST = 1e-30
+"""In any unit: smaller is no measurement either but zero; squares of it underflow."""
+LONGEST_PAUSE = 60.0
+"""s without samples that are simulated through, whatever the length of the record."""
+MOST_EMPTY = 2.0
+"""Of the time that the samples cover: a longer pause is cheaper to cut out than to simulate through."""
+
+
+def check_extent(record: Record, start: float, stop: float) -> None:
+    """Raise IdentificationError where a grid from start to stop (s) is far longer than a record's samples.
+
+    A clock that was set while it recorded, or a pause of hours, would ask for millions of empty steps.
+    """
+    covered = max(_covered(c.t) for c in record.channels.values())
+    if stop - start <= LONGEST_PAUSE + (1.0 + MOST_EMPTY) * covered:
+        return
+    pauses = [(n, int(np.argmax(np.diff(c.t))), c.t) for n, c in record.channels.items() if len(c) > 1]
+    name, k, t = max(pauses, key=lambda p: float(np.max(np.diff(p[2]))))
+    pause = f", {name} pauses for {t[k + 1] - t[k]:.4g} s after {t[k]:.4g} s"
+    raise IdentificationError(
+        f"{record.source}: {covered:.4g} s of samples within {stop - start:.4g} s"
+        f"{pause if t[k + 1] - t[k] > 0.2 * (stop - start) else ', not all channels at the same time'}: "
+        "did the clock jump? Cut the bag there, or record again with one clock for all topics"
+    )
+
+
+def _covered(t: FloatArray) -> float:
+    """Return how long samples last with their median interval, s."""
+    return len(t) * float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+
+
+def bounded(record: Record) -> Record:
+    """Return the record with NaN for what is beyond LARGEST, and zero for what is below SMALLEST."""
+    return record.with_channels(**{n: _bounded(c) for n, c in record.channels.items()})
+
+
+def _bounded(channel: Channel) -> Channel:
+    size = np.abs(channel.y)
+    good = (size <= LARGEST) & ((size >= SMALLEST) | (size == 0.0))
+    if good.all():
+        return channel
+    return Channel(channel.t, np.where(good, channel.y, np.where(size < SMALLEST, 0.0, np.nan)))
+
+
+def check_command(record: Record) -> None:
+    """Raise IdentificationError for a command that no simulation can be driven with: NaN, or not rising."""
+    command = record["command"]
+    bad = ~np.isfinite(command.y)
+    back = np.diff(command.t, prepend=-np.inf) <= 0.0
+    for k in np.flatnonzero(bad | back)[:1]:
+        value = (
+            f"{command.y[k]} N m"
+            if bad[k]
+            else f"stamped {command.t[k]:.6g} s after {command.t[k - 1]:.6g} s"
+        )
+        expected = f"a number up to {LARGEST:g}" if bad[k] else "rising stamps"
+        raise IdentificationError(f"{record.source}: command[{k}] is {value}, expected {expected}")

@@ -1,0 +1,196 @@
+"""Bad and unusual benches and bags: a result, or one line and status 2. The full gate is bench/inputs.py."""
+
+from __future__ import annotations
+
+import json
+import random
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_ros.cli.main import main
+from rsea_ros.diagnosis.hints import Seen, starts_of
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.errors import IdentificationError, RigError
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.problem import case_from
+from rsea_ros.model.extent import bounded, check_extent
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel, Record
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
+
+from inputs_bags import bag_of, record_of
+from inputs_cover import covering, pairs
+from inputs_outcome import judge
+
+BENCH = {
+    "rig": "paper_high_impedance", "channels": ("ft", "position"), "sensors": "stated", "noise": True,
+    "bench": "as stated", "rate": 280.0, "states": 1.0, "duration": 6.0, "command": "white_noise",
+    "stamps": "even", "dead": "none", "loop": False, "epoch": 1_700_000_000_000_000_000,
+}  # fmt: skip
+
+
+def record(**changes: object) -> Record:
+    case = {**BENCH, **changes}
+    return record_of(case, load_rig(case["rig"]))
+
+
+@pytest.fixture
+def played(tmp_path, capsys):
+    """Return a function that plays a verb on a bag: status, stdout, and the line on stderr."""
+
+    def play(verb, *options, **changes):
+        bag, rig = bag_of({**BENCH, **changes}, tmp_path)
+        out = tmp_path / ("out.csv" if verb == "predict" else "out")
+        where = [str(rig), str(bag)] if verb == "predict" else [str(bag), "--rig", str(rig)]
+        status = main([verb, *where, "--out", str(out), *options])
+        printed, said = capsys.readouterr()
+        if status == 0 and verb != "predict":
+            assert (out / "report.html").exists()
+        assert status == 0 or (status == 2 and said.count("\n") == 1), said
+        return status, printed, said
+
+    return play
+
+
+RESULTS = {
+    "a misfitting spring rig without motor torque": ("diagnose", {"bench": "misfit", "duration": 5.0}),
+    "a dead F/T sensor": ("identify", {"dead": "ft zero"}),
+    "a dead encoder": ("identify", {"dead": "position zero"}),
+    "channels without noise": ("identify", {"noise": False, "sensors": "zero"}),
+    "a zero command": ("identify", {"command": "zero"}),
+    "one sample a second": ("diagnose", {"rate": 1.0, "duration": 80.0, "sensors": "zero"}),
+    "velocity alone": ("diagnose", {"channels": ("velocity",)}),
+    "a sample of 1e308": ("predict", {"dead": "1e308"}),
+    "too few samples to compare": ("predict", {"dead": "few"}),
+    "a sensor of 1e-300": ("identify", {"channels": ("position", "velocity"), "sensors": "left out",
+                                        "dead": "velocity zero"}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_what_gives_a_result(played, name):
+    verb, changes = RESULTS[name]
+    status, printed, said = played(verb, "--json", **changes)
+    assert status == 0, said
+    json.loads(printed, parse_constant=pytest.fail)
+
+
+REFUSALS = {
+    "a sample of 1e308": ("identify", {"dead": "1e308"}, "expected a finite value up to 1e+30"),
+    "a dead bench": ("identify", {"dead": "all still"}, "holds one value"),
+    "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
+    "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
+    "a clock that was set": ("identify", {"stamps": "hour forward"}, "did the clock jump?"),
+    "a clock that was set by a year": ("predict", {"stamps": "year forward"}, "did the clock jump?"),
+    "sensors of another day": ("diagnose", {"stamps": "apart"}, "did the clock jump?"),
+    "a drive without a spring, its clock set": (
+        "identify", {"rig": "bare_drive", "stamps": "hour forward"}, "did the clock jump?"
+    ),
+    "a still drive": ("identify", {"rig": "bare_drive", "dead": "all zero"}, "holds one value"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_what_is_refused_in_one_line(played, name):
+    verb, changes, words = REFUSALS[name]
+    status, printed, said = played(verb, **changes)
+    assert (status, printed) == (2, "")
+    assert words in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--duration", "0.001", "--excitation", "steps"], "expected 10 to 2e+07 samples"),
+        (["--duration", "1e9"], "expected 10 to 2e+07 samples"),
+        (["--duration", "0.05", "--low", "5", "--high", "6"], "expected a longer duration or a wider band"),
+    ],
+)
+def test_commands_that_cannot_be_made(tmp_path, capsys, arguments, words):
+    assert main(["simulate", "paper_high_impedance", "--out", str(tmp_path / "bag"), *arguments]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_rig_without_noise_is_controlled(tmp_path):
+    from rsea_ros.control.trials import Trial, restlessness
+
+    value = restlessness(load_rig("cycloidal"), design=None)
+    assert np.isnan(value)
+    assert Trial("held", value, "1", 1.1).met is None
+
+
+def test_a_simulation_that_runs_away_is_refused():
+    rig = load_rig("paper_high_impedance").with_effects(EffectSetting("ft_bias", {"bias": 1e300}))
+    with pytest.raises(RigError, match=r"its simulation runs away, ft is 1e\+300 at sample 0"):
+        synthesize(rig, Channel(np.arange(100) / 280.0, np.ones(100)))
+
+
+def test_a_limit_is_guessed_without_a_motor_torque():
+    case = case_from(record(), load_rig("paper_high_impedance"))
+    seen = Seen(case, load_rig("paper_high_impedance"), dict(case.measured))
+    limits = [start["limit"] for start in starts_of(effect_named("torque_saturation"), seen)]
+    assert len(limits) == 4 and min(limits) > 0.0
+
+
+def test_a_channel_without_a_sample_that_counts_is_left_out():
+    whole = record()
+    late = Record({**whole.channels, "velocity": Channel(whole["ft"].t[:5], whole["ft"].y[:5])})
+    assert set(case_from(late, load_rig("paper_high_impedance")).measured) == {"ft", "position"}
+
+
+def test_numbers_beyond_any_measurement():
+    y = np.array([1.0, 1e31, -1e300, 1e-31, -5e-324, 0.0, np.inf])
+    channel = bounded(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
+    assert np.array_equal(channel.y, [1.0, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan], equal_nan=True)
+
+
+def test_a_grid_over_a_pause_is_bounded_by_the_samples():
+    t = np.concatenate([np.arange(1000) * 0.01, 400.0 + np.arange(1000) * 0.01])
+    paused = Record({"command": Channel(t, np.zeros(2000)), "ft": Channel(t, np.zeros(2000))}, source="bag")
+    with pytest.raises(
+        IdentificationError, match=r"bag: 20 s of samples within 410 s, command pauses for 390"
+    ):
+        check_extent(paused, 0.0, 410.0)
+    check_extent(paused, 0.0, 100.0)
+
+
+def test_nothing_is_warned_of_while_a_still_command_is_identified():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = identify([record(command="constant")], load_rig("paper_high_impedance"))
+    assert result.responses == ()
+
+
+@pytest.mark.parametrize(
+    ("status", "out", "err", "kind"),
+    [
+        (0, "{}", "", "result"),
+        (1, "{}", "", "result"),
+        (2, "", "rsea identify: bag: no such bag\n", "refused"),
+        (2, "", "rsea identify: \n", "message"),
+        (2, "", "", "message"),
+        (2, "", "first\nrsea identify: second\n", "message"),
+        (2, "", "rsea identify: KeyError, this is a fault of rsea\n", "last net"),
+        (0, "{}", "x.py:1: RuntimeWarning: invalid value\n", "warning"),
+        (0, '{"a": NaN}', "", "json"),
+        (1, "", "Traceback (most recent call last):\nKeyError: 1\n", "traceback"),
+        (130, "", "rsea: interrupted\n", "message"),
+    ],
+)
+def test_the_gate_tells_a_kept_promise_from_a_broken_one(status, out, err, kind):
+    assert judge(status, out, err, is_json=status in (0, 1)).kind == kind
+
+
+def test_the_covering_design_holds_every_pair():
+    factors = {"a": [1, 2, 3], "b": ["x", "y"], "c": [True, False], "d": [0.1, 0.2, 0.3, 0.4]}
+    cases, count = covering(factors, random.Random(0), must=[{"a": 1, "d": 0.4}])
+    covered = set().union(*(pairs(case, list(factors)) for case in cases))
+    assert len(covered) == count == 3 * 2 + 3 * 2 + 3 * 4 + 2 * 2 + 2 * 4 + 2 * 4
+    assert len(cases) < 3 * 2 * 2 * 4
