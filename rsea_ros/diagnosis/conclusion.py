@@ -62,6 +62,7 @@ def conclusion(
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)
+    baseline = parameters_of(first.solution, first.confidence)
     return Diagnosis(
         verdict=verdict,
         sentence=verdict_sentence(
@@ -72,9 +73,9 @@ def conclusion(
         duration=sum(r.stop - r.start for r in records),
         rate=records[0]["command"].rate,
         faults=faults,
-        baseline_rig=identified_rig(first.solution, first.confidence),
-        baseline=parameters_of(first.solution, first.confidence),
-        extended_rig=identified_rig(last.solution, last.confidence),
+        baseline_rig=identified_rig(first.solution, baseline),
+        baseline=baseline,
+        extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.judged, case),
         fit_percent=_fit(first, found.cases),

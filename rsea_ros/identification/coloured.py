@@ -1,4 +1,4 @@
-"""Is what a model leaves of a channel noise of its sensor, coloured or not, or something that the model lacks?
+"""Is what a model leaves of a channel noise of its sensor, coloured or not, or something that it lacks?
 
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
 resolves; whitened, it is nearly Gaussian; and it knows nothing of the command, of the motion, or of what
@@ -84,7 +84,7 @@ def _slow(values: FloatArray, rate: float) -> float:
 
 
 def _unsteady(spectra: ComplexArray, shape: Shape, rate: float) -> float:
-    """Return the variance of the whitened power over time, over that of stationary noise, in the worst band."""
+    """Return the variance of the whitened power over time, over stationary noise's, in the worst band."""
     power = np.abs(spectra) ** 2 / shape.at(np.linspace(0.0, 1.0, spectra.shape[1]))
     ratios = [0.0]
     for inside in _bands(_lines(spectra, rate), _STEADY_BANDS):

@@ -2,7 +2,8 @@
 
 The covariance is the sandwich H^-1 (sum_b g_b g_b' + W^2) H^-1 with H = J'J + W^2, W the inverse prior
 doubts, and g_b = J_b' r_b the scores of blocks of one second: right also where the residual is coloured or
-larger than the noise (White, Econometrica 48, 1980; Newey and West 1987). Never less than H^-1.
+larger than the noise (White, Econometrica 48, 1980; Newey and West 1987), times n / (n - p) for n blocks and
+p unknowns (MacKinnon and White, J. Econometrics 29, 1985). Never less than H^-1.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from rsea_ros.wording import listed
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
+_MOST_CORRECTED = 4.0
+"""Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
 _Z95 = 1.959964
 _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
@@ -87,7 +90,9 @@ def _block_scores(solution: Solution) -> FloatArray:
     scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
     for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
         column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
-    result: FloatArray = scores.T @ scores
+    counted = len(np.unique(blocks))
+    free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
+    result: FloatArray = scores.T @ scores * (counted / free)
     return result
 
 

@@ -58,7 +58,7 @@ def least_noise(values: FloatArray, sensor: Sensor) -> float:
 
 
 def top_of_band(values: FloatArray) -> tuple[float, bool]:
-    """Return the RMS of white noise with the level of values at the top of their band, and if that is flat."""
+    """Return the RMS of white noise as high as the top of the band of values, and whether that is flat."""
     power = np.mean(np.abs(segment_spectra(values, _LONGEST, _SEGMENTS)) ** 2, axis=0)
     return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
 

@@ -53,17 +53,17 @@ class Shape:
     def whitened(self, values: FloatArray) -> FloatArray:
         """Return values divided by the shape's amplitude at every frequency."""
         spectrum = rfft(values)
-        return irfft(spectrum / np.sqrt(self.at(np.linspace(0.0, 1.0, len(spectrum)))), len(values))
+        gain = 1.0 / np.sqrt(self.at(np.linspace(0.0, 1.0, len(spectrum))))
+        white: FloatArray = irfft(spectrum * gain, len(values))
+        return white
 
 
 def shape_of(spectra: ComplexArray) -> Shape:
-    """Return the falling spectrum that comes nearest to the mean of some segments' in bands of equal ratio."""
+    """Return the falling spectrum nearest to the mean of some segments', in bands of equal ratio."""
     lines = spectra.shape[1]
     edges = np.unique(np.append(1, np.round(np.geomspace(2, _TOP * lines, _BANDS)).astype(np.int64)))
     mean, count = np.mean(np.abs(spectra) ** 2, axis=0), np.diff(edges)
-    measured = np.maximum(np.add.reduceat(mean, edges[:-1])[: len(count)], 1e-300)
-    measured[-1] = mean[edges[-2] : edges[-1]].sum()
-    measured = np.maximum(measured / count, 1e-300)
+    measured = np.maximum(np.add.reduceat(mean[: edges[-1]], edges[:-1]) / count, 1e-300)
     freedom = 1.8 * count * len(spectra) / OVERLAP / np.where(count > 2, HANN, 1.0)
     level = falling(measured, freedom)
     off = float(np.max(np.abs(np.log(measured / level)) * np.sqrt(freedom / 2.0)))
