@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Verdict
@@ -36,7 +37,8 @@ def verdict_sentence(
             f"is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "unexplained":
-        return f"The {name} residual is {before:.1f} times the noise; no known effect explains it.{data}"
+        size = f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else f"{before:.1f}"
+        return f"The {name} residual is {size} times the noise; no known effect explains it.{data}"
     if verdict == "explained":
         return f"{named.capitalize()}: {fall} {after:.2f} times the noise, which is the floor.{data}"
     return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
@@ -57,6 +59,17 @@ def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
     return (
         f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
         "most of it is noise there, and what these data say of those frequencies is said by chance.",
+    )
+
+
+def coloured_noise(channels: Sequence[str]) -> tuple[str, ...]:
+    """Return what was taken for coloured noise of a sensor, and why, as sentences."""
+    if not channels:
+        return ()
+    return (
+        f"The noise of the {listed([_CHANNELS[n] for n in channels])} is coloured: its level was taken from "
+        "the residual, which is steady, falls with frequency, and agrees with neither command nor motion nor "
+        "another sensor.",
     )
 
 

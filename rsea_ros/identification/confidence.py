@@ -13,9 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.signals import FloatArray, IntArray
 from rsea_ros.wording import listed
@@ -73,9 +75,17 @@ def confidence_of(solution: Solution) -> Confidence:
         information = solution.jacobian.T @ solution.jacobian
     inverse = np.linalg.pinv(information + prior, hermitian=True)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
-    larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(covariance), 1e-300)))
+    least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
+    least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
+    larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
     return Confidence(solution.theta, covariance, _told(information, doubt), information)
+
+
+def _alike(case: Case) -> float:
+    """Return how many samples of a case tell what one independent one would: a filter makes them alike."""
+    drive = case.drive
+    return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
 
 def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:

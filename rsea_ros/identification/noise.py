@@ -26,6 +26,8 @@ _LONGEST, _SEGMENTS = 512, 8
 _FEWEST = 64
 _SLOWER = 0.9
 """Of the command's rate: below it a channel is slower than the command."""
+_FILTERED = 0.1
+"""Of the noise that a rig states: less at the top of the band is a filter's work, not a better sensor's."""
 _ROUNDING = 1e-9
 """Of a channel's standard deviation: less than this is rounding, not noise."""
 
@@ -50,11 +52,13 @@ def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
 def least_noise(values: FloatArray, sensor: Sensor) -> float:
     """Return the least that a channel's noise is taken for: no model is asked for more.
 
-    Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those.
+    Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
+    tenth of the noise that the rig states: what looks better than that was filtered.
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
-    return max(0.5 * sensor.quantum, coarse, _ROUNDING * float(np.std(values)), _TINY)
+    stated = max(0.5 * sensor.quantum, _FILTERED * sensor.noise)
+    return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 
 def top_of_band(values: FloatArray) -> tuple[float, bool]:

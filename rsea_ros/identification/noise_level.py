@@ -14,6 +14,7 @@ import numpy as np
 from rsea_ros.identification.coloured import is_noise, residual_of
 from rsea_ros.identification.noise import top_of_band
 from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
 ABOVE = 1.04
@@ -34,7 +35,8 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     noise = dict(case.noise)
     for n in channels:
         white, is_white = top_of_band(left[n])
-        noise[n] = max(min(noise[n], white if is_white else rms[n]), case.least.get(n, 0.0))
+        seen = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
+        noise[n] = max(min(noise[n], seen), case.least.get(n, 0.0))
     above = [n for n in channels if rms[n] > ABOVE * noise[n]]
     if not above or not all(is_noise(case, outputs, n, ratio) for n in above):
         return replace(case, noise=noise, coloured=frozenset())

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.identification_page import identification_report, verdict
+from rsea_ros.report.identification_page import identification_report
+from rsea_ros.report.identification_words import verdict_sentence
 
 Browser = Callable[[str, Path], tuple[str, str]]
 FIGURES = 8
@@ -49,7 +50,10 @@ def test_text_of_others_is_escaped(identification: Identification) -> None:
 
 
 def test_verdict_names_the_channel_that_is_above_its_noise(identification: Identification) -> None:
-    assert verdict(identification) == "The fitted model explains the record down to the sensor noise"
+    assert re.fullmatch(
+        r"The model fits: .* (0|1)\.\d\d times the noise \(rig paper_high_impedance\)",
+        verdict_sentence(identification),
+    )
     poor = replace(identification, noise_rms={**identification.noise_rms, "ft": 0.01})
-    assert verdict(poor).startswith("The fitted model leaves 3.0 times the noise on the F/T torque")
-    assert "rsea diagnose runs/bench" in identification_report(poor)
+    assert verdict_sentence(poor).startswith("The model does not fit: F/T torque 3 times the noise (rig ")
+    assert "rsea diagnose runs/bench --rig paper_high_impedance" in identification_report(poor)
