@@ -12,7 +12,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
-from rsea_ros.identification.misfit import misfit_ratios, reweighted
+from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.responses import model_response, responses_of
@@ -65,8 +65,10 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
         report("confidence", 0.8)
-        others = alternatives(solution, cases, in_pool(pool)) if _misfits(solution, cases) else ()
-    result = _result(solution, records, cases, responses, others)
+        outputs = solution.problem.outputs(solution.theta)
+        misfits = max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
+        others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
+    result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
     return result
 
@@ -101,24 +103,24 @@ def fit(
     """
     problem = Problem(tuple(cases), rig, unknowns_of(rig, cases), CHANNELS)
     solution = solve(problem, _better_start(problem, start, run), run=run)
-    known = _with_its_noise(solution)
+    outputs = problem.outputs(solution.theta)
+    known = _with_noise_of(problem, outputs)
     if _changed(problem.cases, known):
-        problem = replace(problem, cases=known)
-        solution = solve(problem, solution.theta, run=run)
-        known = _with_its_noise(solution)
+        solution = solve(replace(problem, cases=known), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(solution.problem, outputs)
     for _ in range(_REWEIGHTINGS):
-        ratios = misfit_ratios(solution)
+        ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
             break
-        problem = replace(problem, cases=tuple(reweighted(c, ratios) for c in problem.cases))
-        solution = solve(problem, solution.theta, run=run)
+        heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
     return solution, known
 
 
-def _with_its_noise(solution: Solution) -> tuple[Case, ...]:
-    """Return the cases with the noise that a solution's residual shows."""
-    problem = solution.problem
-    outputs = problem.outputs(solution.theta)
+def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
+    """Return the cases with the noise that the residual of simulated outputs shows."""
     ratio = problem.rig["gear.ratio"]
     return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
 
@@ -127,12 +129,6 @@ def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
     """Tell whether the noise of any channel has changed by more than a fit would notice."""
     ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
     return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
-
-
-def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
-    """Tell whether a channel of any case is left above its noise. cases: with their own noise."""
-    problem = replace(solution.problem, cases=tuple(cases))
-    return max(misfit_ratios(replace(solution, problem=problem)).values()) > AT_NOISE
 
 
 def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
@@ -159,6 +155,7 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
 
 def _result(
     solution: Solution,
+    outputs: Sequence[dict[str, FloatArray]],
     records: Sequence[Record],
     cases: Sequence[Case],
     responses: tuple[FrequencyResponse, ...],
@@ -167,7 +164,6 @@ def _result(
     """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
     confidence = confidence_of(solution)
-    outputs = problem.outputs(solution.theta)
     errors = errors_by_channel(problem, outputs)
     parameters = tuple(
         replace(p, ci95=spanned(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)
