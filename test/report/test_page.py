@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.report.identification_page import identification_report
-from rsea_ros.report.identification_words import verdict_sentence
+from rsea_ros.report.identification_words import next_command, verdict_sentence
 
 Browser = Callable[[str, Path], tuple[str, str]]
 FIGURES = 8
@@ -56,4 +57,5 @@ def test_verdict_names_the_channel_that_is_above_its_noise(identification: Ident
     )
     poor = replace(identification, noise_rms={**identification.noise_rms, "ft": 0.01})
     assert verdict_sentence(poor).startswith("The model does not fit: F/T torque 3 times the noise (rig ")
-    assert "rsea diagnose runs/bench --rig paper_high_impedance" in identification_report(poor)
+    assert next_command(poor) == "rsea diagnose 'runs/bench & <friends>' --rig paper_high_impedance"
+    assert escape(next_command(poor)) in identification_report(poor)
