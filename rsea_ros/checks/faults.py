@@ -12,6 +12,7 @@ import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.motion import is_commanded, motion_beside
+from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 from rsea_ros.stamps import repair_stamps
@@ -23,8 +24,6 @@ _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
 _SMALLEST_SHARE = 1e-3
 _SLOW = 0.25
-_FEW = 0.2
-"""Share of a channel's samples: fewer different values are steps."""
 _COARSE = 5.0
 """Steps of so many times what the rig's sensor makes are told."""
 
@@ -62,7 +61,7 @@ def _has_steps(record: Record, name: str) -> bool:
     """Tell whether a channel's steps are its sensor's: a torque repeats those of a command of few values."""
     if name != "motor_torque" or "command" not in record:
         return name in record
-    return name in record and len(np.unique(record["command"].y)) > _FEW * len(record["command"])
+    return name in record and len(np.unique(record["command"].y)) > FEW * len(record["command"])
 
 
 def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
@@ -95,13 +94,9 @@ def coarse(channel: Channel, name: str, rig: Rig) -> list[Fault]:
 
     Nothing is masked: such a sensor is noisy, not wrong.
     """
-    values = np.unique(channel.y[np.isfinite(channel.y)])
-    if not 3 <= len(values) < _FEW * len(channel):
-        return []
-    step, sensor = float(np.median(np.diff(values))), rig.sensors[name]
-    places = (values - values[0]) / step
+    step, sensor = step_of(channel.y), rig.sensors[name]
     stated = max(sensor.quantum, sensor.noise)
-    if step < _COARSE * stated or np.max(np.abs(places - np.round(places))) > 1e-3:
+    if step == 0.0 or step < _COARSE * stated:
         return []
     return [Fault("coarse_steps", name, 1.0, f"steps of {step:.3g} where the rig's sensor has {stated:.3g}")]
 

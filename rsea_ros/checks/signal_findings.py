@@ -93,7 +93,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
         if name not in record or "command" not in record or len(record[name]) < 64:
             continue
         stated = max(sensor.noise, 0.5 * sensor.quantum)
-        noise = noise_floor(record, name, sensor.quantum)
+        noise = noise_floor(record, name, sensor)
         loud = stated > 0.0 and min(noise, _rough(record[name])) > _LOUD * stated and name != "motor_torque"
         unit = {"position": "rad", "velocity": "rad/s"}.get(name, "N m")
         found.append(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,9 @@ HELP = "frequency response and parameters with confidence from recorded runs"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
+VERDICTS = ("adequate", "misfit", "not_identifiable")
+FOUND = 1
+"""Exit status when the verdict is one that --fail-on names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
     parser.add_argument(
         "--json", action="store_true", help="print identification.json to stdout and nothing else"
+    )
+    parser.add_argument(
+        "--fail-on",
+        nargs="+",
+        action="extend",
+        default=[],
+        choices=VERDICTS,
+        metavar="VERDICT",
+        help=f"exit status {FOUND} when the verdict is one of these: {', '.join(VERDICTS)}",
     )
     add_topic_options(parser)
     add_window_options(parser)
@@ -56,29 +69,32 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 
-        result = identify(records, rig, tell)
+        result = replace(identify(records, rig, tell), rig_option=args.rig)
         report = write_results(result, place)
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
     else:
         _print(result, report)
-    return 0
+    return FOUND if result.verdict in args.fail_on else 0
 
 
 def _print(result: Identification, report: Path) -> None:
-    """Print the table, and a line for each thing to know beside it."""
+    """Print the verdict, the table, and a line for each thing to know beside it."""
     from rich.console import Console
 
     from rsea_ros.report.fault_words import fault
+    from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
     from rsea_ros.report.statics_words import statics_sentences
     from rsea_ros.report.terminal import terminal_table
 
     console = Console()
     if not console.is_terminal:
         console = Console(width=NARROWEST)
+    following = next_command(result)
+    print(f"{verdict_sentence(result)}{f'; next: {following}' if following else ''}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *result.statements, *result.notes):
+    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.notes):
         print(sentence)
     for damage in result.faults:
         print(f"data: {fault(damage)}")

@@ -15,11 +15,17 @@ from rsea_ros.diagnosis.experiment import amplitude_series, separating
 from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.sentences import coherence_lost, evidence_of, on_measured_angle, verdict_sentence
+from rsea_ros.diagnosis.sentences import (
+    coherence_lost,
+    coloured_noise,
+    evidence_of,
+    on_measured_angle,
+    verdict_sentence,
+)
 from rsea_ros.diagnosis.split import JUDGE, Score, score_on
 from rsea_ros.diagnosis.stages import Stage
 from rsea_ros.diagnosis.trial import Trial
-from rsea_ros.diagnosis.verdict import reached, verdict_of
+from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
@@ -53,7 +59,7 @@ def conclusion(
         )
     verdict = verdict_of(found, stages)
     if verdict == "unexplained":
-        stages = stages[:1]
+        stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
     first, last = stages[0], stages[-1]
     causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
     named = {c.name for c in causes}
@@ -62,6 +68,7 @@ def conclusion(
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)
+    baseline = parameters_of(first.solution, first.confidence)
     return Diagnosis(
         verdict=verdict,
         sentence=verdict_sentence(
@@ -72,9 +79,9 @@ def conclusion(
         duration=sum(r.stop - r.start for r in records),
         rate=records[0]["command"].rate,
         faults=faults,
-        baseline_rig=identified_rig(first.solution, first.confidence),
-        baseline=parameters_of(first.solution, first.confidence),
-        extended_rig=identified_rig(last.solution, last.confidence),
+        baseline_rig=identified_rig(first.solution, baseline),
+        baseline=baseline,
+        extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.judged, case),
         fit_percent=_fit(first, found.cases),
@@ -94,8 +101,14 @@ def conclusion(
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
             *coherence_lost(lost_above(case, channel), channel),
             *on_measured_angle(last.solution.problem),
+            *coloured_noise(sorted(case.coloured)),
         ),
     )
+
+
+def spoken_of(judged: Score, channel: str) -> str:
+    """Return the channel that tells an unexplained residual: the worst, unless `channel` is above noise."""
+    return channel if judged.ratio(channel) > FLOOR else judged.worst
 
 
 def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,17 +10,15 @@ import numpy as np
 
 from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.noise import residual_floor
+from rsea_ros.identification.noise_level import ABOVE, reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.model.drive import Drive, coarser
 from rsea_ros.signals import FloatArray
 
-AT_FLOOR = 1.04
+AT_FLOOR = ABOVE
 """RMS of the residual over the noise, in every channel, below which there is nothing left to explain."""
 DELAY = "command_delay.delay"
-_ROUNDING = 1e-9
-"""Of a channel's standard deviation: a residual below it is rounding, not noise."""
 _ITERATIONS = 12
 _SEARCH_GAIN = 2e-4
 """Relative fall of the cost below which a fit of the search is done; what is judged is fitted further."""
@@ -163,23 +161,10 @@ def rescored(cases: Sequence[Case], model: Model) -> Model:
     )
 
 
-def requieted(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
-    """Return the cases with the noise lowered where a model's residual shows that it is less."""
-    return tuple(
-        _requieted(c, out, model.solution.problem) for c, out in zip(cases, model.outputs, strict=True)
-    )
-
-
-def _requieted(case: Case, out: Mapping[str, FloatArray], problem: Problem) -> Case:
-    noise = dict(case.noise)
-    for n in case.measured:
-        if n in out:
-            residual = np.where(case.mask[n], case.measured[n] - out[n], 0.0)
-            quantum = problem.rig.sensors[n].quantum if n in problem.rig.sensors else 0.0
-            least = max(0.5 * quantum, _ROUNDING * float(np.std(case.measured[n])))
-            floor = max(residual_floor(residual), least)
-            noise[n] = min(noise[n], floor)
-    return replace(case, noise=noise)
+def reestimated(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
+    """Return the cases with the noise that a model's residual shows."""
+    ratio = model.solution.problem.rig["gear.ratio"]
+    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(cases, model.outputs, strict=True))
 
 
 def at_floor(model: Model, cases: Sequence[Case]) -> bool:

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.effects.effect import Effect
-from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.errors import RseaError
+from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian_columns, power, solve
-from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
+from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.signals import FloatArray
 
 _STEPS = 2
@@ -36,20 +36,6 @@ class Hypothesis:
     def name(self) -> str:
         """Name of the effect."""
         return self.effect.name
-
-
-def extended(
-    present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
-) -> tuple[Problem, FloatArray]:
-    """Return the present problem with one more effect whose parameters may move, and where it begins.
-
-    An effect of the rotor's angle rides on the measured angle: far from the truth a simulated one, a gear
-    ratio away from the output, sits in other detents.
-    """
-    unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
-    rig = with_effect(present.rig, effect.name, start)
-    problem = replace(present, rig=rig, unknowns=unknowns, ride=present.ride or ROTOR_ANGLE in effect.reads)
-    return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
 def reduced(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:

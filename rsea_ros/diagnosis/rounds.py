@@ -16,13 +16,14 @@ import numpy as np
 from rsea_ros.diagnosis.choice import as_well, at_bound, choose, is_far, is_progress, loss_excess
 from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, quicker, refitted
 from rsea_ros.diagnosis.hints import Seen, Start, starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, extended, screen
+from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
 from rsea_ros.diagnosis.judge import compare
 from rsea_ros.diagnosis.split import CHOOSE, FIT, score_on
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, power, solve
 from rsea_ros.identification.unknowns import apply

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rsea_ros.diagnosis.exchange import exchanged
-from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, refitted, requieted, rescored
+from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, reestimated, refitted, rescored
 from rsea_ros.diagnosis.rounds import NOTHING, Round
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.workers import Workers
@@ -53,14 +53,14 @@ def search(
 ) -> Search:
     """Find up to max_causes causes among some effects, most telling first."""
     models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS, run=at_work.run)]
-    cases = requieted(cases, models[0])
+    cases = reestimated(cases, models[0])
     models = [refitted(cases, models[0], at_work.run)]
     trials: list[Trial] = []
     equals: dict[str, tuple[Model, ...]] = {}
     for number in range(max_causes + _MOST_EXCHANGES):
         present, played = models[-1], NOTHING
-        if at_floor(present, cases):
-            break
+        if at_floor(present, cases) and not any(c.coloured for c in cases):
+            break  # coloured noise may hide a cause that a fit still finds
         if len(present.causes) < max_causes:
             played = Round(cases, effects, present, number, at_work, tell).play()
             trials += played.trials
@@ -70,7 +70,7 @@ def search(
         if accepted is None:
             break
         equals[accepted.causes[-1]] = played.equals
-        quieter = requieted(cases, accepted)
+        quieter = reestimated(cases, accepted)
         accepted = refitted(quieter, accepted, at_work.run)
         models = [*(rescored(quieter, m) for m in models), accepted]
         cases = quieter

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Verdict
@@ -43,7 +44,8 @@ def verdict_sentence(
             f"is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "unexplained":
-        return f"The {name} residual is {before:.1f} times the noise; no known effect explains it.{data}"
+        size = f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else f"{before:.1f}"
+        return f"The {name} residual is {size} times the noise; no known effect explains it.{data}"
     if verdict == "explained":
         return f"{named.capitalize()}: {fall} {after:.2f} times the noise, which is the floor.{data}"
     return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
@@ -74,6 +76,17 @@ def on_measured_angle(problem: Problem) -> tuple[str, ...]:
     return (
         "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "
         "settles in other detents, so `rsea predict` will show a larger residual than the gain here.",
+    )
+
+
+def coloured_noise(channels: Sequence[str]) -> tuple[str, ...]:
+    """Return what was taken for coloured noise of a sensor, and why, as sentences."""
+    if not channels:
+        return ()
+    return (
+        f"The noise of the {listed([_CHANNELS[n] for n in channels])} is coloured: its level was taken from "
+        "the residual, which is steady, falls with frequency, and agrees with neither command nor motion nor "
+        "another sensor.",
     )
 
 

@@ -76,6 +76,11 @@ class Score:
         scaled = [s / max(1.0, against.ratio(n)) ** 2 for n, s in self.sums.items()]
         return np.asarray(np.sum(scaled, axis=0))
 
+    @property
+    def worst(self) -> str:
+        """The channel with the largest RMS of the residual over its noise."""
+        return max(self.sums, key=self.ratio)
+
     def ratio(self, channel: str) -> float:
         """RMS of the residual over the noise of a channel."""
         return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))

@@ -2,7 +2,8 @@
 
 The covariance is the sandwich H^-1 (sum_b g_b g_b' + W^2) H^-1 with H = J'J + W^2, W the inverse prior
 doubts, and g_b = J_b' r_b the scores of blocks of one second: right also where the residual is coloured or
-larger than the noise (White, Econometrica 48, 1980; Newey and West 1987). Never less than H^-1.
+larger than the noise (White, Econometrica 48, 1980; Newey and West 1987), times n / (n - p) for n blocks and
+p unknowns (MacKinnon and White, J. Econometrics 29, 1985). Never less than H^-1.
 """
 
 from __future__ import annotations
@@ -12,15 +13,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import FIELDS
 from rsea_ros.signals import FloatArray, IntArray
 from rsea_ros.wording import listed
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
+_MOST_CORRECTED = 4.0
+"""Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
 _Z95 = 1.959964
 _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
@@ -70,9 +75,17 @@ def confidence_of(solution: Solution) -> Confidence:
         information = solution.jacobian.T @ solution.jacobian
     inverse = np.linalg.pinv(information + prior, hermitian=True)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
-    larger = np.sqrt(np.maximum(1.0, np.diag(inverse) / np.maximum(np.diag(covariance), 1e-300)))
+    least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
+    least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
+    larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
     return Confidence(solution.theta, covariance, _told(information, doubt), information)
+
+
+def _alike(case: Case) -> float:
+    """Return how many samples of a case tell what one independent one would: a filter makes them alike."""
+    drive = case.drive
+    return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
 
 def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:
@@ -87,7 +100,9 @@ def _block_scores(solution: Solution) -> FloatArray:
     scores = np.zeros((blocks.max() + 1, solution.jacobian.shape[1]))
     for column, derivative in zip(scores.T, solution.jacobian.T, strict=True):
         column[:] = np.bincount(blocks, derivative * solution.residual, minlength=len(scores))
-    result: FloatArray = scores.T @ scores
+    counted = len(np.unique(blocks))
+    free = max(counted - len(solution.theta), counted / _MOST_CORRECTED)
+    result: FloatArray = scores.T @ scores * (counted / free)
     return result
 
 

@@ -10,10 +10,19 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
-from rsea_ros.identification.problem import Case, Problem, case_from, weighted
+from rsea_ros.identification.misfit import ratios_of, reweighted
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.responses import model_response, responses_of
-from rsea_ros.identification.result import FrequencyResponse, Identification, Overlay, ParameterEstimate
+from rsea_ros.identification.result import (
+    AT_NOISE,
+    FrequencyResponse,
+    Identification,
+    Overlay,
+    ParameterEstimate,
+)
 from rsea_ros.identification.solver import Map, Solution, in_pool, serial, solve
 from rsea_ros.identification.start import start_from
 from rsea_ros.identification.statics import statics_of
@@ -35,6 +44,8 @@ from rsea_ros.signals import FloatArray, Record
 CHANNELS = ("ft", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3
+_OTHER_NOISE = 1.1
+"""Ratio of a channel's noise after a fit to that before, from which the fit is repeated."""
 
 
 def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:
@@ -52,11 +63,14 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        solution = fit(
+        solution, cases = fit(
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
-    report("confidence", 0.8)
-    result = _result(solution, records, cases, responses)
+        report("confidence", 0.8)
+        outputs = solution.problem.outputs(solution.theta)
+        misfits = max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
+        others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
+    result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
     return result
 
@@ -80,22 +94,43 @@ def check_usable(record: Record) -> None:
             )
 
 
-def fit(cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None) -> Solution:
-    """Fit the rig's free values, its effects and the sensors' clocks; weights follow where the model misfits.
+def fit(
+    cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
+) -> tuple[Solution, tuple[Case, ...]]:
+    """Fit the rig's free values, its effects and the sensors' clocks; return the cases with their noise too.
 
-    Where a channel's residual stays above its noise the weight becomes that residual, as maximum likelihood
-    with unknown noise has it. start: where to begin, should the records fit it better than `rig`.
+    The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
+    weight becomes that residual, as maximum likelihood with unknown noise has it. start: where to begin,
+    should the records fit it better than `rig`.
     """
-    unknowns = unknowns_of(rig, cases)
-    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
+    problem = Problem(tuple(cases), rig, unknowns_of(rig, cases), CHANNELS)
     solution = solve(problem, _better_start(problem, start, run), run=run)
+    outputs = problem.outputs(solution.theta)
+    known = _with_noise_of(problem, outputs)
+    if _changed(problem.cases, known):
+        solution = solve(replace(problem, cases=known), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(solution.problem, outputs)
     for _ in range(_REWEIGHTINGS):
-        ratios = misfit_ratios(solution)
+        ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
             break
-        problem = replace(problem, cases=tuple(_reweighted(c, ratios) for c in problem.cases))
-        solution = solve(problem, solution.theta, run=run)
-    return solution
+        heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
+    return solution, known
+
+
+def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
+    """Return the cases with the noise that the residual of simulated outputs shows."""
+    ratio = problem.rig["gear.ratio"]
+    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
+
+
+def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
+    """Tell whether the noise of any channel has changed by more than a fit would notice."""
+    ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
+    return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
 
 
 def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
@@ -120,38 +155,30 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     )
 
 
-def misfit_ratios(solution: Solution) -> dict[str, float]:
-    """Return by channel the RMS of the residual over its noise: 1 where it is at the noise."""
-    problem = solution.problem
-    parts: dict[str, list[FloatArray]] = {}
-    for case, out in zip(problem.cases, problem.outputs(solution.theta), strict=True):
-        for n in problem.present(case):
-            parts.setdefault(n, []).append(weighted(case, out, [n]))
-    return {n: _rms(np.concatenate(p)) for n, p in parts.items()}
-
-
-def _reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
-    return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})
-
-
 def _result(
     solution: Solution,
+    outputs: Sequence[dict[str, FloatArray]],
     records: Sequence[Record],
     cases: Sequence[Case],
     responses: tuple[FrequencyResponse, ...],
+    others: Sequence[Alternative],
 ) -> Identification:
-    """Gather the result. cases: as they were before any weight followed a misfit."""
+    """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
     confidence = confidence_of(solution)
-    outputs = problem.outputs(solution.theta)
     errors = errors_by_channel(problem, outputs)
-    rig = identified_rig(solution, confidence)
+    parameters = tuple(
+        replace(p, ci95=spanned(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)
+    )
+    rig = identified_rig(solution, parameters)
     return Identification(
         rig=rig,
         sources=tuple(r.source for r in records),
         duration=sum(r.stop - r.start for r in records),
         rate=records[0]["command"].rate,
-        parameters=parameters_of(solution, confidence),
+        parameters=parameters,
+        alternatives=tuple(other.name for other in others),
+        coloured=tuple(sorted({n for c in cases for n in c.coloured})),
         correlation=confidence.correlation,
         residual_rms={n: _rms(e) for n, (e, _) in errors.items()},
         noise_rms={n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in errors},
@@ -205,12 +232,12 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
     )
 
 
-def identified_rig(solution: Solution, confidence: Confidence) -> Rig:
+def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
     """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
     sensors = {n: replace(s, clock=s.clock + clocks.get(n, 0.0)) for n, s in rig.sensors.items()}
     quantities = dict(rig.quantities)
-    for estimate in parameters_of(solution, confidence):
+    for estimate in parameters:
         if estimate.name in quantities:
             quantities[estimate.name] = replace(
                 quantities[estimate.name], ci95=estimate.ci95, source="identified"

@@ -1,7 +1,9 @@
-"""The noise floor of a channel, from the data alone.
+"""The noise floor of a channel before any fit: from the record, and from what the rig states of its sensor.
 
 White sensor noise is all that is left at the top of the band of a torque-driven actuator once what follows
-the command linearly has been taken away: S_nn = (1 - coherence) S_yy, median over the top of the band.
+the command linearly has been taken away: S_nn = (1 - coherence) S_yy, median over the top of the band. Where
+that is not flat (a smoothed log) or the channel is slower than the command, so that the command's upper half
+is folded over it, the record cannot tell its noise; the rig's statement stands until a fit has its residual.
 """
 
 from __future__ import annotations
@@ -9,49 +11,76 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.fft import rfft
 
-from rsea_ros.signals import Channel, ComplexArray, FloatArray, Record
+from rsea_ros.identification.quantum import step_of
+from rsea_ros.identification.spectra import segment_spectra
+from rsea_ros.model.rig import Sensor
+from rsea_ros.signals import Channel, FloatArray, Record
 
 _TINY = 1e-300
 TOP_OF_BAND = (0.62, 0.98)
 """Of the Nyquist frequency: where the noise is read off."""
+_FLAT = 2.0
+"""Ratio of the powers of the two halves of the top of the band, up to which it counts as flat."""
+_LONGEST, _SEGMENTS = 512, 8
+_FEWEST = 64
+_SLOWER = 0.9
+"""Of the command's rate: below it a channel is slower than the command."""
+_FILTERED = 0.1
+"""Of the noise that a rig states: less at the top of the band is a filter's work, not a better sensor's."""
+_ROUNDING = 1e-9
+"""Of a channel's standard deviation: less than this is rounding, not noise."""
 
 
-def noise_floor(record: Record, name: str, quantum: float = 0.0) -> float:
+def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
     """Return the RMS of a channel's noise, in its unit: white noise with the level at the top of the band.
 
-    quantum: of the sensor; half of it is the least that is returned: no model is asked for more.
+    sensor: as the rig states it; its statement counts where the record cannot tell.
     """
     t, y = _finite(record[name])
-    least = max(0.5 * quantum, 1e-9 * float(np.std(y)), 1e-300)
-    if len(y) < 64:
-        return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, least)
+    least = least_noise(y, sensor)
+    stated = math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0))
+    if len(y) < _FEWEST:
+        return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
+    if stated > 0.0 and record[name].rate < _SLOWER * record["command"].rate:
+        return max(stated, least)
+    unlike = _unlike(record["command"], t, y)
+    level = math.sqrt(float(np.median(unlike[_top(unlike)])))
+    return max(level, least) if _is_flat(unlike) else max(level, stated, least)
+
+
+def least_noise(values: FloatArray, sensor: Sensor) -> float:
+    """Return the least that a channel's noise is taken for: no model is asked for more.
+
+    Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
+    tenth of the noise that the rig states: what looks better than that was filtered.
+    """
+    step = step_of(values)
+    coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
+    stated = max(0.5 * sensor.quantum, _FILTERED * sensor.noise)
+    return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
+
+
+def top_of_band(values: FloatArray) -> tuple[float, bool]:
+    """Return the RMS of white noise as high as the top of the band of values, and whether that is flat."""
+    power = np.mean(np.abs(segment_spectra(values, _LONGEST, _SEGMENTS)) ** 2, axis=0)
+    return math.sqrt(float(np.median(power[_top(power)]))), _is_flat(power)
+
+
+def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the power of a channel that does not follow the command linearly, by frequency."""
     period = float(np.median(np.diff(t)))
-    u, v = _spectra(_held_before(record["command"], t - 0.25 * period)), _spectra(y)
+    u = segment_spectra(_held_before(command, t - 0.25 * period), _LONGEST, _SEGMENTS)
+    v = segment_spectra(y, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
-    unlike = (power - shared) / (1.0 - 1.8 / max(2.0, len(v)))
-    return max(math.sqrt(float(np.median(unlike[_top(unlike)]))), least)
+    return np.asarray((power - shared) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
-def residual_floor(residual: FloatArray) -> float:
-    """Return the RMS of white noise with the level that a model's residual has at the top of the band."""
-    power = np.mean(np.abs(_spectra(residual)) ** 2, axis=0)
-    return math.sqrt(float(np.median(power[_top(power)])))
-
-
-def _spectra(values: FloatArray) -> ComplexArray:
-    """Return the spectra of half-overlapping Hann segments, shape (segments, lines).
-
-    Scaled so that white noise has the square of its RMS in every line.
-    """
-    length = min(512, 2 ** math.floor(math.log2(max(len(values), 64) / 8)))
-    segments = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
-    window = np.hanning(length + 1)[:-1]
-    centred = (segments - segments.mean(axis=1, keepdims=True)) * window
-    spectra: ComplexArray = rfft(centred, axis=1) / math.sqrt(float(window @ window))
-    return spectra
+def _is_flat(power: FloatArray) -> bool:
+    """Tell whether the two halves of the top of the band have about the same power."""
+    lower, upper = (float(np.median(half)) for half in np.array_split(power[_top(power)], 2))
+    return max(lower, upper) <= _FLAT * max(min(lower, upper), _TINY)
 
 
 def _top(lines: FloatArray) -> slice:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.noise import noise_floor, residual_floor
+from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.unknowns import Unknown, apply
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import BoolArray, FloatArray, Record
@@ -30,6 +30,8 @@ class Case:
     """One record ready to be simulated: drive, measured channels, their noise, and which samples count.
 
     floating: channels whose zero is unknown; they are compared without their means.
+    least: by channel the least that its noise is taken for. coloured: channels whose residual, all of it, was
+    taken for noise of the sensor after a fit (noise_level.py).
     """
 
     drive: Drive | Motion
@@ -39,6 +41,8 @@ class Case:
     mask: Mapping[str, BoolArray]
     source: str = ""
     floating: frozenset[str] = frozenset()
+    least: Mapping[str, float] = field(default_factory=dict)
+    coloured: frozenset[str] = frozenset()
 
     def within(self, mask: Mapping[str, BoolArray]) -> Case:
         """Return the case with only samples that are also in `mask`."""
@@ -62,25 +66,26 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     Raises IdentificationError when no channel of the record is one that the rig has.
     """
     if is_inverse(rig):
-        return _inverse_case(record)
+        return _inverse_case(record, rig)
     channels = _channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
     in_loop = rig.controller is not None and "reference" in record
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
-    quanta = {n: rig.sensors[n].quantum if n in rig.sensors else 0.0 for n in channels}
+    sensors = {n: rig.sensors.get(n, Sensor()) for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SETTLE
     return Case(
         drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
-        noise=MappingProxyType({n: noise_floor(record, n, quanta[n]) for n in channels}),
+        noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
         mask=MappingProxyType(
             {n: good[n] & np.isfinite(record[n].y) & (record[n].t >= start) for n in channels}
         ),
         source=record.source,
         floating=floating,
+        least=MappingProxyType({n: least_noise(record[n].y, sensors[n]) for n in channels}),
     )
 
 
@@ -109,10 +114,11 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     )
 
 
-def _inverse_case(record: Record) -> Case:
+def _inverse_case(record: Record, rig: Rig) -> Case:
     """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
 
-    Noise: what the filter lets through of the white noise that the torque has at the top of its band.
+    Noise: what the filter lets through of the white noise that the torque has at the top of its band, or
+    where that is not flat of what the rig states, if that is more.
     """
     motion, torque = motion_from(record), acted(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
@@ -121,7 +127,9 @@ def _inverse_case(record: Record) -> Case:
                 f"{record.source}: {name} holds one value, expected motion: "
                 "a rig without a spring is judged by what moves it"
             )
-    noise = residual_floor(torque.y) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
+    level, is_flat = top_of_band(torque.y)
+    stated = 0.0 if is_flat else rig.sensors.get("motor_torque", Sensor()).noise
+    noise = max(level, stated) * math.sqrt(min(1.0, 2.0 * CUT_OFF / torque.rate))
     edges = (motion.t < motion.t[0] + SETTLE) | (motion.t > motion.t[-1] - SETTLE)
     return Case(
         drive=motion,

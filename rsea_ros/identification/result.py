@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, Fault, FloatArray
+
+Verdict = Literal["adequate", "misfit", "not_identifiable"]
+"""Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
+AT_NOISE = 1.1
+"""RMS of a residual over the noise, up to which it is the noise."""
+_JUDGED = ("ft", "position", "velocity")
+"""Channels that judge a model; the motor torque only echoes the command, and judges where no other can."""
+_TOLD = 0.5
+"""Share of what is known of a value that the data must have brought for it to be identified."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,9 @@ class Identification:
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
     frequencies of each of `responses`. statements: plain sentences, one each on what is not identifiable
-    and what would make it so. statics: of slow ramps against a locked output.
+    and what would make it so. statics: of slow ramps against a locked output. alternatives: laws that would
+    explain a part of the misfit; the intervals span what each makes of the values. coloured: channels whose
+    residual was taken for coloured noise of the sensor. rig_option: the rig as the user named it.
     """
 
     rig: Rig
@@ -84,3 +96,22 @@ class Identification:
     statements: tuple[str, ...] = ()
     notes: tuple[str, ...] = field(default=())
     faults: tuple[Fault, ...] = field(default=())
+    alternatives: tuple[str, ...] = ()
+    coloured: tuple[str, ...] = ()
+    rig_option: str = ""
+
+    @property
+    def times_noise(self) -> dict[str, float]:
+        """Return by channel the RMS of the residual over the noise, of the channels that judge."""
+        noise = self.noise_rms
+        ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
+        return {n: r for n, r in ratios.items() if n in _JUDGED} or ratios
+
+    @property
+    def verdict(self) -> Verdict:
+        """Return whether the model fits, and whether the data tell any of its values."""
+        if any(not ratio <= AT_NOISE for ratio in self.times_noise.values()):
+            return "misfit"
+        physical = [p for p in self.parameters if not p.name.startswith("clock.")]
+        told = any(p.told_by_data >= _TOLD for p in physical)
+        return "adequate" if told or not physical else "not_identifiable"

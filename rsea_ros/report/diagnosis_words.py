@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit
+from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
 from rsea_ros.wording import listed
@@ -25,7 +27,10 @@ def main_channel(diagnosis: Diagnosis) -> str:
     """Return the channel that verdict and gain speak of."""
     if diagnosis.causes:
         return diagnosis.causes[0].channel
-    return next(n for n in (*_ORDER, *diagnosis.residual_rms) if n in diagnosis.residual_rms)
+    main = next(n for n in (*_ORDER, *diagnosis.residual_rms) if n in diagnosis.residual_rms)
+    if diagnosis.verdict != "unexplained" or num.times_noise(diagnosis, main)[0] > AT_NOISE:
+        return main
+    return max(diagnosis.residual_rms, key=lambda n: num.times_noise(diagnosis, n)[0])
 
 
 def effect(name: str) -> str:
@@ -65,7 +70,8 @@ def headline(diagnosis: Diagnosis) -> str:
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
     if d.verdict == "unexplained":
-        size = f"{_times(before)} the noise"
+        near = f"{math.ceil(100.0 * before) / 100.0:.2f} times"  # never rounded down to the floor
+        size = f"{near if before < 2.0 else _times(before)} the noise"
         return f"The {channel} residual is {size}, and nothing in the catalogue explains it"
     is_, it, explains = ("is", "it", "explains") if len(d.causes) == 1 else ("are", "them", "explain")
     rest = f"{explains} a part of what the simulation gets wrong; the rest stays unexplained"

@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.signals import Fault
 
 SCHEMA = 1
@@ -19,6 +20,9 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
+        "verdict": i.verdict,
+        "sentence": verdict_sentence(i),
+        "next": next_command(i) or None,
         "data": {"bags": list(i.sources), "duration_s": finite(i.duration), "rate_hz": finite(i.rate),
                  "faults": [fault_json(f) for f in i.faults]},
         "parameters": {p.name: parameter(p) for p in i.parameters},
@@ -28,6 +32,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
         },
         "residual_rms": numbers(i.residual_rms),
         "noise_rms": numbers(i.noise_rms),
+        "times_noise": numbers(i.times_noise),
         "fit_percent": numbers(i.fit_percent),
         "responses": [
             {"input": r.input, "output": r.output, "method": r.method, "lines": len(r.frequency),
@@ -35,7 +40,8 @@ def identification_json(identification: Identification) -> dict[str, Any]:
             for r in i.responses if len(r.frequency)
         ],
         **({"statics": numbers(asdict(i.statics))} if i.statics else {}),
-        "statements": list(i.statements),
+        "alternatives": list(i.alternatives),
+        "statements": [*doubt_sentences(i), *i.statements],
         "notes": list(i.notes),
     }  # fmt: skip
 

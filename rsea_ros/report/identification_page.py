@@ -9,6 +9,7 @@ from rsea_ros.report import words
 from rsea_ros.report.bode import bode_figure
 from rsea_ros.report.fault_words import fault
 from rsea_ros.report.figure import Figure
+from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.overlay import Simulated, overlay_figure
 from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragraph, section
 from rsea_ros.report.palette import AFTER, MEASURED
@@ -17,8 +18,6 @@ from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.statics_words import statics_sentences
 from rsea_ros.signals import UNITS
 
-AT_NOISE = 1.1
-"""A residual up to this many times the noise is the noise."""
 _ORDER = ("ft", "position", "velocity")
 
 
@@ -36,19 +35,7 @@ def identification_report(identification: Identification) -> str:
     for overlay in _shown(identification):
         blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
     blocks.append(_untold(identification))
-    return page(verdict(identification), _kicker(identification), blocks, _footer(identification))
-
-
-def verdict(identification: Identification) -> str:
-    """Return the result in a sentence: whether the residual is the noise, else how far above it stands."""
-    above = _above_noise(identification)
-    if not above:
-        return "The fitted model explains the record down to the sensor noise"
-    worst = max(above, key=lambda n: above[n])
-    return (
-        f"The fitted model leaves {words.number(above[worst], 2)} times the noise on the "
-        f"{words.channel(worst)}: something is missing in it"
-    )
+    return page(verdict_sentence(identification), _kicker(identification), blocks, _footer(identification))
 
 
 def main_channel(identification: Identification) -> str:
@@ -57,25 +44,12 @@ def main_channel(identification: Identification) -> str:
     return present[0] if present else next(iter(identification.residual_rms), "")
 
 
-def _ratios(identification: Identification) -> dict[str, float]:
-    noise = identification.noise_rms
-    return {n: v / noise[n] for n, v in identification.residual_rms.items() if noise.get(n, 0.0) > 0.0}
-
-
-def _above_noise(identification: Identification) -> dict[str, float]:
-    """Return how many times the noise the residual is, of the channels where it is more than that."""
-    ratios = _ratios(identification)
-    judged = {n: r for n, r in ratios.items() if n in _ORDER} or ratios
-    return {n: r for n, r in judged.items() if r > AT_NOISE}
-
-
 def _next(identification: Identification) -> str:
     """Return what to do about a residual above the noise."""
-    if not _above_noise(identification):
+    command = next_command(identification)
+    if not command:
         return ""
-    bags = " ".join(identification.sources)
-    command = code(f"rsea diagnose {bags}")
-    return f'<p class="next">What it is, and how much it would gain: {command}</p>'
+    return f'<p class="next">What it is, and how much it would gain: {code(command)}</p>'
 
 
 def _keys(identification: Identification) -> list[tuple[str, str]]:
@@ -150,11 +124,8 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 
 def _untold(identification: Identification) -> str:
     title = "What these data cannot tell"
-    body = (
-        bullets(identification.statements)
-        if identification.statements
-        else paragraph("Nothing that was asked for.")
-    )
+    said = (*doubt_sentences(identification), *identification.statements)
+    body = bullets(said) if said else paragraph("Nothing that was asked for.")
     return section(title, body)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,33 @@ def test_simulate_with_an_effect_differs_by_the_effect(bag, tmp_path):
 
 def test_identify_leaves_three_files_and_nothing_else(results):
     assert sorted(f.name for f in results.iterdir()) == ["identification.json", "model.yaml", "report.html"]
+
+
+def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
+    """The verdict leads on the terminal, and --fail-on makes it an exit status."""
+    arguments = ["identify", str(bag), "--out", str(tmp_path / "out"), "--fail-on", "misfit"]
+    assert main(arguments) == 0
+    assert re.match(
+        r"The model fits: .* times the noise \(rig paper_high_impedance\)\n", capsys.readouterr().out
+    )
+    misfitting = tmp_path / "misfitting"
+    effect = ["--effect", "torque_constant_error:gain=1.1"]
+    assert main(["simulate", RIG, "--duration", "12", "--seed", "6", *effect, "--out", str(misfitting)]) == 0
+    capsys.readouterr()
+    arguments = ["identify", str(misfitting), "--out", str(tmp_path / "bad")]
+    assert main(arguments) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("The model does not fit: F/T torque ")
+    assert first.endswith(f"; next: rsea diagnose {misfitting} --rig paper_high_impedance")
+    written = json.loads((tmp_path / "bad" / "identification.json").read_text(encoding="utf-8"))
+    assert written["verdict"] == "misfit"
+    assert written["times_noise"]["ft"] > 5.0
+    assert "torque_constant_error" in written["alternatives"]
+    low, high = written["parameters"]["spring.stiffness"]["ci95"]
+    assert low < load_rig(RIG)["spring.stiffness"] < high, (
+        "the interval knows that the motor constant may be off"
+    )
+    assert main([*arguments, "--out", str(tmp_path / "again"), "--fail-on", "misfit"]) == 1
 
 
 def test_the_model_runs_wherever_a_rig_runs(results):

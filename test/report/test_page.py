@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.identification_page import identification_report, verdict
+from rsea_ros.report.identification_page import identification_report
+from rsea_ros.report.identification_words import next_command, verdict_sentence
 
 Browser = Callable[[str, Path], tuple[str, str]]
 FIGURES = 8
@@ -49,7 +51,11 @@ def test_text_of_others_is_escaped(identification: Identification) -> None:
 
 
 def test_verdict_names_the_channel_that_is_above_its_noise(identification: Identification) -> None:
-    assert verdict(identification) == "The fitted model explains the record down to the sensor noise"
+    assert re.fullmatch(
+        r"The model fits: .* (0|1)\.\d\d times the noise \(rig paper_high_impedance\)",
+        verdict_sentence(identification),
+    )
     poor = replace(identification, noise_rms={**identification.noise_rms, "ft": 0.01})
-    assert verdict(poor).startswith("The fitted model leaves 3.0 times the noise on the F/T torque")
-    assert "rsea diagnose runs/bench" in identification_report(poor)
+    assert verdict_sentence(poor).startswith("The model does not fit: F/T torque 3 times the noise (rig ")
+    assert next_command(poor) == "rsea diagnose 'runs/bench & <friends>' --rig paper_high_impedance"
+    assert escape(next_command(poor)) in identification_report(poor)

@@ -1,0 +1,111 @@
+"""What the estimates would be, were some simple thing wrong that the rig does not list.
+
+Where the model does not fit, its estimates are biased by whatever is missing, and no covariance of the
+residual shows that: a motor constant 10 % off moves K_s by 11 % while K_s seems known to 0.01 %. So each of a
+few laws that a bench often has is added in turn and fitted with everything else. One that takes away part of
+the misfit is credible, and its estimates widen the intervals (model averaging, Buckland et al. 1997, in its
+most careful form: the span). Which law it is, the diagnosis tells, not this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.signal_table import ROTOR_ANGLE
+from rsea_ros.errors import RseaError
+from rsea_ros.identification.confidence import Confidence, confidence_of, interval
+from rsea_ros.identification.misfit import misfit_ratios, reweighted
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, Solution, solve
+from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect, with_effect
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.signals import FloatArray
+
+LAWS = ("torque_constant_error", "command_delay", "current_loop_lag", "coulomb_friction", "ft_gain_error")
+"""What is wrong most often and biases the values of the rig most, one number each."""
+FALL = 0.1
+"""Of the cost: an alternative that takes away less explains nothing of the misfit."""
+NEAR = 2.0
+"""Times the cost of the best alternative, up to which another is credible beside it."""
+_ITERATIONS = 10
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A law that the rig does not list, and the fit with it."""
+
+    name: str
+    solution: Solution
+    confidence: Confidence
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Return the 95 % interval of an unknown, SI."""
+        unknowns = self.solution.problem.unknowns
+        i = [u.name for u in unknowns].index(name)
+        sd = float(np.sqrt(self.confidence.covariance[i, i]))
+        return interval(unknowns[i], float(self.solution.theta[i]), sd)
+
+
+def extended(
+    present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
+) -> tuple[Problem, FloatArray]:
+    """Return the present problem with one more effect whose parameters may move, and where it begins.
+
+    An effect of the rotor's angle rides on the measured angle: far from the truth a simulated one, a gear
+    ratio away from the output, sits in other detents.
+    """
+    unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
+    rig, ride = with_effect(present.rig, effect.name, start), present.ride or ROTOR_ANGLE in effect.reads
+    problem = replace(present, rig=rig, unknowns=unknowns, ride=ride)
+    return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
+
+
+def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[Alternative, ...]:
+    """Return the laws that would explain a part of what a solution leaves, the best first.
+
+    cases: with the noise of their sensors, not with the weights that the misfit made of it.
+    """
+    problem = solution.problem
+    if is_inverse(problem.rig):
+        return ()
+    acting = {e.name for e in problem.rig.effects}
+    tried = [(n, _fitted(solution, effect_named(n), run)) for n in LAWS if n not in acting]
+    fitted = [(n, s) for n, s in tried if s is not None and s.cost < (1.0 - FALL) * solution.cost]
+    best = min((s.cost for _, s in fitted), default=0.0)
+    credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)
+    settled = ((n, _settled(s, cases, run)) for n, s in credible)
+    return tuple(Alternative(n, s, confidence_of(s)) for n, s in settled)
+
+
+def _fitted(solution: Solution, effect: Effect, run: Map) -> Solution | None:
+    """Return the fit with an effect beside everything else; None where the rig cannot have it."""
+    try:
+        there = extended(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
+        return solve(*there, iterations=_ITERATIONS, run=run)
+    except RseaError:
+        return None
+
+
+def _clocks_at_zero(solution: Solution) -> FloatArray:
+    """Return where a solution ended with its clocks right: beside a misfit they run to their bounds."""
+    clocks = np.array([u.is_clock for u in solution.problem.unknowns])
+    return np.where(clocks, 0.0, solution.theta)
+
+
+def _settled(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
+    """Return an alternative fitted again, every channel in units of what it leaves of it, or of the noise."""
+    known = replace(solution.problem, cases=tuple(cases))
+    ratios = misfit_ratios(replace(solution, problem=known))
+    weighted = tuple(reweighted(case, ratios) for case in cases)
+    return solve(replace(known, cases=weighted), solution.theta, iterations=_ITERATIONS, run=run)
+
+
+def spanned(ci95: tuple[float, float], name: str, others: Sequence[Alternative]) -> tuple[float, float]:
+    """Return an interval of a parameter widened to hold its intervals under the alternatives, SI."""
+    every = [ci95, *(other.interval(name) for other in others)]
+    return min(low for low, _ in every), max(high for _, high in every)

@@ -1,0 +1,56 @@
+"""The noise of every channel after a fit, from what the model leaves of it.
+
+A floor never lies above the residual's white part, which no law of the bench can make; and where all of a
+residual passes for noise of the sensor (coloured.py) it lies as high as that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.identification.coloured import is_noise, residual_of
+from rsea_ros.identification.noise import top_of_band
+from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
+from rsea_ros.signals import FloatArray
+
+ABOVE = 1.04
+"""RMS of a residual over the noise, above which it is asked whether all of it is noise."""
+_BLOCK = 1.0
+"""s. Coloured noise is independent from one such block to the next."""
+
+
+def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0) -> Case:
+    """Return a case with its noise as a fitted model's residual shows it.
+
+    outputs: simulated, by channel. ratio: of the gear, rotor over output, for ripple. Coloured noise is taken
+    only where every channel above its white noise passes for noise: a misfit seldom shows in one alone.
+    """
+    channels = [n for n in case.measured if n in outputs and case.mask[n].any()]
+    left = {n: residual_of(case, outputs, n) for n in channels}
+    rms = {n: float(np.sqrt(np.mean(left[n][case.mask[n]] ** 2))) for n in channels}
+    noise = dict(case.noise)
+    for n in channels:
+        white, is_white = top_of_band(left[n])
+        seen = white if is_white and isinstance(case.drive, Drive) else rms[n]  # a Motion is filtered
+        noise[n] = max(min(noise[n], seen), case.least.get(n, 0.0))
+    above = [n for n in channels if rms[n] > ABOVE * noise[n]]
+    if not above or not all(is_noise(case, outputs, n, ratio) for n in above):
+        return replace(case, noise=noise, coloured=frozenset())
+    noise |= {n: rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n)) for n in above}
+    return replace(case, noise=noise, coloured=frozenset(above))
+
+
+def _doubt(case: Case, left: FloatArray, channel: str) -> float:
+    """Return the relative standard deviation of the RMS of a residual, from how it varies over time."""
+    keep = case.mask[channel]
+    block = np.floor((case.t[channel][keep] - case.start) / _BLOCK).astype(np.int64)
+    block -= block.min()
+    counts = np.bincount(block)
+    power = (np.bincount(block, left[keep] ** 2) / np.maximum(counts, 1))[counts > 0]
+    if len(power) < 2 or power.mean() == 0.0:
+        return 0.0
+    return float(0.5 * power.std() / power.mean() / np.sqrt(len(power)))

@@ -1,0 +1,95 @@
+"""The noise floor: of coloured noise, coarse steps, slow channels, and never that of a misfit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benches import bench, recorded
+from scipy.signal import lfilter
+
+from rsea_ros.identification.coloured import is_noise
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.quantum import step_of
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.signals import Channel
+
+RMS = {"ft": 0.1, "position": 4e-5}
+
+
+def with_coloured_noise(record, memory, channels=("ft", "position"), seed=0):
+    """Return a record with more noise of first order, `memory` from sample to sample."""
+    rng = np.random.default_rng(seed)
+    added = {}
+    for n in channels:
+        white = rng.normal(size=len(record[n]) + 1000)
+        noise = RMS[n] * np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], white)[1000:]
+        added[n] = Channel(record[n].t.copy(), record[n].y + noise)
+    return record.with_channels(**added)
+
+
+@pytest.mark.parametrize("memory", [0.9, 0.97])
+@pytest.mark.parametrize("channels", [("ft",), ("position",), ("ft", "position")])
+def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
+    nominal, true = bench("paper_high_impedance", 3)
+    result = identify([with_coloured_noise(recorded(true, 3, 20.0), memory, channels)], nominal)
+    assert result.verdict == "adequate"
+    for n in channels:
+        assert 0.8 < result.times_noise[n] < 1.25
+        assert result.noise_rms[n] == pytest.approx(RMS[n], rel=0.5)
+    assert set(result.coloured) == set(channels)
+
+
+def test_a_broadband_misfit_is_not_taken_for_coloured_noise():
+    nominal, true = bench("paper_high_impedance", 4)
+    stiction = EffectSetting("coulomb_friction", {"torque": 1.0, "creep_velocity": 0.02})
+    result = identify([with_coloured_noise(recorded(true.with_effects(stiction), 4, 20.0), 0.9)], nominal)
+    assert result.verdict == "misfit"
+    assert result.coloured == ()
+
+
+def test_a_coarse_encoder_has_the_noise_of_its_steps():
+    nominal, true = bench("paper_high_impedance", 5)
+    record, step = recorded(true, 5, 20.0), 4e-4
+    q = record["position"]
+    coarse = record.with_channels(position=Channel(q.t.copy(), np.round(q.y / step) * step))
+    assert step_of(coarse["position"].y) == pytest.approx(step)
+    result = identify([coarse], nominal)
+    assert result.noise_rms["position"] == pytest.approx(step / np.sqrt(12.0), rel=0.15)
+    assert result.verdict == "adequate"
+
+
+def test_states_slower_than_the_commands_have_the_noise_of_their_sensors():
+    nominal, true = bench("paper_high_impedance", 6)
+    record = recorded(true, 6, 20.0)
+    full = identify([record], nominal)
+    thin = np.searchsorted(record["position"].t, np.arange(0.02, 19.9, 0.01))
+    slow = {
+        n: Channel(record[n].t[thin], record[n].y[thin]) for n in ("position", "velocity", "motor_torque")
+    }
+    result = identify([record.with_channels(**slow)], nominal)
+    assert result.verdict == "adequate"
+    for n in slow:
+        assert result.noise_rms[n] == pytest.approx(full.noise_rms[n], rel=0.3), n
+
+
+def test_noise_that_agrees_with_another_sensor_is_no_noise():
+    """What both sensors see is a torque that the model lacks, however random it looks."""
+    from types import SimpleNamespace
+
+    rng = np.random.default_rng(7)
+    t = np.arange(5600) / 280.0
+    torque = lfilter([1.0], [1.0, -0.9], rng.normal(size=t.size))
+    other = lfilter([1.0], [1.0, -0.9], rng.normal(size=t.size))
+
+    def seen(position):
+        names = ("ft", "position")
+        case = SimpleNamespace(
+            t=dict.fromkeys(names, t),
+            mask=dict.fromkeys(names, np.ones(t.size, bool)),
+            measured={"ft": torque, "position": position},
+            drive=SimpleNamespace(t=t, torque=np.sin(t), q=np.cos(t), v=np.sin(3.0 * t)),
+        )
+        return is_noise(case, dict.fromkeys(names, np.zeros(t.size)), "ft")
+
+    assert seen(other)
+    assert not seen(torque + 0.1 * other)
