@@ -40,7 +40,8 @@ class Design:
 
     stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the torque asked for,
     nan where it cannot carry it. linear: rad, T / K_s. error: share by which Eq. (8) falls short of linear at
-    the deflection limit. resonance: Hz, with the rotor's spin. bands: Hz.
+    the deflection limit. inner: J_sc + n J_r, kg m^2. resonance: Hz, of the spring on it; nan where it is not
+    above zero, so that T_d / T_p only falls. bands: Hz.
     """
 
     requirement: Requirement
@@ -50,6 +51,7 @@ class Design:
     deflection: float
     linear: float
     error: float
+    inner: float
     resonance: float
     band_eq_7: float
     band_exact: float
@@ -79,7 +81,8 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
         deflection=theta,
         linear=float(mechanism.linear_deflection(stiffness, requirement.torque)),
         error=float(mechanism.linearity_error(requirement.deflection)),
-        resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi),
+        inner=inner,
+        resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi) if inner > 0.0 else math.nan,
         band_eq_7=band,
         band_exact=exact,
         checks=_checks(requirement, unit, stiffness, theta, band, exact),
@@ -148,4 +151,5 @@ def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
         name=f"{unit.name}, {stiffness:.0f} N m/rad",
         quantities={name: Quantity(value) for name, value in values.items()},
         clamped=frozenset(END_NAMES),
+        train=unit.train,
     )

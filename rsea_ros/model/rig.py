@@ -10,11 +10,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, get_args
 
 from rsea_ros.errors import RigError
+from rsea_ros.model.train import TRAINS, Train
 
-Train = Literal["planetary", "star", "lumped"]
 END_NAMES = ("housing_end", "spring_end")
 
 
@@ -196,10 +195,8 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
 def _check_structure(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    if rig.train not in get_args(Train):
-        raise RigError(
-            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}"
-        )
+    if rig.train not in TRAINS:
+        raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(TRAINS)}")
     for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
         if end not in END_NAMES:
             raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}")

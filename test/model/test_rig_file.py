@@ -115,7 +115,7 @@ NONSENSE = [
     (("wheels",), {}, "rig: unknown key 'wheels', expected one of about"),
     ((7,), {}, "rig: unknown key 7, expected one of about"),
     (("gear", "ratio", "value"), 0.5, "gear.ratio = 0.5 1, expected a finite value >= 1"),
-    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, lumped"),
+    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, harmonic_"),
     (("gear", "train"), ["star"], "gear.train = ['star'], expected"),
     (
         ("spring", "stiffness"),
