@@ -9,7 +9,7 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import end_to_end, flat_band
+from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.spring import spring_rate
@@ -69,7 +69,7 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
         raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
     inner = requirement.inertia + unit.spin
     exact = flat_band(
-        end_to_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg
+        end_over_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg
     )
     band = eq_7_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
@@ -117,7 +117,7 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     """Return the least K_s, N m/rad, whose exact band reaches the one asked for; bisection in log K_s."""
 
     def reaches(k_s: float) -> bool:
-        function = end_to_end(rig_of(requirement, unit, k_s))
+        function = end_over_end(rig_of(requirement, unit, k_s))
         return (
             flat_band(function, requirement.tolerance_db, requirement.tolerance_deg) >= requirement.bandwidth
         )

@@ -77,8 +77,8 @@ def _keys(d: Design) -> list[tuple[str, str]]:
         (f"{d.band_eq_7:.1f} Hz", "bandwidth by Eq. (7)"),
         (_hz(d.band_exact), "with the rotor's spin"),
         (f"{d.stiffness / 2:.0f} N·m", "most that Eq. (8) carries"),
-        (turned, f"deflection at {d.requirement.torque:.0f} N·m, Eq. (8)"),
-        (f"{math.degrees(d.linear):.0f}°", "deflection if it were linear"),
+        (turned, f"at {d.requirement.torque:.0f} N·m by Eq. (8)"),
+        (f"{math.degrees(d.linear):.0f}°", "as if linear"),
     ]
 
 
@@ -117,7 +117,7 @@ def _why(least: Design) -> str:
 
 def _map(designs: Sequence[Design]) -> Figure:
     r, unit = designs[0].requirement, designs[0].unit
-    j = np.geomspace(2e-4, 2e-2, 13)
+    j = np.geomspace(2e-4, 2e-2, 25)
     omega_2 = (2.0 * math.pi * r.bandwidth) ** 2 / PAPER_FACTOR
     bounds = stiffness_bounds(r, unit)
     spin = np.array([least_for_band(replace(r, inertia=float(v)), unit) for v in j])

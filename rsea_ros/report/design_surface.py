@@ -19,7 +19,7 @@ _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 @dataclass(frozen=True)
 class Point:
     """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2, of either sign. pole: of its
-    name, Hz. A negative inertia stands at its magnitude, below the surface: it falls at −3 dB."""
+    name, Hz. A negative inertia stands at its magnitude, above the surface."""
 
     name: str
     stiffness: float
@@ -75,7 +75,7 @@ def _scene() -> Json:
             "xaxis": named("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
             "yaxis": named("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
             "zaxis": named("bandwidth, Hz"),
-            "camera": {"eye": {"x": -1.25, "y": -1.3, "z": 0.6}, "center": {"x": 0, "y": 0, "z": -0.15}},
+            "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
             "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
         },
         hovermode="closest",
