@@ -68,9 +68,8 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
     inner = requirement.inertia + unit.spin
-    exact = flat_band(
-        end_over_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg
-    )
+    function = end_over_end(rig_of(requirement, unit, stiffness))
+    exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
     band = eq_7_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
     return Design(
