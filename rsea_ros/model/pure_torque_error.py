@@ -1,0 +1,192 @@
+"""Is |T_p - T_d| within a tolerance of |T_d|: the error of who takes the two ends' torques for one.
+
+Both are the observer's, and their RMS over the last `window` seconds are compared:
+
+    share = RMS(T_p - T_d) / RMS(T_d) <= tolerance
+
+A sine of frequency f has the share |1/H - 1|, H = T_d / T_p between clamped ends; where that passes the
+tolerance is the edge. Its interval is that over b_s and J_m within their spreads and over the trains that are
+possible. The verdict changes beyond a hysteresis, and only where the torque is large beside the observer's
+doubt of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from numpy.polynomial import polynomial
+
+from rsea_ros.errors import ParameterError, RigError
+from rsea_ros.model.bandwidth import end_over_end
+from rsea_ros.model.observer import Estimate
+from rsea_ros.model.observer.linear import structured
+from rsea_ros.model.pure_torque_window import empty_window, mean_squares
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.train import Train
+from rsea_ros.model.transfer import Fraction
+from rsea_ros.signals import FloatArray
+
+NINETY_PERCENT = 1.6449
+"""Sigmas either way that hold 90 % of a normal quantity."""
+
+NOTHING, PURE, BEYOND = range(3)
+TOLERANCE, WINDOW, HYSTERESIS, QUIET = range(4)
+VERDICT, HEARD, SHARE, LAST, MEMORY = range(5)
+AUDIBLE = 2.0
+"""Torque times tolerance that can be judged, in sigmas of the observer's T_p and T_d together."""
+AGAIN = 1.0
+"""s by which a stamp may be before the last one and of the same run; further back it begins anew."""
+VERDICTS = ("no torque", "pure", "beyond")
+"""In the order of NOTHING, PURE, BEYOND."""
+
+
+@dataclass(frozen=True)
+class ErrorSettings:
+    """tolerance: of |T_p - T_d| over |T_d|. window: s, over which both are measured, and the longest latency.
+
+    hysteresis: part of the tolerance, either way. quiet: s without torque after which none is said.
+
+    With less window or hysteresis noise whose share is the tolerance changes the verdict more than once a
+    second (bench/observer.py flag).
+    """
+
+    tolerance: float = 0.3
+    window: float = 0.5
+    hysteresis: float = 0.15
+    quiet: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("tolerance", 0.01, 1.0), ("window", 0.01, 10.0), ("hysteresis", 0.0, 0.5)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ParameterError(f"{name} = {value:g}, expected {low:g} to {high:g}")
+
+
+class Edge(NamedTuple):
+    """Where a sine has the share `tolerance`, Hz: of the rig as it is, and over what is not known of it."""
+
+    hz: float
+    low: float
+    high: float
+
+
+class ErrorFlag:
+    """The verdict of one rig, fed with the observer's estimates at increasing stamps (s).
+
+    trains: that the gear may have besides the rig's; they widen the edge's interval only.
+    """
+
+    def __init__(
+        self, rig: Rig, settings: ErrorSettings | None = None, trains: Sequence[Train] = ()
+    ) -> None:
+        """Raises RigError for a rig without a spring: there is one torque, not two."""
+        if rig.rigid_spring:
+            raise RigError(
+                f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
+            )
+        s = settings or ErrorSettings()
+        self.settings = s
+        self.edge = edge_of(structured(rig), s.tolerance, trains)
+        self._limits = np.array([s.tolerance, s.window, s.hysteresis, s.quiet])
+        self._memory = np.zeros(MEMORY)
+        self._memory[[HEARD, LAST]] = -math.inf
+        self._memory[SHARE] = math.nan
+        self._state, self._ring = empty_window()
+
+    def take(self, t: float, estimate: Estimate, *, heard: bool = False) -> int:
+        """Take in an estimate and return the verdict: NOTHING, PURE or BEYOND.
+
+        heard: a finer detector (pure_torque.py) hears a torque, be it too small to be judged here.
+        """
+        sigma = estimate.sigma_distal + estimate.sigma_proximal
+        distal, proximal = estimate.distal, estimate.proximal
+        arrays = (self._state, self._ring, self._limits, self._memory)
+        return int(judge_error(*arrays, t, distal, proximal, sigma, heard))
+
+    @property
+    def verdict(self) -> str:
+        """What is true now; the flag is up when it is `pure`."""
+        return VERDICTS[int(self._memory[VERDICT])]
+
+    @property
+    def share(self) -> float:
+        """RMS(T_p - T_d) / RMS(T_d) over the window; nan where the torque is too small to tell."""
+        return float(self._memory[SHARE])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def judge_error(state, ring, limits, memory, t, distal, proximal, sigma, heard):  # type: ignore[no-untyped-def]
+    """Take in both torques and the sum of their sigmas (N m) at a later t (s); return the verdict.
+
+    heard: hold the verdict while the torque is too small to be judged.
+    """
+    if memory[LAST] - t > AGAIN:
+        state[:], memory[:] = 0.0, 0.0
+        memory[HEARD] = memory[LAST] = -math.inf
+    if not t > memory[LAST]:
+        return memory[VERDICT]
+    memory[LAST] = t
+    error, torque = mean_squares(state, ring, limits[WINDOW], t, proximal - distal, distal)
+    least = AUDIBLE * sigma / limits[TOLERANCE]
+    memory[SHARE] = math.nan
+    if torque > least * least:
+        memory[SHARE] = math.sqrt(error / torque)
+        memory[VERDICT] = _verdict(memory[VERDICT], memory[SHARE], limits)
+    if torque > least * least or heard:
+        memory[HEARD] = t
+    elif not t - memory[HEARD] <= limits[QUIET]:
+        memory[VERDICT] = NOTHING
+    return memory[VERDICT]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _verdict(verdict, share, limits):  # type: ignore[no-untyped-def]
+    slack = 0.0 if verdict == NOTHING else limits[HYSTERESIS] * limits[TOLERANCE]
+    if share > limits[TOLERANCE] + slack:
+        return BEYOND
+    if share <= limits[TOLERANCE] - slack:
+        return PURE
+    return int(verdict)
+
+
+def edge_of(rig: Rig, tolerance: float, trains: Sequence[Train] = ()) -> Edge:
+    """Return where |1/H - 1| reaches a tolerance, and its range over 90 % of b_s and J_m and over trains."""
+    edges = [_edge(end_over_end(other), tolerance) for other in _possible(rig, trains)]
+    return Edge(_edge(end_over_end(rig), tolerance), min(edges), max(edges))
+
+
+def _possible(rig: Rig, trains: Sequence[Train]) -> Iterator[Rig]:
+    """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train."""
+    names = [n for n in ("spring.damping", "rotor.reflected_inertia") if n in rig.quantities]
+    for train in {rig.train, *trains}:
+        for steps in product((-1.0, 0.0, 1.0), repeat=len(names)):
+            values = {
+                n: rig[n] * math.exp(NINETY_PERCENT * step * rig.spread(n))
+                for n, step in zip(names, steps, strict=True)
+            }
+            yield replace(rig.with_values(values), train=train)
+
+
+def _edge(function: Fraction, tolerance: float) -> float:
+    """Return the lowest Hz at which |1/f - 1| is the tolerance, from roots of a polynomial; inf without."""
+    top = polynomial.polysub(function.denominator[::-1], function.numerator[::-1])
+    squares = [_square(p) for p in (top, function.numerator[::-1])]
+    roots = polynomial.polyroots(
+        polynomial.polytrim(polynomial.polysub(squares[0], tolerance**2 * squares[1]))
+    )
+    real = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
+    return float(real.min()) / (2.0 * math.pi) if len(real) else math.inf
+
+
+def _square(lowest_first: npt.NDArray[np.floating]) -> FloatArray:
+    """Return |p(i w)|^2 as a polynomial in w, lowest power first."""
+    values = np.asarray(lowest_first, dtype=np.float64) * 1j ** np.arange(len(lowest_first))
+    parts = [polynomial.polymul(part, part) for part in (values.real, values.imag)]
+    return np.asarray(polynomial.polyadd(*parts), dtype=np.float64)
