@@ -11,13 +11,13 @@ LENGTH = 8192
 """Samples that a window can hold: 0.8 s at 10 kHz."""
 ROUNDING = 1e-6
 """Part of the window by which a sample at its very beginning is out, so that stamps may be rounded."""
-NEWEST, OLDEST, SUM_ERROR, SUM_TORQUE, STATE = range(5)
-"""In `state`: rows of the ring, counted without end, and running sums of squares, N^2 m^2."""
+NEWEST, OLDEST, SUM_ERROR, SUM_TORQUE, SUMS = range(5)
+"""In `state`, first: rows of the ring, counted without end, and running sums of squares, N^2 m^2."""
 
 
-def empty_window() -> tuple[FloatArray, FloatArray]:
-    """Return state and ring (t, error^2, torque^2; s, N^2 m^2) of a window that has heard nothing."""
-    return np.zeros(STATE), np.zeros((LENGTH, 3))
+def empty_ring() -> FloatArray:
+    """Return a ring of t, error^2 and torque^2 (s, N^2 m^2) that has heard nothing."""
+    return np.zeros((LENGTH, 3))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
