@@ -20,14 +20,28 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_over_end
 from rsea_ros.model.observer import Estimate
 from rsea_ros.model.observer.linear import structured
-from rsea_ros.model.pure_torque_window import SUMS, empty_ring, mean_squares
+from rsea_ros.model.pure_torque_window import (
+    BEYOND,
+    HEARD,
+    HYSTERESIS,
+    LAST,
+    NOTHING,
+    PURE,
+    QUIET,
+    SHARE,
+    STATE,
+    TOLERANCE,
+    VERDICT,
+    WINDOW,
+    empty_ring,
+    judge_error,
+)
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.train import Train
 from rsea_ros.model.transfer import Fraction
@@ -36,14 +50,8 @@ from rsea_ros.signals import FloatArray
 NINETY_PERCENT = 1.6449
 """Sigmas either way that hold 90 % of a normal quantity."""
 
-NOTHING, PURE, BEYOND = range(3)
-TOLERANCE, WINDOW, HYSTERESIS, QUIET, VERDICT, HEARD, SHARE, LAST, STATE = range(SUMS, SUMS + 9)
-"""In the state, after the sums of the window: settings, verdict, times (s) and share. One array, for each
-argument of a compiled function costs 0.1 us a sample."""
-AUDIBLE = 2.0
-"""Torque times tolerance that can be judged, in sigmas of the observer's T_p and T_d together."""
-AGAIN = 1.0
-"""s by which a stamp may be before the last one and of the same run; further back it begins anew."""
+__all__ = ["BEYOND", "NOTHING", "PURE", "ErrorFlag", "ErrorSettings", "edge_of"]
+
 VERDICTS = ("no torque", "pure", "beyond")
 """In the order of NOTHING, PURE, BEYOND."""
 
@@ -98,6 +106,7 @@ class ErrorFlag:
         self._state, self._ring = np.zeros(STATE), empty_ring()
         self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
         self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
+        self.take(-math.inf, Estimate(*[0.0] * 6))  # compiles, and is too early to count
 
     def take(self, t: float, estimate: Estimate, *, heard: bool = False) -> int:
         """Take in an estimate and return the verdict: NOTHING, PURE or BEYOND.
@@ -118,41 +127,6 @@ class ErrorFlag:
     def share(self) -> float:
         """RMS(T_p - T_d) / RMS(T_d) over the window; nan where the torque is too small to tell."""
         return float(self._state[SHARE])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def judge_error(state, ring, t, distal, proximal, sigma, heard):  # type: ignore[no-untyped-def]
-    """Take in both torques and the sum of their sigmas (N m) at a later t (s); return the verdict.
-
-    heard: hold the verdict while the torque is too small to be judged.
-    """
-    if state[LAST] - t > AGAIN:
-        state[:SUMS], state[VERDICT] = 0.0, NOTHING
-        state[HEARD] = state[LAST] = -math.inf
-    if not t > state[LAST]:
-        return int(state[VERDICT])
-    state[LAST] = t
-    error, torque = mean_squares(state, ring, state[WINDOW], t, proximal - distal, distal)
-    least = AUDIBLE * sigma / state[TOLERANCE]
-    state[SHARE] = math.nan
-    if torque > least * least:
-        state[SHARE] = math.sqrt(error / torque)
-        state[VERDICT] = _verdict(state)
-    if torque > least * least or heard:
-        state[HEARD] = t
-    elif not t - state[HEARD] <= state[QUIET]:
-        state[VERDICT] = NOTHING
-    return int(state[VERDICT])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _verdict(state):  # type: ignore[no-untyped-def]
-    slack = 0.0 if state[VERDICT] == NOTHING else state[HYSTERESIS] * state[TOLERANCE]
-    if state[SHARE] > state[TOLERANCE] + slack:
-        return BEYOND
-    if state[SHARE] <= state[TOLERANCE] - slack:
-        return PURE
-    return int(state[VERDICT])
 
 
 def edge_of(rig: Rig, tolerance: float, trains: Sequence[Train] = ()) -> Edge:
