@@ -13,7 +13,7 @@ doubt of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
@@ -43,7 +43,6 @@ from rsea_ros.model.pure_torque_window import (
     judge_error,
 )
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.train import Train
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.signals import FloatArray
 
@@ -58,9 +57,9 @@ VERDICTS = ("no torque", "pure", "beyond")
 
 @dataclass(frozen=True)
 class ErrorSettings:
-    """tolerance: of |T_p - T_d| over |T_d|. window: s, over which both are measured, and the longest latency.
-
-    hysteresis: part of the tolerance, either way. quiet: s without torque after which none is said.
+    """tolerance: of |T_p - T_d| over |T_d|. window: s over which both are measured, at most 8192 samples; no
+    verdict is later than it. hysteresis: part of the tolerance, either way. quiet: s without torque after
+    which none is said.
 
     With less window or hysteresis noise whose share is the tolerance changes the verdict more than once a
     second (bench/observer.py flag).
@@ -72,7 +71,7 @@ class ErrorSettings:
     quiet: float = 0.2
 
     def __post_init__(self) -> None:
-        for name, low, high in (("tolerance", 0.01, 1.0), ("window", 0.01, 10.0), ("hysteresis", 0.0, 0.5)):
+        for name, low, high in (("tolerance", 0.01, 1.0), ("window", 0.01, 2.0), ("hysteresis", 0.0, 0.5)):
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ParameterError(f"{name} = {value:g}, expected {low:g} to {high:g}")
@@ -87,14 +86,9 @@ class Edge(NamedTuple):
 
 
 class ErrorFlag:
-    """The verdict of one rig, fed with the observer's estimates at increasing stamps (s).
+    """The verdict of one rig, fed with the observer's estimates at increasing stamps (s)."""
 
-    trains: that the gear may have besides the rig's; they widen the edge's interval only.
-    """
-
-    def __init__(
-        self, rig: Rig, settings: ErrorSettings | None = None, trains: Sequence[Train] = ()
-    ) -> None:
+    def __init__(self, rig: Rig, settings: ErrorSettings | None = None) -> None:
         """Raises RigError for a rig without a spring: there is one torque, not two."""
         if rig.rigid_spring:
             raise RigError(
@@ -102,7 +96,7 @@ class ErrorFlag:
             )
         s = settings or ErrorSettings()
         self.settings = s
-        self.edge = edge_of(structured(rig), s.tolerance, trains)
+        self.edge = edge_of(structured(rig), s.tolerance)
         self._state, self._ring = np.zeros(STATE), empty_ring()
         self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
         self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
@@ -129,16 +123,16 @@ class ErrorFlag:
         return float(self._state[SHARE])
 
 
-def edge_of(rig: Rig, tolerance: float, trains: Sequence[Train] = ()) -> Edge:
+def edge_of(rig: Rig, tolerance: float) -> Edge:
     """Return where |1/H - 1| reaches a tolerance, and its range over 90 % of b_s and J_m and over trains."""
-    edges = [_edge(end_over_end(other), tolerance) for other in _possible(rig, trains)]
+    edges = [_edge(end_over_end(other), tolerance) for other in _possible(rig)]
     return Edge(_edge(end_over_end(rig), tolerance), min(edges), max(edges))
 
 
-def _possible(rig: Rig, trains: Sequence[Train]) -> Iterator[Rig]:
+def _possible(rig: Rig) -> Iterator[Rig]:
     """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train."""
     names = [n for n in ("spring.damping", "rotor.reflected_inertia") if n in rig.quantities]
-    for train in {rig.train, *trains}:
+    for train in (rig.train, *rig.other_trains):
         for steps in product((-1.0, 0.0, 1.0), repeat=len(names)):
             values = {
                 n: rig[n] * math.exp(NINETY_PERCENT * step * rig.spread(n))

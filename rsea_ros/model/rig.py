@@ -102,7 +102,8 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
-    known: names that no fit may move. proximal: which end the paper's *proximal* is. ft_end: which end the
+    other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
+    may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
     """
 
@@ -111,6 +112,7 @@ class Rig:
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
     train: Train = "planetary"
+    other_trains: tuple[Train, ...] = ()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
@@ -197,6 +199,9 @@ def _check_structure(rig: Rig) -> None:
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
     if rig.train not in TRAINS:
         raise RigError(f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(TRAINS)}")
+    for train in rig.other_trains:
+        if train not in TRAINS:
+            raise RigError(f"rig {rig.name}: gear.or has {train!r}, expected one of {', '.join(TRAINS)}")
     for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
         if end not in END_NAMES:
             raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}")

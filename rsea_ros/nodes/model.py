@@ -42,7 +42,7 @@ TABLE = (
     ),
     Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
     Parameter("tolerance", 0.3, "of |T_p - T_d| over |T_d|: up to it the torque is pure", "", 0.01, 1.0),
-    Parameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 10.0),
+    Parameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 2.0),
     Parameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
     Parameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
     Parameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),

@@ -117,12 +117,11 @@ def test_edge_has_the_interval_of_damping_rotor_and_train():
     edge = edge_of(PLATFORM, 0.3)
     hard, soft = (edge_of(PLATFORM.with_values({"spring.damping": b}), 0.3).hz for b in (1.4, 6.5))
     assert edge.low < hard < edge.hz < soft < edge.high
-    alone = edge_of(KNEE, 0.3)
-    both = edge_of(KNEE, 0.3, PROTOTYPE_TRAINS)
-    other = edge_of(replace(KNEE, train=PROTOTYPE_TRAINS[1]), 0.3)
+    both = edge_of(KNEE, 0.3)
+    alone, other = (edge_of(replace(KNEE, train=t, other_trains=()), 0.3) for t in PROTOTYPE_TRAINS)
     assert both.low == min(alone.low, other.low)
     assert both.high == max(alone.high, other.high)
-    certain = replace(KNEE, quantities={n: replace(q, spread=0.0) for n, q in KNEE.quantities.items()})
+    certain = replace(KNEE, other_trains=(), quantities={n: replace(q, spread=0.0) for n, q in KNEE.quantities.items()})
     assert len(set(edge_of(certain, 0.3))) == 1
 
 
