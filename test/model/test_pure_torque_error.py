@@ -121,7 +121,8 @@ def test_edge_has_the_interval_of_damping_rotor_and_train():
     alone, other = (edge_of(replace(KNEE, train=t, other_trains=()), 0.3) for t in PROTOTYPE_TRAINS)
     assert both.low == min(alone.low, other.low)
     assert both.high == max(alone.high, other.high)
-    certain = replace(KNEE, other_trains=(), quantities={n: replace(q, spread=0.0) for n, q in KNEE.quantities.items()})
+    exact = {n: replace(q, spread=0.0) for n, q in KNEE.quantities.items()}
+    certain = replace(KNEE, other_trains=(), quantities=exact)
     assert len(set(edge_of(certain, 0.3))) == 1
 
 
