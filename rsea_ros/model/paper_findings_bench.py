@@ -49,9 +49,9 @@ def identification() -> Iterator[Finding]:
         "Table 2, b_m",
         f"23.088 N·m·s/rad cannot be viscous drag: at the no-load speed of 33.1 rpm it would take "
         f"{23.088 * claims.NO_LOAD_SPEED:.0f} N·m, the maker's no-load current of 1.65 A makes "
-        f"{bound * claims.NO_LOAD_SPEED:.0f} N·m, at most {bound:.1f} N·m·s/rad. Dry or load-dependent "
-        "friction, "
-        "linearised at the test's amplitude, is not spoken of.",
+        f"{bound * claims.NO_LOAD_SPEED:.0f} N·m, at most {bound:.1f} N·m·s/rad. Most of it is likely dry "
+        "friction, linearised at the test's amplitude; the paper names static friction only as the reason "
+        "for the added noise.",
     )
     yield Finding(
         "silent",
