@@ -158,6 +158,25 @@ def latency(rig: Rig, before: float, after: float, rate: float) -> float:
     return worst
 
 
+def restless(rig: Rig) -> tuple[float, float]:
+    """Return the most changes a second on a minute of flat noise, and up to where that was flat, Hz.
+
+    Exact torques at 1 kHz: T_p is T_d over H, around the circle.
+    """
+    rate, count, rng = 1000.0, 60_000, np.random.default_rng(0)
+    hz, function = np.fft.rfftfreq(count, 1.0 / rate), end_over_end(rig)
+    inverse = np.array([1.0 / function(2j * np.pi * f) for f in hz])
+    worst = (0.0, 0.0)
+    for top in np.arange(10.0, 120.0, 8.0):
+        torque = flat(count, rate, float(top), rng)
+        other = np.fft.irfft(np.fft.rfft(torque) * inverse, count)
+        judge = ErrorFlag(rig)
+        pairs = zip(torque.tolist(), other.tolist(), strict=True)
+        said = [judge.take(k / rate, Estimate(d, p, 0.0, 0.01, 0.01, 0.01)) for k, (d, p) in enumerate(pairs)]
+        worst = max(worst, (np.count_nonzero(np.diff(said[1000:])) / 59.0, float(top)))
+    return worst
+
+
 def flag(args: argparse.Namespace) -> Iterator[str]:
     """Print the table, then latencies, then benches that are not the model."""
     settings = ErrorSettings()
@@ -176,6 +195,9 @@ def flag(args: argparse.Namespace) -> Iterator[str]:
     for before, after in ((0.3, 1.1), (0.3, 1.5), (0.9, 1.5), (1.5, 0.9), (1.5, 0.3)):
         late = latency(rig, before, after, 1000.0)
         yield f"  sine from {before:g} to {after:g} of the edge: right after {late:.3f} s"
+    for name, _ in RIGS[1:]:
+        changes, top = restless(load_rig(name))
+        yield f"  {name}, noise flat to any frequency: {changes:.2f} changes/s at most (flat to {top:g} Hz)"
     yield "the bench is not the model (paper_high_impedance, 1 kHz): what the observer cannot know"
     yield head
     for what, values in OTHERS.items():
