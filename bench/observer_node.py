@@ -21,6 +21,7 @@ def main() -> int:
     """Run the node with a note of its times."""
     from rsea_ros.model.observer import Observer
     from rsea_ros.model.pure_torque import PureTorque
+    from rsea_ros.model.pure_torque_error import ErrorFlag
     from rsea_ros.nodes import model
 
     rows: list[tuple[int, ...]] = []
@@ -29,9 +30,9 @@ def main() -> int:
     def noted(kind: Any, name: str) -> None:
         original = getattr(kind, name)
 
-        def take(*args: Any) -> Any:
+        def take(*args: Any, **named: Any) -> Any:
             cpu, wall = time.thread_time_ns(), time.perf_counter_ns()
-            result = original(*args)
+            result = original(*args, **named)
             spent[0] += time.perf_counter_ns() - wall  # without thread_time_ns, which asks the kernel
             spent[1] += time.thread_time_ns() - cpu
             return result
@@ -50,6 +51,7 @@ def main() -> int:
 
     noted(Observer, "_take")
     noted(PureTorque, "take")
+    noted(ErrorFlag, "take")
     model.Model._work = woken  # type: ignore[method-assign]
     atexit.register(lambda: np.save(os.environ[MARK], np.array(rows, dtype=np.int64).reshape(-1, 5)))
     return model.main()

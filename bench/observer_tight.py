@@ -14,6 +14,7 @@ import numpy as np
 
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import PureTorque
+from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import FloatArray
@@ -35,7 +36,7 @@ def tight(args: argparse.Namespace) -> Iterator[str]:
 
 
 def _times(rig: Rig, jitter: float, pause: float = 0.0) -> FloatArray:
-    observer, flag, times = Observer(rig), PureTorque(rig), []
+    observer, heard, flag, times = Observer(rig), PureTorque(rig), ErrorFlag(rig), []
     shifts = jitter * np.random.default_rng(0).uniform(-1.0, 1.0, SAMPLES)
     for k, shift in enumerate(shifts.tolist()):
         time.sleep(pause)
@@ -44,8 +45,8 @@ def _times(rig: Rig, jitter: float, pause: float = 0.0) -> FloatArray:
         observer.state(t, 0.0, 0.0)
         estimate = observer.ft(t, 0.0)
         assert estimate is not None
-        flag.take(t, estimate)
+        flag.take(t, estimate, heard=heard.take(t, estimate) != "no torque")
         times.append((time.perf_counter_ns() - begin) / 1e3)
         if k == WARM // 2:
-            flag.calibrate(observer.error_model(1.0 / RATE), 1.0 / RATE)
+            heard.calibrate(observer.error_model(1.0 / RATE), 1.0 / RATE)
     return np.array(times[WARM:])

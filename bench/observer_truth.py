@@ -1,9 +1,9 @@
 """A bench that is simulated, with the true torques on both ends, got without the observer's output equations.
 
-T_p is what the load on the proximal end feels, from its motion: T_p = -(J w' + b w + K q); where that end is
-clamped, from the momentum of what is between the ends: T_p = T_d + (J_sc + n J_r) q_c''. Means over each of
-the last two steps before a stamp (0.45 ms at most), drawn on to it. T_d: the spring, its effects included.
-A spring before the proximal end is read instead.
+T_h is what the load on the housing's end feels, from its motion: T_h = -(J w' + b w + K q); where that end is
+clamped, from the momentum of what is between the ends: T_h = T_s + (J_sc + n J_r) q_c''. Means over each of
+the last two steps before a stamp (0.45 ms at most), drawn on to it. T_s: the spring, its effects included.
+A spring before the housing's end is read instead. Which of the two is T_d, the rig says.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ def true_run(rig: Rig, command: FloatArray, rate: float, seed: int = 0) -> Truth
     h, n = 1.0 / rate / count, len(command)
     machine, placement = build(rig, h, n / rate), mechanics(structured(rig)).placement
     out, rows = np.empty((count, 4)), np.empty((n, 4))
-    distal, proximal, sprung = np.empty(n), np.empty(n), math.isfinite(rig["proximal_spring.stiffness"])
+    spring, housing, sprung = np.empty(n), np.empty(n), math.isfinite(rig["proximal_spring.stiffness"])
     for k, torque in enumerate(command):
         means = []
         for i in range(count):
             before, held = machine.x.copy(), _spring(machine)
             run(machine, np.full(1, torque), out[i : i + 1], start=k / rate + i * h)
             mean = 0.5 * (held + _spring(machine))
-            means.append(_proximal(rig, placement, before, machine.x, h, mean))
-        rows[k], distal[k] = out[-1], _spring(machine)
-        proximal[k] = means[-1] if sprung else 1.5 * means[-1] - 0.5 * means[-2]
+            means.append(_housing(rig, placement, before, machine.x, h, mean))
+        rows[k], spring[k] = out[-1], _spring(machine)
+        housing[k] = means[-1] if sprung else 1.5 * means[-1] - 0.5 * means[-2]
     t, rng = np.arange(n) / rate, np.random.default_rng(seed)
     names = ("position", "velocity", "motor_torque", "ft")
     measured = {
@@ -55,17 +55,19 @@ def true_run(rig: Rig, command: FloatArray, rate: float, seed: int = 0) -> Truth
     }
     if rig.rigid_spring or "ft" not in rig.sensors:
         measured.pop("ft")
-    return Truth(Record({"command": Channel(t, command), **measured}, source=rig.name), distal, proximal)
+    record = Record({"command": Channel(t, command), **measured}, source=rig.name)
+    held = rig.proximal == "housing_end"
+    return Truth(record, spring, housing) if held else Truth(record, housing, spring)
 
 
 def _spring(machine: Machine) -> float:
     return float(machine.linear.outputs[2] @ machine.x + machine.table[st.SPRING_TORQUE])
 
 
-def _proximal(
-    rig: Rig, placement: FloatArray, a: FloatArray, b: FloatArray, h: float, distal: float
+def _housing(
+    rig: Rig, placement: FloatArray, a: FloatArray, b: FloatArray, h: float, spring: float
 ) -> float:
-    """Return T_p from the states before and after a step of h seconds."""
+    """Return T_h from the states before and after a step of h seconds."""
     half = placement.shape[1]
     angle, speed = placement @ (a + b)[:half] / 2.0, placement @ (a + b)[half:] / 2.0
     rate = placement @ (b - a)[half:] / h
@@ -74,6 +76,6 @@ def _proximal(
         twist, turn = angle[P] - angle[H], speed[P] - speed[H]
         return float(rig["proximal_spring.stiffness"] * twist + rig["proximal_spring.damping"] * turn)
     if not rig.end_is_free("housing_end"):
-        return distal + inner_inertia(rig) * float(rate[C])
+        return spring + inner_inertia(rig) * float(rate[C])
     inertia, damping, stiffness = (rig[f"housing_end.{name}"] for name in ("inertia", "damping", "stiffness"))
     return -float(inertia * rate[P] + damping * speed[P] + stiffness * angle[P])

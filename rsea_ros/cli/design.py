@@ -9,6 +9,7 @@ from typing import Any
 
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
+from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
 
 HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
@@ -71,6 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--unit", default=UNIT, help="motor and gear of the catalogue (default %(default)s)")
     parser.add_argument(
+        "--train", choices=TRAINS, help="of the gear, where the unit's own is another (default: the unit's)"
+    )
+    parser.add_argument(
         "--catalogue",
         type=Path,
         help="YAML of motor-gear units (default config/design/motor_gear_units.yaml)",
@@ -97,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
     place = results_place(args, "out/design", (JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
     requirement, unit = _requirement(args), unit_named(args.unit, args.catalogue)
+    unit = unit.with_train(args.train) if args.train else unit
     asked = judge(requirement, unit, args.stiffness)
     least = judge(requirement, unit, least_stiffness(requirement, unit))
     enough = robust_stiffness(requirement, unit)
@@ -127,6 +132,8 @@ def _requirement(args: argparse.Namespace) -> Requirement:
 
 
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
+    from rsea_ros.design.by_train import by_train
+    from rsea_ros.report import words
     from rsea_ros.report.design_page import verdict
 
     print(verdict(asked))
@@ -141,6 +148,13 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
         f"least stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
         f"{least.rate:.0f} N/m"
     )
+    for row in by_train(asked.requirement, asked.unit, asked.stiffness):
+        low, high = row.band_range
+        print(
+            f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "
+            f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N m/rad for "
+            f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N m/rad for all demands"
+        )
     if robust:
         print(f"with 95 % of all parts within tolerance: {robust.stiffness:.0f} N m/rad")
     print(f"report: {report}")

@@ -74,8 +74,10 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(path.read_text(encoding="utf-8"), end="")
         return 0
-    agree = sum(c["agrees"] for c in results["claims"])
-    print(f"{agree} of {len(results['claims'])} printed numbers come out to the last digit")
+    recomputed = [c for c in results["claims"] if c["status"] == "found"]
+    agree = sum(c["agrees"] for c in recomputed)
+    made = f"{len(recomputed)} printed numbers that others of the paper make"
+    print(f"{agree} of the {made} come out to the last digit")
     for name, models in results["moving_output"].items():
         for model, sensors in models.items():
             shares = ", ".join(f"{_share(j['explained'])} at the {j['sensor']}" for j in sensors)

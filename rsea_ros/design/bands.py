@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from control import TransferFunction
 
+from rsea_ros.design.by_train import band_range
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia
+from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia, undamped_band
 from rsea_ros.model.paper_formulas import eq_6_distal_per_proximal, eq_7_bandwidth
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import END_NAMES, Rig
@@ -29,7 +30,8 @@ class BandRow:
 
 @dataclass(frozen=True)
 class Bands:
-    """Of one actuator. eq_7, eq_7_spin: Hz, with J_sc and with J_sc + n J_r.
+    """Of one actuator. eq_7: Hz, with J_sc. eq_7_spin: Hz, with J_sc + n J_r, of either sign; spin_range: the
+    same over 90 % of J_m within its spread.
 
     spring_limit: N m at the deflection limit, of the nonlinear Eq. (8). motor_limit: by frequency (Hz), the
     amplitude of T_d, N m, that the motor's torque limit leaves against clamped ends.
@@ -37,6 +39,7 @@ class Bands:
 
     eq_7: float
     eq_7_spin: float
+    spin_range: tuple[float, float]
     rows: tuple[BandRow, ...]
     spring_limit: float
     motor_limit: Mapping[float, float]
@@ -51,10 +54,12 @@ def bands(rig: Rig, motor_torque: float, deflection: float = math.radians(5.0)) 
         "With the rotor's spin, element": end_to_end(rig, "element"),
         "With the rotor's spin, sensor sees K_s + b_s s": end_to_end(rig),
     }
-    edge = eq_7_bandwidth(k_s, inner_inertia(rig))
+    inner, spread = inner_inertia(rig), rig.spread("rotor.reflected_inertia")
+    edge = float(undamped_band(k_s, inner))
     return Bands(
         eq_7=eq_7_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
+        spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
         rows=tuple(BandRow(what, _edges(function)) for what, function in functions.items()),
         spring_limit=0.5 * k_s * math.sin(2.0 * deflection),
         motor_limit={f: motor_torque * _gain(rig, f) for f in (1.0, 5.0, 10.0, edge)},

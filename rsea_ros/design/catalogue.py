@@ -1,10 +1,14 @@
-"""Motor-gear units from config/design/motor_gear_units.yaml, every number with its unit and source."""
+"""Motor-gear units from config/design/motor_gear_units.yaml, every number with its unit and source.
+
+`train: {value: planetary, or: [star], source: …}` names the gear train, and the others that the sources allow
+where they leave it open; a number may have a `spread`, relative, one sigma.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +16,8 @@ from rsea_ros import strict_yaml
 from rsea_ros.checked import mapping, number, only_keys, text, unit
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.model.rig_file import rig_folders
+from rsea_ros.model.train import TRAINS, Train, rotor_turns, spin_inertia
+from rsea_ros.wording import shown
 
 FILE = "motor_gear_units.yaml"
 UNITS: Mapping[str, str] = {
@@ -24,25 +30,50 @@ UNITS: Mapping[str, str] = {
     "mass": "kg",
     "diameter": "m",
 }
-REQUIRED = ("ratio", "continuous_torque", "reflected_inertia", "reflected_damping")
+REQUIRED = ("train", "ratio", "continuous_torque", "reflected_inertia", "reflected_damping")
 
 
 @dataclass(frozen=True)
 class MotorGear:
-    """A motor with its gear. values: SI by name of UNITS; sources: where each comes from."""
+    """A motor with its gear.
+
+    trains: that of the unit, then the others that its sources allow. values: SI by name of UNITS. spreads:
+    relative, one sigma, of those that are uncertain. sources: where each value and the train come from.
+    """
 
     name: str
     about: str
+    trains: tuple[Train, ...]
     values: Mapping[str, float]
+    spreads: Mapping[str, float]
     sources: Mapping[str, str]
 
     def __getitem__(self, name: str) -> float:
         return self.values[name]
 
     @property
+    def train(self) -> Train:
+        """The train that the unit is taken to have."""
+        return self.trains[0]
+
+    def with_train(self, train: Train) -> MotorGear:
+        """Return the unit with this train for certain."""
+        return replace(self, trains=(train,))
+
+    @property
+    def turns(self) -> float:
+        """Return n, the rotor's turns for one of the output, both against the housing."""
+        return rotor_turns(self.train, self["ratio"])
+
+    @property
     def spin(self) -> float:
-        """J_m / N, kg m^2: what the rotor adds to J_sc between the two ends (planetary train)."""
-        return self["reflected_inertia"] / self["ratio"]
+        """What the rotor adds to J_sc between the two ends, kg m^2; negative where it turns backward."""
+        return spin_inertia(self.train, self["ratio"], self["reflected_inertia"])
+
+    @property
+    def rotor_spread(self) -> float:
+        """Relative one-sigma spread of the reflected inertia, and so of the spin."""
+        return self.spreads.get("reflected_inertia", 0.0)
 
     @property
     def strongest(self) -> float:
@@ -81,23 +112,58 @@ def _default_path() -> Path:
 def _unit(name: str, item: Any) -> MotorGear:
     body = dict(mapping(item, name))
     about = text(body.pop("about", ""), f"{name}.about")
-    only_keys(body, set(UNITS), name)
+    only_keys(body, {"train", *UNITS}, name)
     for key in REQUIRED:
         if key not in body:
-            raise FieldError(f"{name}.{key} is missing, expected a value in {UNITS[key]}", name)
+            expected = f"a value in {UNITS[key]}" if key in UNITS else f"one of {', '.join(TRAINS)}"
+            raise FieldError(f"{name}.{key} is missing, expected {expected}", name)
+    trains, origin = _trains(f"{name}.train", body.pop("train"))
     entries = {key: _entry(f"{name}.{key}", UNITS[key], entry) for key, entry in body.items()}
     return MotorGear(
-        name, about, {k: e[0] for k, e in entries.items()}, {k: e[1] for k, e in entries.items()}
+        name,
+        about,
+        trains,
+        {k: e[0] for k, e in entries.items()},
+        {k: e[2] for k, e in entries.items() if e[2] > 0.0},
+        {"train": origin, **{k: e[1] for k, e in entries.items()}},
     )
 
 
-def _entry(name: str, symbol: str, item: Any) -> tuple[float, str]:
+def train_named(name: Any, field: str) -> Train:
+    """Return a train. Raises FieldError for a name that is none."""
+    if name not in TRAINS:
+        raise FieldError(f"{field} = {shown(name)}, expected one of {', '.join(TRAINS)}", field)
+    return TRAINS[TRAINS.index(name)]
+
+
+def _trains(name: str, item: Any) -> tuple[tuple[Train, ...], str]:
+    body = mapping(item, name, expected="{value: planetary, source: …}")
+    only_keys(body, {"value", "or", "source"}, name)
+    others = body.get("or", [])
+    if not isinstance(others, list):
+        raise FieldError(f"{name}.or = {others!r}, expected a list of trains", f"{name}.or")
+    trains = tuple(
+        train_named(value, f"{name}.{key}")
+        for key, value in (("value", body.get("value")), *(("or", o) for o in others))
+    )
+    source = text(body.get("source", ""), f"{name}.source")
+    if not source:
+        raise FieldError(f"{name}.source is missing, expected where the train is known from", name)
+    return trains, source
+
+
+def _entry(name: str, symbol: str, item: Any) -> tuple[float, str, float]:
     body = mapping(item, name, expected=f"{{value: …, unit: {symbol}, source: …}}")
-    only_keys(body, {"value", "unit", "source"}, name)
+    only_keys(body, {"value", "unit", "spread", "source"}, name)
     unit(body.get("unit"), f"{name}.unit", symbol)
     value, source = number(body.get("value"), name, symbol), text(body.get("source", ""), f"{name}.source")
     if not 0.0 < value < math.inf or not source:
         raise FieldError(
             f"{name} = {value:g} {symbol}, source {source!r}, expected a value > 0 and a source", name
         )
-    return value, source
+    spread = number(body.get("spread", 0.0), f"{name}.spread", "relative, one sigma")
+    if not 0.0 <= spread < 10.0:
+        raise FieldError(
+            f"{name}.spread = {spread:g}, expected a relative one-sigma spread from 0 to 10", f"{name}.spread"
+        )
+    return value, source, spread

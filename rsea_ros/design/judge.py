@@ -9,7 +9,7 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import end_to_end, flat_band
+from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.spring import spring_rate
@@ -40,7 +40,8 @@ class Design:
 
     stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the torque asked for,
     nan where it cannot carry it. linear: rad, T / K_s. error: share by which Eq. (8) falls short of linear at
-    the deflection limit. resonance: Hz, with the rotor's spin. bands: Hz.
+    the deflection limit. inner: J_sc + n J_r, kg m^2. resonance: Hz, of the spring on it; nan where it is not
+    above zero, so that T_d / T_p only falls. bands: Hz.
     """
 
     requirement: Requirement
@@ -50,6 +51,7 @@ class Design:
     deflection: float
     linear: float
     error: float
+    inner: float
     resonance: float
     band_eq_7: float
     band_exact: float
@@ -66,9 +68,8 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
     inner = requirement.inertia + unit.spin
-    exact = flat_band(
-        end_to_end(rig_of(requirement, unit, stiffness)), requirement.tolerance_db, requirement.tolerance_deg
-    )
+    function = end_over_end(rig_of(requirement, unit, stiffness))
+    exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
     band = eq_7_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
     return Design(
@@ -79,7 +80,8 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
         deflection=theta,
         linear=float(mechanism.linear_deflection(stiffness, requirement.torque)),
         error=float(mechanism.linearity_error(requirement.deflection)),
-        resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi),
+        inner=inner,
+        resonance=math.sqrt(stiffness / inner) / (2.0 * math.pi) if inner > 0.0 else math.nan,
         band_eq_7=band,
         band_exact=exact,
         checks=_checks(requirement, unit, stiffness, theta, band, exact),
@@ -114,7 +116,7 @@ def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
     """Return the least K_s, N m/rad, whose exact band reaches the one asked for; bisection in log K_s."""
 
     def reaches(k_s: float) -> bool:
-        function = end_to_end(rig_of(requirement, unit, k_s))
+        function = end_over_end(rig_of(requirement, unit, k_s))
         return (
             flat_band(function, requirement.tolerance_db, requirement.tolerance_deg) >= requirement.bandwidth
         )
@@ -148,4 +150,5 @@ def rig_of(requirement: Requirement, unit: MotorGear, stiffness: float) -> Rig:
         name=f"{unit.name}, {stiffness:.0f} N m/rad",
         quantities={name: Quantity(value) for name, value in values.items()},
         clamped=frozenset(END_NAMES),
+        train=unit.train,
     )

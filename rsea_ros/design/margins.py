@@ -12,13 +12,14 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.judge import Design, judge, least_stiffness
 from rsea_ros.design.requirement import Requirement
-from rsea_ros.model.paper_formulas import PAPER_FACTOR
+from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.signals import FloatArray
 
 SPREADS: Mapping[str, float] = MappingProxyType(
-    {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "rotor": 0.25, "motor": 0.05}
+    {"rate": 0.05, "arm": 0.005, "spring_radius": 0.04, "inertia": 0.05, "motor": 0.05}
 )
-"""Relative, one sigma. rate: the paper's springs were 9.5 % below the maker's number. rotor: an estimate."""
+"""Relative, one sigma. rate: the paper's springs were 9.5 % below the maker's number. The rotor's spread is
+the unit's (catalogue.py)."""
 SAMPLES = 20_000
 
 
@@ -33,8 +34,18 @@ class Margin:
     share: float
 
 
-def margins(design: Design, spreads: Mapping[str, float] = SPREADS, seed: int = 0) -> tuple[Margin, ...]:
-    """Return the margins of a design, and last the share in which every demand is met at once."""
+def spreads_of(unit: MotorGear) -> dict[str, float]:
+    """Return every spread of a design with this unit."""
+    return {**SPREADS, "rotor": unit.rotor_spread}
+
+
+def margins(design: Design, spreads: Mapping[str, float] | None = None, seed: int = 0) -> tuple[Margin, ...]:
+    """Return the margins of a design, and last the share in which every demand is met at once.
+
+    spreads: by part, relative, one sigma; those of the design's unit where left out.
+    """
+    if spreads is None:
+        spreads = spreads_of(design.unit)
     r, draw = design.requirement, _draws(spreads, seed)
     arm, radius = r.arm * draw["arm"], r.spring_radius * draw["spring_radius"]
     k_s = 2.0 * design.rate * draw["rate"] * (arm**2 + radius**2 / 3.0)
@@ -42,8 +53,8 @@ def margins(design: Design, spreads: Mapping[str, float] = SPREADS, seed: int = 
     inner = inertia + design.unit.spin * draw["rotor"]
     theta, limit = np.degrees(mechanism.deflection(k_s, r.torque)), float(np.degrees(r.deflection))
     found = [
-        ("Bandwidth by Eq. (7)", "Hz", _band(k_s, inertia), r.bandwidth, True),
-        ("Bandwidth with the rotor's spin", "Hz", _band(k_s, inner), r.bandwidth, True),
+        ("Bandwidth by Eq. (7)", "Hz", undamped_band(k_s, inertia), r.bandwidth, True),
+        ("Bandwidth with the rotor's spin", "Hz", undamped_band(k_s, inner), r.bandwidth, True),
         ("Torque that the mechanism carries", "N m", mechanism.largest_torque(k_s), r.torque, True),
         ("Deflection", "deg", np.where(np.isnan(theta), np.inf, theta), limit, False),
         ("Peak torque of motor and gear", "N m", design.unit.strongest * draw["motor"], r.torque, True),
@@ -77,10 +88,6 @@ def _draws(spreads: Mapping[str, float], seed: int) -> dict[str, FloatArray]:
     """Return log-normal factors by part, shape (SAMPLES,)."""
     rng = np.random.default_rng(seed)
     return {name: np.exp(spread * rng.standard_normal(SAMPLES)) for name, spread in spreads.items()}
-
-
-def _band(k_s: FloatArray, inertia: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(PAPER_FACTOR * k_s / inertia) / (2.0 * np.pi))
 
 
 def _percentiles(values: FloatArray) -> tuple[float, float, float]:

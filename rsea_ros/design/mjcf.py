@@ -1,14 +1,17 @@
 """A rig as MJCF, the XML of the multibody engine MuJoCo, for a second opinion from other code.
 
-Every part is a body with its own hinge about the actuator's axis (z), so that the engine knows nothing of our
-coordinates; what joins them are fixed tendons, each a sum of joint angles:
+Housing and loads have their own hinges about the actuator's axis (z); gear output and rotor are borne where
+the mechanism bears them (mesh.py): a planetary train's rotor in the carrier, a harmonic drive's flexspline on
+its wave generator. So a hinge's angle is that against the bearing part, the engine composes the rotor's spin
+from the bodies by itself, and the train is one equality between two hinges, two gears in mesh:
+z_1 q_1 = s z_2 q_2.
 
-    spring       q_c - q_d, stiffness and damping     motor    q_c - q_h, driven and damped
-    train        q_r - (1 - n) q_h - n q_g = 0, an equality, where the gear is stiff (q_g = q_c)
-    gear         q_r / n - (1 - n) / n q_h - q_c, a spring, where it gives
+    spring       q_c - q_d, stiffness and damping       motor    q_c - q_h, driven and damped
+    gear         where it gives: chassis and rotor in the housing, a spring from chassis to the mesh's output
 
-A clamped end has no hinge. A pendulum (m g l) hangs along -y, half its inertia in a point mass; other masses
-are 1 kg on the axis, where they do nothing. The rig's effects are left out.
+Sums of hinges (fixed tendons) run along the bodies' chain. A clamped end has no hinge. A pendulum (m g l)
+hangs along -y, half its inertia in a point mass; other masses are 1 kg on the axis, where they do nothing.
+The rig's effects are left out.
 """
 
 from __future__ import annotations
@@ -17,8 +20,9 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree as xml
 
+from rsea_ros.design.mesh import Mesh, mesh_of
 from rsea_ros.errors import RigError
-from rsea_ros.model.equations import rotor_inertia, train_ratio
+from rsea_ros.model.equations import rotor_inertia
 from rsea_ros.model.rig import Rig
 
 GRAVITY = 9.80665
@@ -32,46 +36,64 @@ _LENGTH = {"housing_end": 0.4, "spring_end": -0.4}
 
 def mjcf(rig: Rig) -> str:
     """Return the model. Raises RigError for a rig that is lumped, has a rigid spring or a massless part."""
-    if rig.rigid_spring or rig.train == "lumped":
-        kind = "a rigid spring" if rig.rigid_spring else "the lumped train"
-        raise RigError(f"rig {rig.name}: {kind} cannot be exported, expected a spring and a real train")
+    if rig.rigid_spring:
+        raise RigError(f"rig {rig.name}: a rigid spring cannot be exported, expected a spring")
+    mesh = mesh_of(rig)
     root = xml.Element("mujoco", model=rig.name)
     xml.SubElement(root, "compiler", angle="radian")
     xml.SubElement(
         root, "option", timestep=f"{STEP:g}", integrator="RK4", gravity=f"0 {-GRAVITY} 0", tolerance="1e-12"
     )
-    _bodies(rig, xml.SubElement(root, "worldbody"))
-    _joined(rig, root)
+    parents = _bodies(rig, mesh, xml.SubElement(root, "worldbody"))
+    _joined(rig, mesh, parents, root)
     xml.indent(root)
     return xml.tostring(root, encoding="unicode") + "\n"
 
 
-def _bodies(rig: Rig, world: xml.Element) -> None:
+def _bodies(rig: Rig, mesh: Mesh, world: xml.Element) -> Mapping[str, str | None]:
+    """Add the parts; return in which part each is borne, None for the world."""
     elastic = math.isfinite(rig["proximal_spring.stiffness"])
+    moves = elastic or rig.end_is_free("housing_end")
+    housing = world
     if elastic:
-        _body(world, "housing", rig["housing.inertia"])
+        housing = _body(world, "housing", rig["housing.inertia"])
     if rig.end_is_free("housing_end"):
-        own = 0.0 if elastic else rig["housing.inertia"]
-        _end(rig, world, "housing_end", "proximal" if elastic else "housing", own)
+        fixed_to_it = 0.0 if elastic else rig["housing.inertia"]
+        load = _end(rig, world, "housing_end", "proximal" if elastic else "housing", fixed_to_it)
+        housing = housing if elastic else load
     else:
         _link(world, "housing_end")
-    _body(world, "rotor", rotor_inertia(rig))
-    _body(world, "chassis", rig["chassis.inertia"])
+    parents = _borne(rig, mesh, "housing" if moves else None)
+    bodies = {"housing": housing}
+    inertia = {"rotor": rotor_inertia(rig), "chassis": rig["chassis.inertia"]}
+    for name in sorted(inertia, key=lambda part: parents[part] in inertia):  # those in the housing first
+        bodies[name] = _body(bodies[parents[name] or "housing"], name, inertia[name])
     if rig.end_is_free("spring_end"):
         _end(rig, world, "spring_end", "distal", 0.0)
     else:
         _link(world, "spring_end")
+    return parents
 
 
-def _end(rig: Rig, world: xml.Element, end: str, name: str, own: float) -> None:
-    """Add the load of an end; own: inertia of the part that it is fixed to, kg m^2."""
-    inertia, weight = rig[f"{end}.inertia"] + own, rig[f"{end}.gravity"]
+def _borne(rig: Rig, mesh: Mesh, housing: str | None) -> dict[str, str | None]:
+    """Return where rotor and chassis are borne: in the housing, or one of them in the other, the arm."""
+    parents: dict[str, str | None] = {"rotor": housing, "chassis": housing}
+    if math.isinf(rig["gear.stiffness"]) and mesh.arm != "housing":
+        arm, other = ("rotor", "chassis") if mesh.arm == "rotor" else ("chassis", "rotor")
+        parents[other] = arm
+    return parents
+
+
+def _end(rig: Rig, world: xml.Element, end: str, name: str, fixed_to_it: float) -> xml.Element:
+    """Add and return the load of an end; fixed_to_it: inertia of the part that it is fixed to, kg m^2."""
+    inertia, weight = rig[f"{end}.inertia"] + fixed_to_it, rig[f"{end}.gravity"]
     body = _body(world, name, inertia, weight)
     joint = body.find("joint")
     assert joint is not None
     joint.set("stiffness", repr(rig[f"{end}.stiffness"]))
     joint.set("damping", repr(rig[f"{end}.damping"]))
     _link(body, end)
+    return body
 
 
 def _body(world: xml.Element, name: str, inertia: float, weight: float = 0.0) -> xml.Element:
@@ -96,27 +118,63 @@ def _link(parent: xml.Element, end: str) -> None:
     )
 
 
-def _joined(rig: Rig, root: xml.Element) -> None:
+def _joined(rig: Rig, mesh: Mesh, parents: Mapping[str, str | None], root: xml.Element) -> None:
     """Add springs, dampers, the train and the motor."""
-    n, tendons = train_ratio(rig), xml.SubElement(root, "tendon")
-    damping = rig["rotor.reflected_damping"]
-    _tendon(root, tendons, "spring", {"chassis": 1.0, "distal": -1.0}, *_spring(rig, "spring"))
-    if math.isinf(rig["gear.stiffness"]):
-        _tendon(root, tendons, "motor", {"chassis": 1.0, "housing": -1.0}, 0.0, damping)
-        _tendon(root, tendons, "train", {"rotor": 1.0, "housing": n - 1.0, "chassis": -n})
-        equality = xml.SubElement(root, "equality")
-        xml.SubElement(
-            equality, "tendon", tendon1="train", polycoef="0 0 0 0 0", solref=SOLREF, solimp=SOLIMP
-        )
+    tendons = xml.SubElement(root, "tendon")
+    damping, stiff = rig["rotor.reflected_damping"], math.isinf(rig["gear.stiffness"])
+
+    def tie(name: str, angles: Mapping[str, float], stiffness: float = 0.0, damping: float = 0.0) -> None:
+        _tendon(root, tendons, name, _hinges(angles, parents), stiffness, damping)
+
+    tie("spring", {"chassis": 1.0, "distal": -1.0}, *_spring(rig, "spring"))
+    output = {"chassis": 1.0} if stiff else _output(mesh)
+    tie("motor", _sum(output, {"housing": -1.0}), 0.0, damping)
+    if stiff:
+        _teeth(root, tendons, mesh)
     else:
-        _tendon(root, tendons, "motor", {"rotor": 1.0 / n, "housing": -1.0 / n}, 0.0, damping)
-        output = {"rotor": 1.0 / n, "housing": 1.0 - 1.0 / n}
-        _tendon(root, tendons, "gear", {**output, "chassis": -1.0}, rig["gear.stiffness"])
+        tie("gear", _sum(output, {"chassis": -1.0}), rig["gear.stiffness"])
     if math.isfinite(rig["proximal_spring.stiffness"]):
-        sides = {"proximal": 1.0, "housing": -1.0}
-        _tendon(root, tendons, "proximal_spring", sides, *_spring(rig, "proximal_spring"))
+        tie("proximal_spring", {"proximal": 1.0, "housing": -1.0}, *_spring(rig, "proximal_spring"))
     actuators = xml.SubElement(root, "actuator")
     xml.SubElement(actuators, "motor", name="motor", tendon="motor", gear="1")
+
+
+def _teeth(root: xml.Element, tendons: xml.Element, mesh: Mesh) -> None:
+    """Tie the hinges of the two gears, each its angle as seen from the arm: z_1 q_1 - s z_2 q_2 = 0.
+
+    A gear borne in the arm turns by its hinge; the housing, in which the arm is borne, by minus the arm's. (A
+    tendon, for the engine makes an equality of two joints much softer where one carries the other.)
+    """
+    part, factors = {"rotor": "rotor", "output": "chassis"}, (mesh.teeth[0], -mesh.sense * mesh.teeth[1])
+    hinges = {
+        part.get(gear, part.get(mesh.arm, "")): factor if gear in part else -factor
+        for gear, factor in zip(mesh.gears, factors, strict=True)
+    }
+    _tendon(root, tendons, "teeth", hinges)
+    equality = xml.SubElement(root, "equality")
+    xml.SubElement(equality, "tendon", tendon1="teeth", polycoef="0 0 0 0 0", solref=SOLREF, solimp=SOLIMP)
+
+
+def _output(mesh: Mesh) -> dict[str, float]:
+    """Return the mesh's output, a part without mass, as a sum of rotor's and housing's absolute angles."""
+    law = mesh.law()
+    return {name: -law[name] / law["output"] for name in ("rotor", "housing")}
+
+
+def _sum(*angles: Mapping[str, float]) -> dict[str, float]:
+    names = {name for part in angles for name in part}
+    return {name: sum(part.get(name, 0.0) for part in angles) for name in sorted(names)}
+
+
+def _hinges(angles: Mapping[str, float], parents: Mapping[str, str | None]) -> dict[str, float]:
+    """Return a sum of absolute angles as a sum of hinges along each part's chain of bearings."""
+    hinges: dict[str, float] = {}
+    for name, factor in angles.items():
+        part: str | None = name
+        while part is not None:
+            hinges[part] = hinges.get(part, 0.0) + factor
+            part = parents.get(part)
+    return hinges
 
 
 def _spring(rig: Rig, name: str) -> tuple[float, float]:
@@ -131,9 +189,9 @@ def _tendon(
     stiffness: float = 0.0,
     damping: float = 0.0,
 ) -> None:
-    """Add a sum of joint angles; those of clamped parts are left out."""
+    """Add a sum of hinge angles; those of clamped parts are left out."""
     moving = {joint.get("name") for joint in root.iter("joint")}
     fixed = xml.SubElement(tendons, "fixed", name=name, stiffness=repr(stiffness), damping=repr(damping))
     for joint, coefficient in angles.items():
-        if joint in moving:
+        if joint in moving and coefficient:
             xml.SubElement(fixed, "joint", joint=joint, coef=repr(coefficient))

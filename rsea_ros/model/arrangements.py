@@ -1,4 +1,4 @@
-"""The same actuator held by either end, with either train, lumped or not: transfer functions and limits.
+"""The same actuator held by either end, with any train, lumped or not: transfer functions and limits.
 
 With both ends clamped, n the train's ratio, J_r = J_m / N^2 and Z = J s^2 + b_s s + K_s:
 
@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.model import outputs, paper_formulas
+from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.response import frequency_response
-from rsea_ros.model.rig import END_NAMES, Rig, Train
+from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.train import TRAINS, Train
 from rsea_ros.signals import ComplexArray, FloatArray
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
-TRAINS: tuple[Train, ...] = ("planetary", "star", "lumped")
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def arrangements(rig: Rig) -> tuple[Arrangement, ...]:
 def _arrangement(rig: Rig) -> Arrangement:
     n, j_r, j_sc = train_ratio(rig), rotor_inertia(rig), rig["chassis.inertia"]
     outer = j_sc + n**2 * j_r
-    return Arrangement(rig.train, n, outer, outer if rig.train == "lumped" else j_sc + n * j_r)
+    return Arrangement(rig.train, n, outer, inner_inertia(rig))
 
 
 def limits(rig: Rig) -> tuple[Limit, ...]:

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.outputs import Sees
-from rsea_ros.model.paper_formulas import eq_7_bandwidth
+from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.train import spin_inertia
 from rsea_ros.model.transfer import Fraction, distal_over_proximal, distal_per_proximal
 from rsea_ros.signals import FloatArray
 
@@ -24,14 +24,30 @@ if TYPE_CHECKING:
 pure_torque_bandwidth = eq_7_bandwidth
 """Eq. (7): Hz from K_s (N m/rad) and J_sc (kg m^2)."""
 
+FALL_FACTOR = 10.0 ** (3.0 / 20.0) - 1.0
+"""0.41254, in the place of Eq. (7)'s 0.292 where J_inner is negative: 1 / (1 + 0.41254) is -3 dB."""
+
 
 def inner_inertia(rig: Rig) -> float:
     """Return J_sc + n J_r, kg m^2: what (T_p - T_d) / q_c'' is with both ends clamped.
 
-    n J_r = J_m / N for a planetary train is the spin of the rotor, which Eqs. (5) to (7) leave out.
-    Negative where a star train turns the rotor backward.
+    n J_r is the spin of the rotor, which Eqs. (5) to (7) leave out: J_m / N for a planetary train, negative
+    where the rotor turns against the output (train.py). A lumped rotor counts with the whole J_m.
     """
-    return rig["chassis.inertia"] + train_ratio(rig) * rotor_inertia(rig)
+    spin = spin_inertia(rig.train, rig["gear.ratio"], rig["rotor.reflected_inertia"])
+    return rig["chassis.inertia"] + spin
+
+
+def undamped_band(stiffness: float | FloatArray, inertia: float | FloatArray) -> FloatArray:
+    """Return up to where an undamped K_s / (J s^2 + K_s) is within 3 dB, Hz: Eq. (7) for either sign of J.
+
+    stiffness: K_s, N m/rad. inertia: J_inner, kg m^2. Above zero the response rises to a resonance and passes
+    +3 dB, Eq. (7); below zero it falls without one and passes -3 dB; at zero it has no edge.
+    """
+    inertia = np.asarray(inertia, dtype=np.float64)
+    factor = np.where(inertia > 0.0, PAPER_FACTOR, FALL_FACTOR)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt(factor * stiffness / np.abs(inertia)) / (2.0 * np.pi))
 
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:

@@ -3,7 +3,7 @@
 Coordinates (absolute angles, rad): h housing, g gear output before the gear's own compliance,
 c spring chassis, d distal output, p load on the housing's end. The rotor turns at
 
-    w_rotor = w_h + n (w_g - w_h),   n = N (planetary) or -(N - 1) (star: annulus and carrier exchanged)
+    w_rotor = w_h + n (w_g - w_h),   n by the kind of train (train.py): N for a planetary one
     w_rotor = N w_g                  (lumped: grounded, as if the housing's motion did not turn it)
 
 so with J_r = J_m / N^2 the kinetic energy
@@ -24,6 +24,7 @@ import numpy as np
 
 from rsea_ros.errors import RigError
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.train import rotor_turns
 from rsea_ros.signals import FloatArray
 
 H, G, C, D, P = range(5)
@@ -67,7 +68,7 @@ class Mechanics:
 
 def train_ratio(rig: Rig) -> float:
     """Return n, the rotor's turns for one of the gear output, both against the housing."""
-    return -(rig["gear.ratio"] - 1.0) if rig.train == "star" else rig["gear.ratio"]
+    return rotor_turns(rig.train, rig["gear.ratio"])
 
 
 def rotor_inertia(rig: Rig) -> float:

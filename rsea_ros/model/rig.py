@@ -10,12 +10,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, get_args
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
+from rsea_ros.model.train import TRAINS, Train
 
-Train = Literal["planetary", "star", "lumped"]
 END_NAMES = ("housing_end", "spring_end")
 
 
@@ -104,7 +103,8 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
-    known: names that no fit may move. proximal: which end the paper's *proximal* is. ft_end: which end the
+    other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
+    may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
     """
 
@@ -113,6 +113,7 @@ class Rig:
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
     train: Train = "planetary"
+    other_trains: tuple[Train, ...] = ()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
@@ -207,11 +208,15 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
 def _check_structure(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    if rig.train not in get_args(Train):
+    if rig.train not in TRAINS:
         raise RigError(
-            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(get_args(Train))}",
-            "gear.train",
+            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(TRAINS)}", "gear.train"
         )
+    for train in rig.other_trains:
+        if train not in TRAINS:
+            raise RigError(
+                f"rig {rig.name}: gear.or has {train!r}, expected one of {', '.join(TRAINS)}", "gear.or"
+            )
     for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
         if end not in END_NAMES:
             raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)

@@ -55,6 +55,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         clamped=clamped,
         rigid_spring=switch(groups["spring"], "spring.rigid"),
         train=groups["gear"].get("train", "planetary"),
+        other_trains=_other_trains(groups["gear"].get("or", [])),
         sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
         known=_known(
             document.get("known", []),
@@ -83,6 +84,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     for end in sorted(rig.clamped):
         document.setdefault(end, {})["clamped"] = True
     document.setdefault("gear", {})["train"] = rig.train
+    if rig.other_trains:
+        document["gear"]["or"] = list(rig.other_trains)
     if rig.rigid_spring:
         document.setdefault("spring", {})["rigid"] = True
     document["known"] = sorted(rig.known)
@@ -180,6 +183,12 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
         sensors[name] = Sensor(noise, quantum, floating, clock)
     return sensors
+
+
+def _other_trains(items: Any) -> tuple[Any, ...]:
+    if not isinstance(items, list):
+        raise RigError(f"gear.or = {shown(items)}, expected a list of trains", "gear.or")
+    return tuple(items)
 
 
 def _known(items: Any, stated: Collection[str]) -> frozenset[str]:

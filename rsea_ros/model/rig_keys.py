@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import get_args
 
 from rsea_ros.keys import NEEDED, Key, table
-from rsea_ros.model.rig import END_NAMES, FIELDS, Field, Train
+from rsea_ros.model.rig import END_NAMES, FIELDS, Field
+from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
 
 _END = (
@@ -33,10 +33,13 @@ _MEANINGS = {
         for key, meaning in zip(("inertia", "damping", "stiffness", "gravity"), _END, strict=True)
     },
 }  # fmt: skip
-_TRAINS = ", ".join(f"`{train}`" for train in get_args(Train))
+_TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS})
 SWITCHES: Mapping[str, Sequence[Key]] = {
-    "gear": (Key("train", _TRAINS, "planetary", "kind of gear train"),),
+    "gear": (
+        Key("train", _TRAINS, "planetary", "kind of gear train, and what of it is held"),
+        Key("or", "list of trains", "none", "others that it may be, where that is not known"),
+    ),
     "spring": (Key("rigid", "true or false", "false", "there is no spring"),),
     **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in END_NAMES},
 }  # fmt: skip

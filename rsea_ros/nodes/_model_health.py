@@ -9,6 +9,7 @@ from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.model.observer.consistency import Consistency
 from rsea_ros.model.pure_torque import PureTorque
+from rsea_ros.model.pure_torque_error import ErrorFlag
 from rsea_ros.model.rig import Rig
 from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.nodes._model_inputs import Inputs
@@ -23,8 +24,10 @@ CHANGED = 0.1
 class ModelHealth:
     """Assesses the node once a second, and keeps the flag told of the noise of the estimates."""
 
-    def __init__(self, rig: Rig, observer: Observer, flag: PureTorque, inputs: Inputs) -> None:
-        self._observer, self._flag, self._inputs = observer, flag, inputs
+    def __init__(
+        self, rig: Rig, observer: Observer, flag: PureTorque, error: ErrorFlag, inputs: Inputs
+    ) -> None:
+        self._observer, self._flag, self._error, self._inputs = observer, flag, error, inputs
         j_sc = rig["chassis.inertia"]
         sprung = j_sc > 0.0 and not rig.rigid_spring
         self._eq_7 = pure_torque_bandwidth(rig["spring.stiffness"], j_sc) if sprung else math.inf
@@ -47,7 +50,7 @@ class ModelHealth:
             )
         tests = self._observer.consistency()
         troubles = [*self._silence(), *(_told(name, test) for name, test in tests.items() if test.broken)]
-        summary = "; ".join(troubles) or self._flag.verdict
+        summary = "; ".join(troubles) or self._error.verdict
         return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
 
     def _calibrate(self) -> None:
@@ -73,7 +76,12 @@ class ModelHealth:
         here = math.isfinite(reading.occupied)
         gain, phase = self._flag.error_at(reading.occupied) if here else (math.nan, math.nan)
         return {
-            "verdict": reading.verdict,
+            "verdict": self._error.verdict,
+            "tolerance": f"{self._error.settings.tolerance:g}",
+            "error_share": f"{self._error.share:.4f}",
+            "error_edge_hz": f"{self._error.edge.hz:.2f}",
+            "error_edge_low_hz": f"{self._error.edge.low:.2f}",
+            "error_edge_high_hz": f"{self._error.edge.high:.2f}",
             "bandwidth_hz": self._edge(),
             "eq_7_hz": f"{self._eq_7:.2f}",
             "occupied_hz": f"{reading.occupied:.2f}",

@@ -14,6 +14,7 @@ from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
 from msg_adapters.topics import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
+from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
@@ -40,6 +41,9 @@ TABLE = (
         "ft_timeout", 0.02, "time without ft after which joint_states make the estimates", "s", 1e-3, 1.0
     ),
     Parameter("reliable", False, "lose nothing; needs reliable publishers, as replay's are"),
+    Parameter("tolerance", 0.3, "of |T_p - T_d| over |T_d|: up to it the torque is pure", "", 0.01, 1.0),
+    Parameter("error_window", 0.5, "over which that is measured, RMS", "s", 0.01, 2.0),
+    Parameter("error_hysteresis", 0.15, "part of that tolerance, either way", "", 0.0, 0.5),
     Parameter("tolerance_db", 3.0, "of |T_d/T_p| in the band of pure torque", "dB", 0.01, 40.0),
     Parameter("tolerance_deg", 30.0, "of its phase; 90 leaves that out of account", "deg", 0.1, 90.0),
     Parameter("share", 0.5, "of the torque's power above the edge, of a sine exactly at it", "", 0.05, 0.5),
@@ -64,26 +68,30 @@ class Model:
         observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
         names = ("tolerance_db", "tolerance_deg", "hysteresis", "window", "hold_on", "hold_off", "quiet")
         self._flag = PureTorque(rig, Settings(limit=values["share"], **{n: values[n] for n in names}))
+        asked = (values[n] for n in ("tolerance", "error_window", "error_hysteresis", "quiet"))
+        self._error = ErrorFlag(rig, ErrorSettings(*asked))
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
         self._pure = node.create_publisher(Bool, "pure_torque", LATCHED)
         self._pure.publish(bool_message(False))
         self._inputs = Inputs(node, observer, values["ft_timeout"], values["axis"], values["reliable"])
-        self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
+        self._assess = ModelHealth(rig, observer, self._flag, self._error, self._inputs)
         self._lock = threading.Lock()
         self._health = Health(node, self._report)
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
         keep_time(node, self._waiter, values["realtime_priority"])
-        node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")
+        node.get_logger().info(f"rig {rig.name}: pure torque up to {self._error.edge.hz:.1f} Hz")
 
     def _work(self) -> None:
         """Publish an estimate for each sample that came, and the flag when it changes."""
         with self._lock:
             for stamp, estimate in self._inputs.take():
                 self._estimates.publish(self._writer.write(stamp, estimate))
-                was = self._flag.verdict == "pure"
-                now = self._flag.take(self._inputs.seconds(stamp), estimate) == "pure"
+                was = self._error.verdict == "pure"
+                t = self._inputs.seconds(stamp)
+                heard = self._flag.take(t, estimate) != "no torque"
+                now = self._error.take(t, estimate, heard=heard) == PURE
                 if now != was:
                     self._pure.publish(bool_message(now))
                 self._assess.tell(estimate)

@@ -77,6 +77,7 @@ def epicyclic_circuit() -> str:
     _voltage(d, (0.8, 0.3), (0.8, top - 0.8), "T_p")
     _voltage(d, (13.3, 0.3), (13.3, top - 0.8), "T_d")
     _dots(d, (5.9, 0), (8.2, 0), (8.2, top), (11.4, 0), (11.4, top))
+    _polarity(d, (3.42, 4.3), (4.6, 3.42), (7.82, 3.05), (7.05, 3.35))
     return _svg(d, "Equivalent circuit with the epicyclic train as a three-port")
 
 
@@ -132,6 +133,12 @@ def _voltage(d: schemdraw.Drawing, low: Point, high: Point, text: str) -> None:
 def _dots(d: schemdraw.Drawing, *points: Point) -> None:
     for point in points:
         d += elm.Dot(radius=0.07).at(point).color(INK)
+
+
+def _polarity(d: schemdraw.Drawing, *points: Point) -> None:
+    """Mark one end of each winding: a velocity that enters a winding at its mark leaves the other at its."""
+    for point in points:
+        d += elm.Dot(radius=0.08).at(point).color(AFTER)
 
 
 def _drawing() -> schemdraw.Drawing:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rsea_ros.design.by_train import WithTrain, by_train
 from rsea_ros.design.judge import Design, stiffness_bounds
 from rsea_ros.design.margins import margins
 
@@ -16,6 +17,8 @@ def design_json(asked: Design, least: Design, robust: Design | None) -> dict[str
         "schema": 1,
         "requirement": {name: getattr(r, name) for name in r.__dataclass_fields__},
         "unit": asked.unit.name,
+        "train": asked.unit.train,
+        "by_train": [_by_train(row) for row in by_train(r, asked.unit, asked.stiffness)],
         "least_stiffness_by_demand": stiffness_bounds(r, asked.unit),
         "asked": _design(asked),
         "least": _design(least),
@@ -32,9 +35,10 @@ def _design(d: Design) -> dict[str, Any]:
         "deflection": _finite(d.deflection),
         "linear_deflection": d.linear,
         "linearity_error_at_limit": d.error,
-        "resonance_hz": d.resonance,
+        "inner_inertia": d.inner,
+        "resonance_hz": _finite(d.resonance),
         "bandwidth_eq_7_hz": d.band_eq_7,
-        "bandwidth_exact_hz": d.band_exact,
+        "bandwidth_exact_hz": _finite(d.band_exact),
         "feasible": d.feasible,
         "checks": [
             {"name": c.name, "value": _finite(c.value), "limit": c.limit, "unit": c.unit, "met": c.met}
@@ -49,6 +53,18 @@ def _design(d: Design) -> dict[str, Any]:
             }
             for m in margins(d)
         ],
+    }
+
+
+def _by_train(row: WithTrain) -> dict[str, Any]:
+    return {
+        "train": row.train,
+        "turns": row.turns,
+        "inner_inertia": row.inner,
+        "bandwidth_exact_hz": _finite(row.band),
+        "bandwidth_hz_90_percent_of_rotor_inertia": [_finite(v) for v in row.band_range],
+        "least_stiffness_for_bandwidth": row.for_band,
+        "least_stiffness": row.least,
     }
 
 

@@ -9,15 +9,23 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.design.by_train import by_train
 from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_to_end
+from rsea_ros.model.bandwidth import FALL_FACTOR, end_to_end
 from rsea_ros.model.paper_formulas import PAPER_FACTOR
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.design_map import Demand, feasible_map
 from rsea_ros.report.design_surface import Point, bandwidth_surface
-from rsea_ros.report.design_tables import checks_table, margins_table, springs_table
+from rsea_ros.report.design_tables import (
+    checks_table,
+    hertz,
+    margins_table,
+    signed,
+    springs_table,
+    trains_table,
+)
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.page import Block, equation, key_numbers, page, section
 from rsea_ros.report.palette import AFTER, BEFORE, INK, QUIET, TRUTH
@@ -34,6 +42,7 @@ def design_report(asked: Design, least: Design, robust: Design | None) -> str:
         key_numbers(_keys(asked)),
         _sentences(asked, least),
         checks_table(designs),
+        trains_table(by_train(asked.requirement, asked.unit, asked.stiffness), asked),
         _map(designs),
         bandwidth_surface(*_surface(designs)),
         _open_loop(designs),
@@ -49,7 +58,7 @@ def verdict(d: Design) -> str:
     what = f"{d.stiffness:.0f} N·m/rad"
     if not unmet:
         turned = f"{math.degrees(d.deflection):.1f}° at {d.requirement.torque:.0f} N·m"
-        return f"{what} meet every demand: {d.band_exact:.1f} Hz, {turned}"
+        return f"{what} meet every demand: {_hz(d.band_exact)}, {turned}"
     band = f"{what} reach {d.band_eq_7:.1f} Hz by Eq. (7)"
     return f"{band}, but miss {len(unmet)} of {len(d.checks)} demands"
 
@@ -66,10 +75,10 @@ def _keys(d: Design) -> list[tuple[str, str]]:
     turned = "none" if math.isnan(d.deflection) else f"{math.degrees(d.deflection):.1f}°"
     return [
         (f"{d.band_eq_7:.1f} Hz", "bandwidth by Eq. (7)"),
-        (f"{d.band_exact:.1f} Hz", "with the rotor's spin"),
+        (_hz(d.band_exact), "with the rotor's spin"),
         (f"{d.stiffness / 2:.0f} N·m", "most that Eq. (8) carries"),
-        (turned, f"deflection at {d.requirement.torque:.0f} N·m, Eq. (8)"),
-        (f"{math.degrees(d.linear):.0f}°", "deflection if it were linear"),
+        (turned, f"at {d.requirement.torque:.0f} N·m by Eq. (8)"),
+        (f"{math.degrees(d.linear):.0f}°", "as if linear"),
     ]
 
 
@@ -84,12 +93,20 @@ def _sentences(asked: Design, least: Design) -> str:
             f"Eq. (8)   T ≤ K_s / 2 = {asked.stiffness / 2:.0f} N·m at 45°, {r.torque:.0f} N·m asked for\n"
             f"linear    T / K_s = {asked.linear:.2f} rad = {math.degrees(asked.linear):.0f}°, "
             f"{math.degrees(r.deflection):.0f}° allowed\n"
-            f"spin      J_sc + J_m / N = {1e3 * r.inertia:.3f} + {1e3 * spin:.3f} g·m²  →  "
-            f"{asked.band_exact:.1f} Hz"
+            f"spin      J_sc + n J_r = {1e3 * r.inertia:.3f} {_term(1e3 * spin)} g·m²  →  "
+            f"{_hz(asked.band_exact)}   ({words.train(asked.unit.train)}, n = {signed(asked.unit.turns, 0)})"
         ),
         f"<p>The least stiffness that meets all demands on the spring is <b>{least.stiffness:.0f} N·m/rad</b>"
         f" with this motor and gear: {escape(_why(least))}.</p>",
     )
+
+
+def _hz(value: float) -> str:
+    return hertz(value) + (" Hz" if math.isfinite(value) else "")
+
+
+def _term(value: float) -> str:
+    return f"{'−' if value < 0.0 else '+'} {abs(value):.3f}"
 
 
 def _why(least: Design) -> str:
@@ -100,7 +117,7 @@ def _why(least: Design) -> str:
 
 def _map(designs: Sequence[Design]) -> Figure:
     r, unit = designs[0].requirement, designs[0].unit
-    j = np.geomspace(2e-4, 2e-2, 13)
+    j = np.geomspace(2e-4, 2e-2, 25)
     omega_2 = (2.0 * math.pi * r.bandwidth) ** 2 / PAPER_FACTOR
     bounds = stiffness_bounds(r, unit)
     spin = np.array([least_for_band(replace(r, inertia=float(v)), unit) for v in j])
@@ -111,24 +128,33 @@ def _map(designs: Sequence[Design]) -> Figure:
         Demand(f"K_s/2 = {r.torque:g} N·m", QUIET, j, bounds["Torque, K_s/2"] * flat),
         Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, omega_2 * j),
     ]
-    lightest = spin[0]
-    title = (
-        f"However light the chassis, {r.bandwidth:g} Hz need {lightest:.0f} N·m/rad with this rotor: "
-        "Eq. (7) sees only the chassis"
-    )
     points = [
         Point(f"{d.stiffness:.0f}", d.stiffness, r.inertia, c)
         for d, c in zip(designs, _COLOURS, strict=False)
     ]
     caption = "A design meets a demand above its line. Eq. (7) is the only one that the paper draws."
-    return feasible_map(title, points, demands, caption)
+    return feasible_map(_map_title(designs[0]), points, demands, caption)
+
+
+def _map_title(d: Design) -> str:
+    r, spin = d.requirement, d.unit.spin
+    alone = abs(spin) * (2.0 * math.pi * r.bandwidth) ** 2 / (PAPER_FACTOR if spin > 0.0 else FALL_FACTOR)
+    if spin > 0.0:
+        return (
+            f"However light the chassis, {r.bandwidth:g} Hz need {alone:.0f} N·m/rad with this rotor: "
+            "Eq. (7) sees only the chassis"
+        )
+    return (
+        f"A chassis without mass needs {alone:.0f} N·m/rad for {r.bandwidth:g} Hz; a heavier one less, "
+        f"until it cancels the rotor's spin at {1e3 * abs(spin):.1f} g·m²"
+    )
 
 
 def _surface(designs: Sequence[Design]) -> tuple[str, list[Point], str]:
     d = designs[0]
     points = [
         Point(f"{d.stiffness:.0f} N·m/rad, chassis", d.stiffness, d.requirement.inertia, AFTER),
-        Point("the same with the rotor's spin", d.stiffness, d.requirement.inertia + d.unit.spin, BEFORE),
+        Point("the same with the rotor's spin", d.stiffness, d.inner, BEFORE),
     ]
     title = "Bandwidth by Eq. (7) over stiffness and inertia (Fig. 9): drag to turn"
     return title, points, "Both horizontal axes are logarithmic; lines of equal bandwidth every 20 Hz."
@@ -143,9 +169,15 @@ def _open_loop(designs: Sequence[Design]) -> Figure:
         ends = end_to_end(rig)(2j * np.pi * hz)
         curves.append(Response(f"{d.stiffness:.0f}: T_d/T_p", colour, hz, ends))
         curves.append(Response(f"{d.stiffness:.0f}: T_d/T_m", colour, hz, motor, 1.2, "dot"))
+    first = designs[0]
+    between = (
+        f"resonate at {first.resonance:.1f} Hz"
+        if first.inner > 0.0
+        else f"fall below −3 dB at {_hz(first.band_exact)}, without a resonance"
+    )
     title = (
-        f"Between the ends {designs[0].stiffness:.0f} N·m/rad resonate at {designs[0].resonance:.1f} Hz; "
-        "the motor itself, with its reflected inertia, reaches less"
+        f"Between the ends {first.stiffness:.0f} N·m/rad {between}; the motor itself, with its reflected "
+        "inertia, reaches less"
     )
     caption = (
         "Solid: end to end, the pure-torque criterion. Dotted: open loop from the motor, both ends clamped."
@@ -155,7 +187,8 @@ def _open_loop(designs: Sequence[Design]) -> Figure:
 
 
 def _footer(d: Design) -> list[str]:
-    sources = [f"{k.replace('_', ' ')} {d.unit[k]:g} ({s})" for k, s in d.unit.sources.items()]
+    sources = [f"train {words.train(d.unit.train)} ({d.unit.sources['train']})"]
+    sources += [f"{k.replace('_', ' ')} {v:g} ({d.unit.sources[k]})" for k, v in d.unit.values.items()]
     return [
         f"{d.unit.name}: {'; '.join(sources)}",
         "Damping of spring and chassis: ratio 0.025, assumed.",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.model.paper_formulas import PAPER_FACTOR
 from rsea_ros.report.figure import Figure, Json, axis, label, layout, line, numbers
 from rsea_ros.report.palette import INK, QUIET, faint
@@ -17,7 +18,8 @@ _SHADES = [[0.0, "#eef3f8"], [0.5, "#7fa8cf"], [1.0, "#123f6d"]]
 
 @dataclass(frozen=True)
 class Point:
-    """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2. pole: of its name, Hz."""
+    """An actuator. stiffness: K_s, N m/rad. inertia: between its ends, kg m^2, of either sign. pole: of its
+    name, Hz. A negative inertia stands at its magnitude, above the surface."""
 
     name: str
     stiffness: float
@@ -45,12 +47,12 @@ def bandwidth_surface(title: str, points: Sequence[Point], caption: str = "") ->
 
 def _flag(p: Point) -> Json:
     """Return a point of the surface with its name on a pole: text in the surface would be cut by it."""
-    z = float(_band(np.array(p.stiffness), np.array(p.inertia)))
+    z = float(undamped_band(p.stiffness, p.inertia))
     return {
         "type": "scatter3d",
         "mode": "lines+markers+text",
         "x": [p.stiffness] * 2,
-        "y": [1e3 * p.inertia] * 2,
+        "y": [1e3 * abs(p.inertia)] * 2,
         "z": [z, z + p.pole],
         "text": ["", f"<b>{p.name}</b>"],
         "textposition": "top center",
@@ -73,7 +75,7 @@ def _scene() -> Json:
             "xaxis": named("stiffness, N·m/rad", type="log", **log_marks(200, 500, 1000, 2000)),
             "yaxis": named("inertia, g·m²", type="log", **log_marks(0.5, 1, 2, 5, 10)),
             "zaxis": named("bandwidth, Hz"),
-            "camera": {"eye": {"x": -1.25, "y": -1.3, "z": 0.6}, "center": {"x": 0, "y": 0, "z": -0.15}},
+            "camera": {"eye": {"x": -1.36, "y": -1.42, "z": 0.68}, "center": {"x": 0, "y": 0, "z": -0.2}},
             "aspectratio": {"x": 1.25, "y": 1.25, "z": 0.85},
         },
         hovermode="closest",
@@ -96,7 +98,7 @@ def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:
         data.append(line(k, y, f"{1e3 * value:g} g·m²", shade, xaxis="x2", yaxis="y2"))
         names.append(_end(f"{1e3 * value:g} g·m²", k[-1], y[-1], shade, "2"))
     for p in points:
-        z = float(_band(np.array(p.stiffness), np.array(p.inertia)))
+        z = float(undamped_band(p.stiffness, p.inertia))
         marker = {
             "type": "scatter",
             "mode": "markers",
@@ -104,7 +106,7 @@ def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:
             "name": p.name,
         }
         data += [
-            {**marker, "x": [1e3 * p.inertia], "y": [z]},
+            {**marker, "x": [1e3 * abs(p.inertia)], "y": [z]},
             {**marker, "x": [p.stiffness], "y": [z], "xaxis": "x2", "yaxis": "y2"},
         ]
     return Figure(title, caption, data, _two(names), 400)
@@ -134,7 +136,7 @@ def _two(names: list[Json]) -> Json:
 
 def _grid(points: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
     """Return stiffnesses and inertias that hold the points with room around."""
-    k, j = (np.array([getattr(p, n) for p in points]) for n in ("stiffness", "inertia"))
+    k, j = (np.abs([getattr(p, n) for p in points]) for n in ("stiffness", "inertia"))
     stiffness: FloatArray = np.geomspace(min(100.0, k.min() / 2), max(4000.0, 1.5 * k.max()), 40)
     inertia: FloatArray = np.geomspace(min(3e-4, j.min() / 2), max(2e-2, 1.5 * j.max()), 40)
     return stiffness, inertia

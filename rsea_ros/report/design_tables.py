@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
 from rsea_ros.design.judge import Check, Design, judge
-from rsea_ros.design.margins import SPREADS, Margin, margins
+from rsea_ros.design.margins import Margin, margins, spreads_of
 from rsea_ros.report import words
 from rsea_ros.report.page import section
 from rsea_ros.report.table import table
@@ -36,6 +37,55 @@ def _cell(check: Check) -> str:
 
 def _unit(check: Check) -> str:
     return "°" if check.unit == "deg" else words.unit(check.unit)
+
+
+def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
+    """Return the design with every train that the unit may have, and what J_m leaves open."""
+    hz = d.requirement.bandwidth
+    head = [
+        "Train",
+        "n",
+        "J_sc + n J_r, g·m²",
+        f"±3 dB with K_s = {d.stiffness:.0f}, Hz",
+        "90 % of J_m, Hz",
+        f"K_s for {hz:g} Hz, N·m/rad",
+        "K_s for all demands",
+    ]
+    body = [
+        [
+            words.train(row.train),
+            signed(row.turns, 0),
+            signed(1e3 * row.inner, 2),
+            hertz(row.band),
+            " to ".join(hertz(v) for v in row.band_range),
+            f"{row.for_band:.0f}",
+            f"{row.least:.0f}",
+        ]
+        for row in rows
+    ]
+    spread, factor = 100.0 * d.unit.rotor_spread, math.exp(NINETY_PERCENT * d.unit.rotor_spread)
+    caption = (
+        f"J_m = {d.unit['reflected_inertia']:g} kg·m² within {spread:.0f} % (one sigma, log-normal: 90 % "
+        f"from 1/{factor:.2f} to {factor:.2f} times). A rotor that turns against the output takes its spin "
+        "from the chassis' inertia: below zero T_d/T_p falls without a resonance, and a heavier chassis "
+        f"widens the band. Train: {d.unit.sources['train']}."
+    )
+    title = (
+        "Which way the rotor turns is not known: both senses side by side"
+        if sense_unknown(rows)
+        else "What the rotor's spin makes of the band"
+    )
+    return section(title, table(head, body, numbers=range(1, 7)), caption=caption)
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a number with its sign."""
+    return f"{value:+.{digits}f}".replace("-", "−")
+
+
+def hertz(value: float) -> str:
+    """Return a frequency, or that it has no limit."""
+    return "no limit" if math.isinf(value) else f"{value:.1f}"
 
 
 def springs_table(designs: Sequence[Design]) -> str:
@@ -72,7 +122,7 @@ def margins_table(d: Design) -> str:
     rows = margins(d)
     head = ["Quantity", "5 %", "median", "95 %", "limit", "meets it"]
     body = [_margin_row(m) for m in rows]
-    spreads = ", ".join(f"{name.replace('_', ' ')} {100 * s:g} %" for name, s in SPREADS.items())
+    spreads = ", ".join(f"{name.replace('_', ' ')} {100 * s:g} %" for name, s in spreads_of(d.unit).items())
     finding = (
         f"With parts that scatter, {100 * rows[-1].share:.0f} % of the actuators with {d.stiffness:.0f} "
         "N·m/rad "

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rsea_ros.model import outputs
 from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import end_to_end, inner_inertia
+from rsea_ros.model.bandwidth import end_to_end, inner_inertia, undamped_band
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.lumped import lumped
+from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS
+from rsea_ros.model.paper_moving import readings
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.circuit_drawing import epicyclic_circuit, general_circuit
@@ -51,9 +56,15 @@ def _moving_output() -> str:
     rig = load_rig("paper_moving_output")
     curves = [
         Response(name, colour, _HZ, frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ))
-        for name, model, colour in (("unlumped", rig, AFTER), ("lumped", lumped(rig), BEFORE))
+        for (name, model), colour in zip(readings(rig).items(), (AFTER, TRUTH, BEFORE), strict=True)
     ]
-    return gain_svg(curves, (-60.0, 10.0), [Mark(1.34, "1.34 Hz"), Mark(19.8, "19.8 Hz")])
+    return gain_svg(
+        curves, (-70.0, 10.0), [Mark(1.34, "1.34 Hz"), Mark(6.07, "6.1 Hz"), Mark(19.8, "19.8 Hz")]
+    )
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.0f}".replace("-", "−")
 
 
 def _end_to_end() -> str:
@@ -61,12 +72,16 @@ def _end_to_end() -> str:
     rig = load_rig("prototype_knee")
     k_s, j_sc = rig["spring.stiffness"], rig["chassis.inertia"]
     eq_6 = paper.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])
-    curves = [
-        Response("Eq. (6)", AFTER, hz, eq_6(2j * np.pi * hz)),
-        Response("with the rotor's spin", BEFORE, hz, end_to_end(rig)(2j * np.pi * hz)),
-    ]
-    marks = [
-        Mark(paper.eq_7_bandwidth(k_s, j), f"{paper.eq_7_bandwidth(k_s, j):.1f} Hz")
-        for j in (j_sc, inner_inertia(rig))
-    ]
+    curves = [Response("Eq. (6)", AFTER, hz, eq_6(2j * np.pi * hz))]
+    edge = paper.eq_7_bandwidth(k_s, j_sc)
+    marks = [Mark(edge, f"{edge:.1f} Hz")]
+    for train, colour, anchor in zip(PROTOTYPE_TRAINS, (BEFORE, TRUTH), ("start", "end"), strict=True):
+        turned = replace(rig, train=train)
+        curves.append(
+            Response(
+                f"spin, n = {_signed(train_ratio(turned))}", colour, hz, end_to_end(turned)(2j * np.pi * hz)
+            )
+        )
+        edge = float(undamped_band(k_s, inner_inertia(turned)))
+        marks.append(Mark(edge, f"{edge:.1f} Hz", anchor))
     return gain_svg(curves, (-40.0, 40.0), marks)

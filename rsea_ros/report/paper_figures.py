@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rsea_ros.identification.moving_output import MovingOutput
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model import outputs
 from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import end_to_end, inner_inertia
-from rsea_ros.model.lumped import lumped
+from rsea_ros.model.bandwidth import end_to_end, inner_inertia, undamped_band
+from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS
+from rsea_ros.model.paper_moving import largest_gap, readings, resonance_hz
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.train import Train
 from rsea_ros.report.design_surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
@@ -32,16 +37,27 @@ def figure_9() -> list[Figure]:
     ):
         rig = load_rig(rig_name)
         points.append(Point(name, rig["spring.stiffness"], rig["chassis.inertia"], colour))
-        points.append(Point(f"{name}, with spin", rig["spring.stiffness"], inner_inertia(rig), BEFORE, 110.0))
+        for train, pole in _senses(rig):
+            turned = replace(rig, train=train)
+            sign = "" if rig.train == "planetary" else f", n = {train_ratio(turned):+.0f}".replace("-", "−")
+            inner = inner_inertia(turned)
+            points.append(Point(f"{name}, with spin{sign}", rig["spring.stiffness"], inner, BEFORE, pole))
     whole = bandwidth_surface(
         "Fig. 9 (a): bandwidth over stiffness and inertia, Eq. (7)", points,
-        "Drag to turn. Points: what the paper has (blue, green), and with the rotor's spin J_m/N "
-        "(orange).")  # fmt: skip
+        "Drag to turn. Points: what the paper has (blue, green), and with the rotor's spin (orange). A "
+        "negative n J_r + J_sc stands at its magnitude: T_d/T_p falls to −3 dB there.")  # fmt: skip
     views = slices(
         "Fig. 9 (b), (c): ten times the stiffness or a tenth of the inertia are worth √10 = 3.2 in "
         "bandwidth", points,
         "The paper prints no number on this figure. On logarithmic axes the surface is a plane.")  # fmt: skip
     return [whole, views]
+
+
+def _senses(rig: Rig) -> list[tuple[Train, float]]:
+    """Return the trains that an actuator of the paper may have, and the pole of each one's name, Hz."""
+    if rig.train == "planetary":
+        return [(rig.train, 110.0)]
+    return list(zip(PROTOTYPE_TRAINS, (150.0, 100.0), strict=True))
 
 
 def figure_15(measured: FrequencyResponse) -> Figure:
@@ -94,18 +110,26 @@ def figure_18_as_printed() -> Figure:
     """Return both models with Table 2's values, unfitted, as the paper's simulation had them."""
     rig = load_rig("paper_moving_output")
     curves = []
-    for name, model, colour in (("unlumped", rig, AFTER), ("lumped", lumped(rig), BEFORE)):
+    models = readings(rig)
+    for (name, model), colour, dash in zip(
+        models.items(), (AFTER, BEFORE, BEFORE), ("solid", "solid", "dot"), strict=True
+    ):
         values = frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ)
-        curves.append(Response(f"<b>{name}</b>, Table 2", colour, _HZ, values))
-    gaps = 20 * np.log10(np.abs(curves[0].values / curves[1].values))
-    worst = int(np.argmax(np.abs(gaps)))
-    title = f"Fig. 18 with Table 2 as printed: {abs(gaps[worst]):.0f} dB between both at {_HZ[worst]:.2f} Hz"
-    return response_figure(
-        title,
-        curves,
-        [],
-        "At its own frequency the pendulum swings by itself and holds no torque: none reaches the spring.",
+        curves.append(Response(name.replace(", ", ",<br>"), colour, _HZ, values, dash=dash))
+    unlumped, moving, grounded = models.values()
+    own, other = resonance_hz(unlumped), resonance_hz(moving)
+    hz, gap = largest_gap(unlumped, grounded)
+    title = f"Fig. 18 with Table 2 as printed: resonance at {own:.1f} Hz unlumped, at {other:.1f} Hz lumped"
+    caption = (
+        "“Lumped” has two readings: its loads moving (Fig. 16), or the motor pushing against the ground "
+        "(Fig. "
+        f"3), which puts it {gap:.1f} dB above the unlumped model at {hz:.2f} Hz, the pendulum's "
+        "frequency. There "
+        "the pendulum swings by itself and holds no torque: none reaches the spring. In both readings the "
+        "resonance is elsewhere."
     )
+    marks = [Mark(other, f"{other:.1f} Hz", "right"), Mark(own, f"{own:.1f} Hz", "left")]
+    return response_figure(title, curves, marks, caption, decibel=(-72, 16))
 
 
 def figure_20() -> Figure:
@@ -121,15 +145,28 @@ def figure_20() -> Figure:
             hz,
             paper.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])(s),
         ),
-        Response("with the rotor's spin", BEFORE, hz, end_to_end(rig)(s)),
     ]
-    ours, spin = paper.eq_7_bandwidth(k_s, j_sc), paper.eq_7_bandwidth(k_s, inner_inertia(rig))
+    marks = [Mark(55.5, "55.5 Hz, printed")]
+    for train, dash in zip(PROTOTYPE_TRAINS, ("solid", "dash"), strict=True):
+        turned = replace(rig, train=train)
+        name = f"with the rotor's spin,<br>n = {train_ratio(turned):+.0f}".replace("-", "−")
+        curves.append(Response(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
+        edge = float(undamped_band(k_s, inner_inertia(turned)))
+        marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))
+    ours = paper.eq_7_bandwidth(k_s, j_sc)
+    edges = " or ".join(f"{mark.hz:.1f}" for mark in marks[1:])
     title = (
-        f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); "
-        f"{spin:.1f} Hz with the rotor's spin"
+        f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); {edges} "
+        "Hz with "
+        "the rotor's spin, by its sense"
     )
-    marks = [Mark(55.5, "55.5 Hz, printed"), Mark(spin, f"{spin:.1f} Hz")]
-    caption = "|T_d/T_p| of the prototype. J_m is our estimate; the paper states neither it nor the damping."
+    caption = (
+        "|T_d/T_p| of the prototype. A harmonic drive with its circular spline held turns backward (n = "
+        "−160): "
+        "no resonance. With the flexspline held n = +161. J_m is our estimate; the paper states neither "
+        "it, nor "
+        "the damping, nor what is held."
+    )
     return response_figure(title, curves, marks, caption, decibel=(-20, 20))
 
 

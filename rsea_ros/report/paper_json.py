@@ -34,11 +34,16 @@ def _bands(b: Bands) -> dict[str, Any]:
     return {
         "eq_7_hz": b.eq_7,
         "eq_7_with_spin_hz": b.eq_7_spin,
+        "eq_7_with_spin_hz_90_percent_of_rotor_inertia": [_finite(v) for v in b.spin_range],
         "tolerances_db_deg": [list(t) for t in TOLERANCES],
-        "exact": {row.what: [v if math.isfinite(v) else None for v in row.hz] for row in b.rows},
+        "exact": {row.what: [_finite(v) for v in row.hz] for row in b.rows},
         "spring_limit": b.spring_limit,
         "motor_limit": [{"hz": f, "torque": t} for f, t in b.motor_limit.items()],
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _moving(test: MovingOutput) -> dict[str, Any]:

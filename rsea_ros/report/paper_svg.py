@@ -37,7 +37,8 @@ def gain_svg(responses: Sequence[Response], decibel: tuple[float, float], marks:
         parts.append(
             _stroke(x(mark.hz), y(decibel[0]), x(mark.hz), y(decibel[1]), QUIET, 'stroke-dasharray="2 3"')
         )
-        parts.append(_text(mark.text, x(mark.hz), _TOP - 8, QUIET, "middle"))
+        anchor = {"start": "start", "end": "end"}.get(mark.anchor, "middle")
+        parts.append(_text(mark.text, x(mark.hz), _TOP - 8, QUIET, anchor))
     for i, r in enumerate(responses):
         db = np.clip(20.0 * np.log10(np.abs(r.values)), decibel[0], decibel[1])
         points = " ".join(f"{x(f):.1f},{y(v):.1f}" for f, v in zip(r.hz, db, strict=True))

@@ -11,7 +11,7 @@ from rsea_ros.identification.moving_output import MovingOutput
 from rsea_ros.identification.rivals import Judged
 from rsea_ros.model.arrangements import Arrangement, Limit
 from rsea_ros.model.paper_claims import TABLE_2, Claim
-from rsea_ros.model.paper_findings import Finding
+from rsea_ros.model.paper_finding import Finding
 from rsea_ros.report import words
 from rsea_ros.report.page import equation, section
 from rsea_ros.report.table import table
@@ -22,8 +22,8 @@ EQUATIONS = """\
 (3)   T_d/T_p = K_s / (J_eff s² + b_s s + K_s)                           lumped
 (4)   T_d/T_m = K_s / den,                                               the same function as (1)
       den = (J_rotor N² + J_sc) s² + (b_rotor N² + b_s) s + K_s
-(5)   T_p/T_m = (J_sc s² + b_s s + K_s) / den                            exact: J_sc + J_m/N
-(6)   T_d/T_p = K_s / (J_sc s² + b_s s + K_s)                            exact: J_sc + J_m/N
+(5)   T_p/T_m = (J_sc s² + b_s s + K_s) / den                            exact: J_sc + n J_r
+(6)   T_d/T_p = K_s / (J_sc s² + b_s s + K_s)                            exact: J_sc + n J_r
 (7)   bandwidth = √(0.292 K_s / J_sc) / 2π                               +3 dB, undamped
 (8)   T = 2 K (R² + r_s²/3) sin θ cos θ                                  at most K_s/2, at 45°
 (9)   K_s = 2 K (R² + r_s²/3) (2 cos² θ − 1)                             slope of (8)
@@ -38,31 +38,37 @@ TABLE_1 = (
 
 
 def claims_table(claims: Sequence[Claim]) -> str:
-    """Return printed beside ours with the difference."""
-    agree = sum(c.agrees for c in claims)
+    """Return printed beside ours with the difference; only what the paper's numbers alone make is counted."""
+    recomputed = [c for c in claims if c.status == "found"]
+    agree = sum(c.agrees for c in recomputed)
     rows = []
     for c in claims:
         unit = "°" if c.unit == "deg" else words.unit(c.unit)
         ours = words.number(c.ours, 5)
         same = "to the last digit" if c.agrees else f"{100 * c.difference:+.2f} %".replace("-", "−")
-        rows.append([c.where, c.what, c.printed, ours, unit, same, c.how])
-    head = ["Where", "What", "Printed", "Ours", "", "Difference", "Ours comes from"]
+        rows.append([c.where, c.what, c.printed, ours, unit, same, c.status, c.how])
+    head = ["Where", "What", "Printed", "Ours", "", "Difference", "", "Ours comes from"]
     title = (
-        f"{agree} of {len(claims)} numbers come out to the last digit; the others are the paper's open ends"
+        f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit"
     )
-    return section(title, table(head, rows, numbers=(2, 3, 5)))
+    caption = (
+        "found: the paper's numbers alone make it, and only these count. silent: one that is needed is not "
+        "printed. unclear: tuned by the paper, or only bounded by other sources."
+    )
+    return section(title, table(head, rows, numbers=(2, 3, 5)), caption=caption)
 
 
 def findings_list(findings: Sequence[Finding]) -> str:
     """Return where the paper contradicts itself or is silent."""
-    counts = {kind: sum(f.kind == kind for f in findings) for kind in ("inconsistent", "silent")}
+    counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
     rows = "".join(
         "<tr><td "
-        f"style='white-space:nowrap'>{escape(f.where)}<small>{f.kind}</small></td><td>{escape(f.text)}</td></tr>"
+        f"style='white-space:nowrap'>{escape(f.where)}<small>{f.status}</small></td><td>{escape(f.text)}</td></tr>"
         for f in findings
     )
     title = (
-        f"{counts['inconsistent']} statements that cannot both hold, {counts['silent']} things left unsaid"
+        f"{counts['found']} contradictions, {counts['unclear']} statements with two readings, "
+        f"{counts['silent']} things left unsaid"
     )
     return section(title, f"<div class='scroll'><table>{rows}</table></div>")
 
@@ -110,8 +116,10 @@ def bands_table(actuators: Mapping[str, Bands]) -> str:
     parts = []
     for name, b in actuators.items():
         first = ["Eq. (7) as printed", f"{b.eq_7:.1f}", *[""] * (len(tolerances) - 1)]
+        low, high = b.spin_range
         spin = ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *[""] * (len(tolerances) - 1)]
-        rows = [first, spin, *([row.what, *(_hz(v) for v in row.hz)] for row in b.rows)]
+        doubt = ["the same over 90 % of J_m", f"{_hz(low)} to {_hz(high)}", *[""] * (len(tolerances) - 1)]
+        rows = [first, spin, doubt, *([row.what, *(_hz(v) for v in row.hz)] for row in b.rows)]
         motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
         limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
         body = table(["|T_d/T_p| within, Hz", *tolerances], rows, numbers=range(1, 5))
@@ -123,7 +131,10 @@ def bands_table(actuators: Mapping[str, Bands]) -> str:
     return section(
         title,
         *parts,
-        caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped.",
+        caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped. "
+        "J_m within the rig's spread: Table 2's for the platform, our estimate for the prototype. Which "
+        "spline "
+        "of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
     )
 
 
@@ -135,10 +146,10 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
     """Return transfer functions and limits of all arrangements."""
     body = [
         [
-            r.train,
-            f"{r.ratio:.0f}",
+            words.train(r.train),
+            f"{r.ratio:+.0f}".replace("-", "−"),
             f"{r.outer:.4f}",
-            f"{r.inner:.5f}",
+            f"{r.inner:+.5f}".replace("-", "−"),
             "T_d/T_m = (b_s s + K_s)/den",
             "T_p/T_m = (J_in s² + b_s s + K_s)/den",
         ]
@@ -149,7 +160,7 @@ def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> 
         [x.what, x.of.split(",")[0], _values(x), " → ".join(f"{e:.1e}" for e in x.errors)] for x in limits
     ]
     return section(
-        "T-RSEA and RT-RSEA, planetary and star, lumped and unlumped: one table",
+        "T-RSEA and RT-RSEA, every train, lumped and unlumped: one table",
         equation(
             "den = J_out s² + (b_m + b_s) s + K_s\nJ_out = J_sc + n² J_r      J_in = J_sc + n J_r "
             "(lumped: J_out)      J_r = J_m/N²"

@@ -37,6 +37,12 @@ _PIECES = {"housing_end": "Housing", "spring_end": "Spring end", "clock": "Clock
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
+def train(name: str) -> str:
+    """Return the plain name of a gear train, `harmonic_flexspline_held` as `harmonic, flexspline held`."""
+    kind, _, held = name.partition("_")
+    return f"{kind}, {held.replace('_', ' ')}" if held else kind
+
+
 def parameter(name: str) -> str:
     """Return the plain name of a parameter, `housing_end.inertia` as `Housing: inertia`."""
     group, _, key = name.partition(".")

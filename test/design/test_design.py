@@ -10,12 +10,14 @@ import pytest
 
 from rsea_ros.design import mechanism
 from rsea_ros.design.bands import bands
+from rsea_ros.design.by_train import band_range, by_train
 from rsea_ros.design.catalogue import catalogue, unit_named
 from rsea_ros.design.judge import judge, least_stiffness, rig_of, stiffness_bounds
-from rsea_ros.design.margins import SPREADS, margins, robust_stiffness
+from rsea_ros.design.margins import margins, robust_stiffness, spreads_of
 from rsea_ros.design.requirement import Requirement, gyration
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
+from rsea_ros.model.bandwidth import inner_inertia, undamped_band
 from rsea_ros.model.paper_formulas import eq_8_spring_torque, eq_9_spring_stiffness
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
@@ -25,7 +27,9 @@ UNIT = unit_named("rd85x13-hd_cpl-25a-160")
 ASKED = judge(PAPER, UNIT, 260.0)
 
 
-OTHERS = "continuous_torque: {}, reflected_inertia: {}, reflected_damping: {}"
+TRAIN = "train: {value: star, source: x}"
+OTHERS = TRAIN + ", continuous_torque: {}, reflected_inertia: {}, reflected_damping: {}"
+VALUES = "ratio: {}, continuous_torque: {}, reflected_inertia: {}, reflected_damping: {}"
 
 
 def met(design):
@@ -45,7 +49,8 @@ def test_what_the_paper_does_not_say():
     assert math.isnan(ASKED.deflection)
     assert ASKED.linear == pytest.approx(0.577, abs=5e-4)
     assert math.degrees(ASKED.linear) == pytest.approx(33.0, abs=0.1)
-    assert ASKED.band_exact == pytest.approx(15.39, abs=5e-3)
+    assert ASKED.band_exact == pytest.approx(19.87, abs=5e-3)
+    assert math.isnan(ASKED.resonance)
     assert met(ASKED) == [True, False, False, False, True]
 
 
@@ -77,7 +82,7 @@ def test_no_deflection_carries_more_than_half_the_stiffness():
 
 def test_monte_carlo_is_the_spread_of_the_formulas():
     """Eq. (7) goes as sqrt(K / J): log-normal spreads in closed form, arm and spring radius exact."""
-    spreads = {**dict.fromkeys(SPREADS, 0.0), "rate": 0.06, "inertia": 0.08}
+    spreads = {**dict.fromkeys(spreads_of(UNIT), 0.0), "rate": 0.06, "inertia": 0.08}
     row = margins(ASKED, spreads)[0]
     sigma = 0.5 * math.hypot(0.06, 0.08)
     expected = [ASKED.band_eq_7 * math.exp(1.6449 * s * sigma) for s in (-1, 0, 1)]
@@ -85,7 +90,7 @@ def test_monte_carlo_is_the_spread_of_the_formulas():
 
 
 def test_without_spread_a_margin_is_all_or_nothing():
-    shares = [m.share for m in margins(ASKED, dict.fromkeys(SPREADS, 0.0))]
+    shares = [m.share for m in margins(ASKED, dict.fromkeys(spreads_of(UNIT), 0.0))]
     assert shares == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
 
 
@@ -109,9 +114,35 @@ def test_amplitudes_of_the_bands():
 
 def test_the_design_as_a_rig_has_its_band():
     rig = rig_of(PAPER, UNIT, 260.0)
-    assert rig["chassis.inertia"] + rig["rotor.reflected_inertia"] / rig["gear.ratio"] == pytest.approx(
-        8.117e-3, rel=1e-4
-    )
+    assert inner_inertia(rig) == pytest.approx(ASKED.inner) == pytest.approx(-6.883e-3, rel=1e-4)
+
+
+def test_both_senses_of_the_prototypes_drive():
+    """facts.md: 50 Hz need 1647 N m/rad with the circular spline held, 2759 with the flexspline; all 1728."""
+    held = {row.train: row for row in by_train(PAPER, UNIT, 260.0)}
+    circular, flexspline = held.values()
+    assert list(held) == ["harmonic_circular_spline_held", "harmonic_flexspline_held"]
+    assert (circular.turns, flexspline.turns) == (-160.0, 161.0)
+    assert [circular.band, flexspline.band] == pytest.approx([19.87, 15.35], abs=0.01)
+    assert [circular.for_band, flexspline.for_band] == pytest.approx([1647.0, 2759.0], abs=1.0)
+    assert [circular.least, flexspline.least] == pytest.approx([1728.0, 2759.0], abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("train", "sign"), [(t, -1) for t in UNIT.trains[:1]] + [(t, 1) for t in UNIT.trains[1:]]
+)
+def test_a_heavier_chassis_helps_where_the_rotor_turns_backward(train, sign):
+    unit, heavier = UNIT.with_train(train), replace(PAPER, inertia=2.0 * PAPER.inertia)
+    change = judge(heavier, unit, 260.0).band_exact - judge(PAPER, unit, 260.0).band_exact
+    assert sign * change < -0.4
+
+
+def test_band_over_the_rotors_inertia():
+    """Ends of the log-normal range, and no upper end where the spin cancels the chassis within it."""
+    low, high = band_range(260.0, 6.169e-4, UNIT.spin, 0.5)
+    for hz, factor in ((low, math.exp(1.6449 * 0.5)), (high, math.exp(-1.6449 * 0.5))):
+        assert hz == pytest.approx(float(undamped_band(260.0, 6.169e-4 + factor * UNIT.spin)))
+    assert band_range(260.0, 6.169e-4, -6.0e-4, 0.5)[1] == math.inf
 
 
 def test_chassis_is_between_a_disc_and_a_ring():
@@ -126,11 +157,13 @@ def test_every_number_of_the_catalogue_has_a_source():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a: {ratio: {value: 5, unit: N m, source: x}}", r"a.continuous_torque is missing"),
+        (f"a: {{{TRAIN}, ratio: {{value: 5, unit: N m, source: x}}}}", r"a.continuous_torque is missing"),
         ("a: 3", r"a = 3, expected a mapping"),
         ("[", "not YAML"),
         (f"a: {{ratio: {{value: 5, unit: m, source: x}}, {OTHERS}}}", r"a.ratio.unit = 'm', expected '1'"),
         ("a: {speed: 3}", r"unknown key 'speed'"),
+        (f"a: {{train: {{value: worm, source: x}}, {VALUES}}}", r"a.train.value = 'worm', expected one of"),
+        (f"a: {{{VALUES}}}", r"a.train is missing, expected one of planetary, star"),
     ],
 )  # fmt: skip
 def test_bad_catalogues_are_refused(tmp_path, text, message):

@@ -12,14 +12,18 @@ import pytest
 from hypothesis import assume, given, settings
 
 from rsea_ros.cli.main import main
+from rsea_ros.design import mesh
+from rsea_ros.design import mjcf as mjcf_module
 from rsea_ros.design.mjcf import GRAVITY, mjcf
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.train import TRAINS
 
 sys.path.append(str(Path(__file__).parents[1] / "model"))
 from random_rigs import rigs
+from rolling import rotor_speed
 
 S = 2j * np.pi * np.array([0.3, 2.0, 11.0, 70.0])
 
@@ -28,17 +32,35 @@ def floats(node, key, default="0"):
     return np.array([float(v) for v in node.get(key, default).split()])
 
 
+def chains(root):
+    """Return every body with a hinge, and what it adds of each hinge to the body's absolute angle."""
+    parent = {child: node for node in root.iter() for child in node}
+    joints = [j.get("name") for body in root.iter("body") for j in body.findall("joint")]
+    bodies, rows = list(root.iter("body")), []
+    for body in bodies:
+        row, node = np.zeros(len(joints)), body
+        while node.tag == "body":
+            row[joints.index(node.find("joint").get("name"))] = 1.0
+            node = parent[node]
+        rows.append(row)
+    return bodies, joints, np.array(rows)
+
+
 def matrices(text):
-    """Return mass, damping and stiffness of the small motions, read from the XML alone, and the joints."""
+    """Return mass, damping and stiffness of the small motions, read from the XML alone, and the joints.
+
+    Last what is tied: rows of hinge angles that are zero.
+    """
     root = ElementTree.fromstring(text)
-    joints = [j.get("name") for j in root.iter("joint") if j.get("name")]
+    bodies, joints, absolute = chains(root)
     mass, damping, stiffness = (np.zeros((len(joints), len(joints))) for _ in range(3))
-    for i, body in enumerate(root.iter("body")):
+    for i, (body, row) in enumerate(zip(bodies, absolute, strict=True)):
         joint, inertial = body.find("joint"), body.find("inertial")
         arm, weight = -floats(inertial, "pos")[1], floats(inertial, "mass")[0]
-        mass[i, i] = floats(inertial, "diaginertia")[2] + weight * arm**2
-        damping[i, i] = floats(joint, "damping")[0]
-        stiffness[i, i] = floats(joint, "stiffness")[0] + weight * GRAVITY * arm
+        mass += (floats(inertial, "diaginertia")[2] + weight * arm**2) * np.outer(row, row)
+        damping[i, i] += floats(joint, "damping")[0]
+        stiffness[i, i] += floats(joint, "stiffness")[0]
+        stiffness += weight * GRAVITY * arm * np.outer(row, row)
     rows = {}
     for tendon in root.iter("fixed"):
         row = np.zeros(len(joints))
@@ -47,7 +69,7 @@ def matrices(text):
         rows[tendon.get("name")] = row
         damping += floats(tendon, "damping")[0] * np.outer(row, row)
         stiffness += floats(tendon, "stiffness")[0] * np.outer(row, row)
-    tied = [rows[node.get("tendon1")] for node in root.iter("tendon") if node.get("tendon1")]
+    tied = [rows[node.get("tendon1")] for node in root.findall("equality/tendon")]
     return mass, damping, stiffness, joints, tied
 
 
@@ -62,8 +84,8 @@ def test_the_xml_holds_the_rigs_equations_of_motion(rig):
     assume(not rig.rigid_spring)
     mass, damping, stiffness, joints, tied = matrices(mjcf(rig))
     keep = np.eye(len(joints))
-    for row in tied:  # the rotor's angle follows from the others
-        k = joints.index("rotor")
+    for row in tied:  # the hinge with the largest factor follows from the others
+        k = int(np.argmax(np.abs(row)))
         keep[k] = -row / row[k]
         keep = np.delete(keep, k, axis=1)
     ours = mechanics(rig)
@@ -73,10 +95,30 @@ def test_the_xml_holds_the_rigs_equations_of_motion(rig):
     np.testing.assert_allclose(characteristic(*found), expected, rtol=1e-6)
 
 
-def test_masses_and_inertias_of_the_knee():
-    mass, _, _, joints, _ = matrices(mjcf(load_rig("prototype_knee")))
-    inertia = dict(zip(joints, np.diag(mass), strict=True))
-    assert inertia == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
+def test_inertias_of_the_knee():
+    root = ElementTree.fromstring(mjcf(load_rig("prototype_knee")))
+    found = {body.get("name"): floats(body.find("inertial"), "diaginertia")[2] for body in root.iter("body")}
+    assert found == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
+
+
+@pytest.mark.parametrize("train", [t for t in TRAINS if t != "lumped"])
+def test_the_bodies_turn_as_the_teeth_do(train):
+    """The hinges' tie and the chain of bearings alone make the rotor's speed, as rolling contacts do."""
+    rig = replace(load_rig("prototype_knee"), train=train)
+    root = ElementTree.fromstring(mjcf(rig))
+    bodies, joints, absolute = chains(root)
+    _, _, _, _, (tie,) = matrices(mjcf(rig))
+    of = {body.get("name"): row for body, row in zip(bodies, absolute, strict=True)}
+    for housing, output in ((0.0, 1.0), (1.0, 0.0), (0.3, -2.0)):
+        speeds = np.linalg.solve([of["housing"], of["chassis"], tie], [housing, output, 0.0])
+        expected = rotor_speed(train, rig["gear.ratio"], housing, output)
+        assert of["rotor"] @ speeds == pytest.approx(expected, rel=1e-9)
+    assert len(joints) == 3
+
+
+def test_the_export_knows_no_formula_of_the_train():
+    for module in (mjcf_module, mesh):
+        assert not {"train_ratio", "rotor_turns", "spin_inertia"} & set(vars(module))
 
 
 def test_what_mujoco_cannot_hold_is_refused():

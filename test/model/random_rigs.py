@@ -7,6 +7,7 @@ import math
 from hypothesis import strategies as st
 
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
+from rsea_ros.model.train import TRAINS
 
 RIG_NAMES = ("paper_high_impedance", "paper_moving_output", "prototype_knee", "bare_drive", "pendulum")
 WITH_SPRING = RIG_NAMES[:3]
@@ -35,7 +36,7 @@ def _between(bounds: tuple[float, float]) -> st.SearchStrategy[float]:
 @st.composite
 def rigs(draw: st.DrawFn, *, gravity: bool = False) -> Rig:
     """Draw a rig without effects: ends clamped or free, spring rigid or not, gear stiff or
-    not, a spring on the proximal side or not, either train.
+    not, a spring on the proximal side or not, any real train.
 
     gravity: let ends be pendulums, whose equations of motion are not linear.
     """
@@ -53,7 +54,7 @@ def rigs(draw: st.DrawFn, *, gravity: bool = False) -> Rig:
         quantities={name: Quantity(draw(_between(bounds))) for name, bounds in ranges.items()},
         clamped=clamped,
         rigid_spring=rigid,
-        train=draw(st.sampled_from(["planetary", "star"])),
+        train=draw(st.sampled_from([t for t in TRAINS if t != "lumped"])),
         proximal=draw(st.sampled_from(END_NAMES)),
         ft_end=draw(st.sampled_from(END_NAMES)) if proximal and not rigid else "spring_end",
     )

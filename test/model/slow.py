@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from rolling import rotor_speed
 from scipy.linalg import expm
 
 from rsea_ros.model.rig import Rig
@@ -32,9 +33,7 @@ def coordinates(rig: Rig) -> np.ndarray:
 def kinetic(rig: Rig, w: np.ndarray) -> float:
     """Return the kinetic energy at speeds w of the parts in MOVABLE, J."""
     ratio = rig["gear.ratio"]
-    carrier = w[0] + ratio * (w[1] - w[0])  # annulus on the housing
-    annulus = w[0] - (ratio - 1.0) * (w[1] - w[0])  # carrier on the housing
-    rotor = carrier if rig.train == "planetary" else annulus
+    rotor = rotor_speed(rig.train, ratio, w[0], w[1])
     energy = rig["rotor.reflected_inertia"] / ratio**2 * rotor**2 + rig["chassis.inertia"] * w[2] ** 2
     energy += rig["housing.inertia"] * w[0] ** 2
     return 0.5 * (energy + sum(_end(rig, end, "inertia") * w[i] ** 2 for i, end in _ENDS))

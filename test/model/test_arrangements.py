@@ -11,12 +11,13 @@ from rsea_ros.model import outputs
 from rsea_ros.model.arrangements import HZ, arrangements, limits
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.train import TRAINS
 
 LIMITS = limits(load_rig("paper_moving_output"))
 
 
 @pytest.mark.parametrize("held", ["T-RSEA", "RT-RSEA"])
-@pytest.mark.parametrize("index", range(3), ids=["planetary", "star", "lumped"])
+@pytest.mark.parametrize("index", range(len(TRAINS)), ids=TRAINS)
 def test_table_of_transfer_functions(index, held):
     rig = load_rig("paper_high_impedance")
     row = arrangements(rig)[index]

@@ -70,7 +70,7 @@ def test_infinite_is_for_rigid_parts_only(name):
             {"rigid_spring": True},
             "spring rigid and spring_end clamped, expected one of them: nothing could move",
         ),
-        ({"train": "worm"}, "gear.train = 'worm', expected one of planetary, star, lumped"),
+        ({"train": "worm"}, "gear.train = 'worm', expected one of planetary, star, harmonic_"),
         ({"proximal": "left"}, "proximal = 'left', expected one of housing_end, spring_end"),
         ({"clamped": frozenset({"left"})}, "clamped end 'left', expected one of housing_end, spring_end"),
         (

@@ -49,6 +49,7 @@ def test_everything_that_a_rig_can_hold_survives(tmp_path):
         controller=Controller(k_p=8.0, k_v=20.0, limit=40.0),
         effects=(EffectSetting("coulomb_friction", {"torque": 2.5}),),
         train="star",
+        other_trains=("spur", "planetary"),
     )
     fitted = Quantity(0.9501, 0.02, "fit", (0.94, 0.96))
     rig = replace(rig, quantities={**rig.quantities, "rotor.reflected_inertia": fitted})
@@ -118,8 +119,10 @@ NONSENSE = [
     (("wheels",), {}, "rig: unknown key 'wheels', expected one of about"),
     ((7,), {}, "rig: unknown key 7, expected one of about"),
     (("gear", "ratio", "value"), 0.5, "gear.ratio = 0.5 1, expected a finite value >= 1"),
-    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, lumped"),
+    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, harmonic_"),
     (("gear", "train"), ["star"], "gear.train = ['star'], expected"),
+    (("gear", "or"), "star", "gear.or = 'star', expected a list of trains"),
+    (("gear", "or"), ["worm"], "gear.or has 'worm', expected one of planetary, star, harmonic_"),
     (
         ("spring", "stiffness"),
         DELETE,

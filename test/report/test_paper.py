@@ -39,8 +39,9 @@ def test_surface_is_eq_7():
 
 
 def test_titles_carry_the_numbers():
-    assert "55.8 Hz by Eq. (7), 55.5 Hz printed (+0.6 %); 15.4 Hz" in figure_20().title
-    assert "1.34 Hz" in figure_18_as_printed().title
+    assert "55.8 Hz by Eq. (7), 55.5 Hz printed (+0.6 %); 19.9 or 15.3 Hz" in figure_20().title
+    assert "19.8 Hz unlumped, at 6.1 Hz lumped" in figure_18_as_printed().title
+    assert "62.0 dB" in figure_18_as_printed().caption
 
 
 def test_figures_are_json():

@@ -1,0 +1,72 @@
+"""What the sense of the rotor's rotation does to a design: the trains that a unit may have, side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.design.catalogue import MotorGear
+from rsea_ros.design.judge import judge, least_for_band, least_stiffness
+from rsea_ros.design.requirement import Requirement
+from rsea_ros.model.bandwidth import undamped_band
+from rsea_ros.model.train import Train
+
+NINETY_PERCENT = 1.6449
+"""Sigmas either way of the mean that hold 90 % of a normal quantity."""
+_STEPS = 201
+
+
+@dataclass(frozen=True)
+class WithTrain:
+    """A design with one train.
+
+    turns: n. inner: J_sc + n J_r, kg m^2. band: of the stiffness judged, Hz, exact. band_range: the same
+    over 90 % of the rotor's inertia. for_band, least: the least K_s, N m/rad, for the bandwidth and for all
+    demands.
+    """
+
+    train: Train
+    turns: float
+    inner: float
+    band: float
+    band_range: tuple[float, float]
+    for_band: float
+    least: float
+
+
+def by_train(requirement: Requirement, unit: MotorGear, stiffness: float) -> tuple[WithTrain, ...]:
+    """Return a design of this stiffness, N m/rad, with each train that the unit may have."""
+    return tuple(_with_train(requirement, unit.with_train(train), stiffness) for train in unit.trains)
+
+
+def _with_train(r: Requirement, unit: MotorGear, stiffness: float) -> WithTrain:
+    design = judge(r, unit, stiffness)
+    return WithTrain(
+        train=unit.train,
+        turns=unit.turns,
+        inner=design.inner,
+        band=design.band_exact,
+        band_range=band_range(stiffness, r.inertia, unit.spin, unit.rotor_spread),
+        for_band=least_for_band(r, unit),
+        least=least_stiffness(r, unit),
+    )
+
+
+def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> tuple[float, float]:
+    """Return the least and the greatest undamped ±3 dB band, Hz, over 90 % of a log-normal rotor inertia.
+
+    stiffness: N m/rad. chassis: J_sc, spin: n J_r, kg m^2. spread: of J_m, relative, one sigma. The band is
+    without limit where the range holds a J_m whose spin cancels J_sc.
+    """
+    inner = chassis + spin * np.exp(NINETY_PERCENT * spread * np.linspace(-1.0, 1.0, _STEPS))
+    bands = undamped_band(stiffness, inner)
+    cancels = bool(inner.min() < 0.0 < inner.max())
+    return float(bands.min()), math.inf if cancels else float(bands.max())
+
+
+def sense_unknown(rows: Sequence[WithTrain]) -> bool:
+    """Tell whether the trains differ in the sign of the rotor's spin."""
+    return len({row.turns > 0.0 for row in rows}) > 1

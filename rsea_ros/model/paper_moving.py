@@ -1,0 +1,61 @@
+"""Fig. 18's models, compared off any grid: where each resonates, and how far apart two of them come."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from rsea_ros.model import outputs
+from rsea_ros.model.lumped import lumped
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+_HZ: FloatArray = np.geomspace(0.1, 140.0, 400)
+
+
+def readings(rig: Rig) -> dict[str, Rig]:
+    """Return the models that Fig. 18 may compare: unlumped, and the lumped one in both readings.
+
+    With moving loads only the rotor is grounded (`train: lumped`), as within the inner line of Fig. 16; the
+    other takes the motor for a torque against the ground as well (lumped.py), as in Fig. 3.
+    """
+    return {
+        "unlumped": rig,
+        "lumped, loads moving": replace(rig, train="lumped"),
+        "lumped, motor grounded": lumped(rig),
+    }
+
+
+def resonance_hz(rig: Rig, low: float = 3.0) -> float:
+    """Return where the torque at the spring end is largest above low, Hz."""
+    hz = _HZ[low <= _HZ]
+    return _sharpened(
+        hz, int(np.argmax(_decibel(rig, hz))), lambda f: -float(_decibel(rig, np.array([f]))[0])
+    )
+
+
+def largest_gap(rig: Rig, other: Rig) -> tuple[float, float]:
+    """Return where two models are furthest apart, Hz, and by how much, dB."""
+
+    def gap(hz: FloatArray) -> FloatArray:
+        return np.abs(_decibel(rig, hz) - _decibel(other, hz))
+
+    f = _sharpened(_HZ, int(np.argmax(gap(_HZ))), lambda f: -float(gap(np.array([f]))[0]))
+    return f, float(gap(np.array([f]))[0])
+
+
+def _decibel(rig: Rig, hz: FloatArray) -> FloatArray:
+    response = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
+    return np.asarray(20.0 * np.log10(np.abs(response)))
+
+
+def _sharpened(hz: FloatArray, at: int, cost: Callable[[float], float]) -> float:
+    """Return the minimum of a cost over log frequency, between the neighbours of a grid point."""
+    low, high = (math.log(hz[k]) for k in (max(at - 1, 0), min(at + 1, len(hz) - 1)))
+    found = minimize_scalar(lambda x: cost(math.exp(x)), bounds=(low, high), method="bounded")
+    return math.exp(found.x)

@@ -1,0 +1,159 @@
+"""Is |T_p - T_d| within a tolerance of |T_d|: the error of who takes the two ends' torques for one.
+
+Both are the observer's, and their RMS over the last `window` seconds are compared:
+
+    share = RMS(T_p - T_d) / RMS(T_d) <= tolerance
+
+A sine of frequency f has the share |1/H - 1|, H = T_d / T_p between clamped ends; where that passes the
+tolerance is the edge. Its interval is that over b_s and J_m within their spreads and over the trains that are
+possible. The verdict changes beyond a hysteresis, and only where the torque is large beside the observer's
+doubt of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial import polynomial
+
+from rsea_ros.errors import ParameterError, RigError
+from rsea_ros.model.bandwidth import end_over_end
+from rsea_ros.model.observer import Estimate
+from rsea_ros.model.observer.linear import structured
+from rsea_ros.model.pure_torque_window import (
+    BEYOND,
+    HEARD,
+    HYSTERESIS,
+    LAST,
+    NOTHING,
+    PURE,
+    QUIET,
+    SHARE,
+    STATE,
+    TOLERANCE,
+    VERDICT,
+    WINDOW,
+    empty_ring,
+    judge_error,
+)
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.transfer import Fraction
+from rsea_ros.signals import FloatArray
+
+NINETY_PERCENT = 1.6449
+"""Sigmas either way that hold 90 % of a normal quantity."""
+
+__all__ = ["BEYOND", "NOTHING", "PURE", "ErrorFlag", "ErrorSettings", "edge_of"]
+
+VERDICTS = ("no torque", "pure", "beyond")
+"""In the order of NOTHING, PURE, BEYOND."""
+
+
+@dataclass(frozen=True)
+class ErrorSettings:
+    """tolerance: of |T_p - T_d| over |T_d|. window: s over which both are measured, at most 8192 samples; no
+    verdict is later than it. hysteresis: part of the tolerance, either way. quiet: s without torque after
+    which none is said.
+
+    With less window or hysteresis noise whose share is the tolerance changes the verdict more than once a
+    second (bench/observer.py flag).
+    """
+
+    tolerance: float = 0.3
+    window: float = 0.5
+    hysteresis: float = 0.15
+    quiet: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("tolerance", 0.01, 1.0), ("window", 0.01, 2.0), ("hysteresis", 0.0, 0.5)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ParameterError(f"{name} = {value:g}, expected {low:g} to {high:g}")
+
+
+class Edge(NamedTuple):
+    """Where a sine has the share `tolerance`, Hz: of the rig as it is, and over what is not known of it."""
+
+    hz: float
+    low: float
+    high: float
+
+
+class ErrorFlag:
+    """The verdict of one rig, fed with the observer's estimates at increasing stamps (s)."""
+
+    def __init__(self, rig: Rig, settings: ErrorSettings | None = None) -> None:
+        """Raises RigError for a rig without a spring: there is one torque, not two."""
+        if rig.rigid_spring:
+            raise RigError(
+                f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
+            )
+        s = settings or ErrorSettings()
+        self.settings = s
+        self.edge = edge_of(structured(rig), s.tolerance)
+        self._state, self._ring = np.zeros(STATE), empty_ring()
+        self._state[[TOLERANCE, WINDOW, HYSTERESIS, QUIET]] = s.tolerance, s.window, s.hysteresis, s.quiet
+        self._state[[HEARD, SHARE, LAST]] = -math.inf, math.nan, -math.inf
+        self.take(-math.inf, Estimate(*[0.0] * 6))  # compiles, and is too early to count
+
+    def take(self, t: float, estimate: Estimate, *, heard: bool = False) -> int:
+        """Take in an estimate and return the verdict: NOTHING, PURE or BEYOND.
+
+        heard: a finer detector (pure_torque.py) hears a torque, be it too small to be judged here.
+        """
+        distal, proximal, _, sigma_distal, sigma_proximal, _ = estimate
+        sigma = sigma_distal + sigma_proximal
+        verdict: int = judge_error(self._state, self._ring, t, distal, proximal, sigma, heard)
+        return verdict
+
+    @property
+    def verdict(self) -> str:
+        """What is true now; the flag is up when it is `pure`."""
+        return VERDICTS[int(self._state[VERDICT])]
+
+    @property
+    def share(self) -> float:
+        """RMS(T_p - T_d) / RMS(T_d) over the window; nan where the torque is too small to tell."""
+        return float(self._state[SHARE])
+
+
+def edge_of(rig: Rig, tolerance: float) -> Edge:
+    """Return where |1/H - 1| reaches a tolerance, and its range over 90 % of b_s and J_m and over trains."""
+    edges = [_edge(end_over_end(other), tolerance) for other in _possible(rig)]
+    return Edge(_edge(end_over_end(rig), tolerance), min(edges), max(edges))
+
+
+def _possible(rig: Rig) -> Iterator[Rig]:
+    """Yield the rig with its damping and rotor at both ends and in the middle of 90 %, with each train."""
+    names = [n for n in ("spring.damping", "rotor.reflected_inertia") if n in rig.quantities]
+    for train in (rig.train, *rig.other_trains):
+        for steps in product((-1.0, 0.0, 1.0), repeat=len(names)):
+            values = {
+                n: rig[n] * math.exp(NINETY_PERCENT * step * rig.spread(n))
+                for n, step in zip(names, steps, strict=True)
+            }
+            yield replace(rig.with_values(values), train=train)
+
+
+def _edge(function: Fraction, tolerance: float) -> float:
+    """Return the lowest Hz at which |1/f - 1| is the tolerance, from roots of a polynomial; inf without."""
+    top = polynomial.polysub(function.denominator[::-1], function.numerator[::-1])
+    squares = [_square(p) for p in (top, function.numerator[::-1])]
+    roots = polynomial.polyroots(
+        polynomial.polytrim(polynomial.polysub(squares[0], tolerance**2 * squares[1]))
+    )
+    real = roots[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0.0)].real
+    return float(real.min()) / (2.0 * math.pi) if len(real) else math.inf
+
+
+def _square(lowest_first: npt.NDArray[np.floating]) -> FloatArray:
+    """Return |p(i w)|^2 as a polynomial in w, lowest power first."""
+    values = np.asarray(lowest_first, dtype=np.float64) * 1j ** np.arange(len(lowest_first))
+    parts = [polynomial.polymul(part, part) for part in (values.real, values.imag)]
+    return np.asarray(polynomial.polyadd(*parts), dtype=np.float64)
