@@ -64,7 +64,9 @@ RESULTS = {
     "a dead F/T sensor": ("identify", {"dead": "ft zero"}),
     "a dead encoder": ("identify", {"dead": "position zero"}),
     "channels without noise": ("identify", {"noise": False, "sensors": "zero"}),
-    "a zero command": ("identify", {"command": "zero"}),
+    "a clock that was set": ("identify", {"stamps": "hour forward"}),
+    "a clock that was set by a year": ("predict", {"stamps": "year forward"}),
+    "a drive without a spring, its clock set": ("identify", {"rig": "bare_drive", "stamps": "hour forward"}),
     "one sample a second": ("diagnose", {"rate": 1.0, "duration": 80.0, "sensors": "zero"}),
     "velocity alone": ("diagnose", {"channels": ("velocity",)}),
     "a sample of 1e308": ("predict", {"dead": "1e308"}),
@@ -84,16 +86,14 @@ def test_what_gives_a_result(played, name):
 
 REFUSALS = {
     "a sample of 1e308": ("identify", {"dead": "1e308"}, "expected a finite value up to 1e+30"),
-    "a dead bench": ("identify", {"dead": "all still"}, "holds one value"),
+    "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N m and nothing moves"),
+    "a dead bench": ("identify", {"dead": "all still"}, "no sensor answers to the machine"),
     "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
-    "a clock that was set": ("identify", {"stamps": "hour forward"}, "did the clock jump?"),
-    "a clock that was set by a year": ("predict", {"stamps": "year forward"}, "did the clock jump?"),
-    "sensors of another day": ("diagnose", {"stamps": "apart"}, "did the clock jump?"),
-    "a drive without a spring, its clock set": (
-        "identify", {"rig": "bare_drive", "stamps": "hour forward"}, "did the clock jump?"
+    "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
+    "a still drive": (
+        "identify", {"rig": "bare_drive", "dead": "all zero"}, "no sensor answers to the machine"
     ),
-    "a still drive": ("identify", {"rig": "bare_drive", "dead": "all zero"}, "holds one value"),
 }  # fmt: skip
 
 

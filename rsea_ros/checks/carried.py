@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rsea_ros.checks.finding import Findings
+from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Record
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
@@ -13,8 +14,14 @@ _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamp
 
 
 def with_faults(record: Record, found: Findings) -> Record:
-    """Return a record with the faults that were found; a dead channel is left out."""
+    """Return a record with the faults that were found; a dead channel is left out.
+
+    Raises IdentificationError where no channel is left that measures anything.
+    """
     dead = {f.channel for f in found.faults if f.kind == "dead_channel"}
     channels = {n: c for n, c in record.channels.items() if n not in dead}
+    if not set(channels) - {"command", "reference"}:
+        reasons = "; ".join(f"{f.channel}: {f.detail or f.kind}" for f in found.faults if f.channel in dead)
+        raise IdentificationError(f"{record.source}: no sensor answers to the machine ({reasons}), expected one")
     kept = (*record.faults, *(f for f in found.faults if f.kind not in _AGAIN and f not in record.faults))
     return replace(record, channels=channels, faults=kept)
