@@ -12,8 +12,6 @@ Every name of the door is imported when it is first used; none of them needs ROS
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.compiler_cache import choose_cache
-
 if TYPE_CHECKING:
     from rsea_ros import effects
     from rsea_ros.control.controller import TorqueController
@@ -52,8 +50,6 @@ __all__ = [
     "DiagnosisSettings", "Observer", "Record", "Rig", "RseaError", "TorqueController", "check", "diagnose",
     "effects", "identify", "load_rig", "predict", "read_bag", "simulate",
 ]  # fmt: skip
-
-choose_cache()
 
 
 def __getattr__(name: str) -> Any:

@@ -20,10 +20,9 @@ SHARED = ("effects/_*.py", "effects/effect.py", "effects/signal_table.py", "mode
 """Files whose functions and constants are compiled into those of other files."""
 
 
-def choose_cache() -> None:
-    """Name the folder in NUMBA_CACHE_DIR, unless the user has. Must run before numba is imported."""
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        os.environ["NUMBA_CACHE_DIR"] = str(trusted_cache(shared_key(Path(__file__).parent)))
+def cache_folder() -> Path:
+    """Return the folder of the code that is compiled from the present sources."""
+    return trusted_cache(shared_key(Path(__file__).parent))
 
 
 def shared_key(package: Path) -> str:

@@ -11,8 +11,10 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from numba.core import config
 
-from rsea_ros.compiler_cache import SHARED, choose_cache, shared_key, trusted_cache
+from rsea_ros.compiler import _own_cache
+from rsea_ros.compiler_cache import SHARED, cache_folder, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "rsea_ros"
@@ -80,7 +82,8 @@ def test_all_that_is_compiled_into_other_files_is_in_the_key():
         tree = ast.parse(file.read_text(encoding="utf-8"))
         files = imported_files(tree)
         for function in compiled_functions(tree):
-            names = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
+            body = (node for statement in function.body for node in ast.walk(statement))
+            names = {node.id for node in body if isinstance(node, ast.Name)}
             used = {files[name] for name in names & files.keys()}
             assert used <= shared, f"{file.name}: {function.name} uses {used - shared}"
             seen += len(used)
@@ -180,6 +183,13 @@ def of_others(monkeypatch, folders: set[Path]) -> None:
 
 
 def test_a_cache_that_the_user_names_is_his(monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "/somewhere")
-    choose_cache()
-    assert os.environ["NUMBA_CACHE_DIR"] == "/somewhere"
+    monkeypatch.setattr(config, "CACHE_DIR", "/somewhere")
+    with _own_cache():
+        assert config.CACHE_DIR == "/somewhere"
+
+
+def test_functions_of_others_are_kept_where_they_were(monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    with _own_cache():
+        assert Path(config.CACHE_DIR) == cache_folder()
+    assert config.CACHE_DIR == ""

@@ -31,8 +31,9 @@ OWN = {
     "keys": set(),
     "checked": {"errors", "units", "wording"},
     "strict_yaml": {"errors", "decimal_number", "wording"},
-    "effects": BASE,
-    "model": BASE | {"effects"},
+    "compiler": {"compiler_cache"},
+    "effects": BASE | {"compiler"},
+    "model": BASE | {"effects", "compiler"},
     "identification": BASE | {"effects", "model"},
     "checks": BASE | {"effects", "model", "identification"},
     "diagnosis": BASE | {"effects", "model", "identification", "checks"},
@@ -48,7 +49,7 @@ OWN = {
     "nodes": CORE | {"hardware", "report", "msg_adapters", "one_thread"},
     "cli": CORE | {"hardware", "report", "msg_adapters", "nodes", "one_thread"},
     "__main__": {"cli"},
-    "__init__": CORE | {"compiler_cache", "library"},
+    "__init__": CORE | {"library"},
     "compiler_cache": set(),
 }
 """Layers of this project that a layer may import beside itself."""
@@ -68,6 +69,7 @@ MESSAGES = {
 }
 FOREIGN = {
     "strict_yaml": {"yaml"},
+    "compiler": {"numba"},
     "effects": NUMERIC,
     "model": NUMERIC,
     "identification": NUMERIC | {"threadpoolctl"},

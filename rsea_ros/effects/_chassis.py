@@ -11,7 +11,7 @@ it meets a flank.
 
 import math
 
-from numba import njit
+from rsea_ros.compiler import njit
 
 
 @njit(inline="always")

@@ -11,8 +11,7 @@ sticking is no stiff problem.
 
 import math
 
-from numba import njit
-
+from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import Parameter
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 

@@ -11,8 +11,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from numba import cfunc, types
+from numba import types
 
+from rsea_ros.compiler import cfunc
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import shown

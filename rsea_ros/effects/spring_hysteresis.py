@@ -8,8 +8,7 @@ sign(dd) as exp(-|dd| / angle), exactly. Source: Dahl, AIAA J. 14, 1976; Wen, J.
 
 import math
 
-from numba import njit
-
+from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, SPRING_TORQUE, Port
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import CubicHermiteSpline
 
+from rsea_ros.compiler import njit
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.step import OUTPUTS

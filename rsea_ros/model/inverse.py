@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.equations import mechanics, train_ratio

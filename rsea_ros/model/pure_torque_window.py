@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from rsea_ros.compiler import njit
 from rsea_ros.signals import FloatArray
 
 LENGTH = 8192

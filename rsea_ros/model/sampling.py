@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from rsea_ros.compiler import njit
 from rsea_ros.signals import FloatArray
 
 

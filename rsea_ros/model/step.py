@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.call import call
 from rsea_ros.signals import FloatArray, IntArray

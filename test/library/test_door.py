@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 
@@ -36,9 +37,9 @@ def fit(record):
 
 
 def in_a_fresh_interpreter(code: str) -> dict[str, object]:
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
+    bare = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "OPENBLAS", "MKL"))}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60, env=bare)
     return json.loads(done.stdout)
 
 
@@ -56,12 +57,14 @@ def test_importing_changes_no_variable_and_brings_neither_ros_nor_numerics():
 
 def test_every_name_of_the_door_opens_without_ros():
     seen = in_a_fresh_interpreter(
-        "import json, sys\n"
+        "import json, os, sys\n"
         "import rsea_ros as rsea\n"
+        "before = dict(os.environ)\n"
         "opened = [getattr(rsea, name) is not None for name in dir(rsea)]\n"
-        "print(json.dumps({'all': all(opened), 'ros': 'rclpy' in sys.modules}))"
+        "same = dict(os.environ) == before\n"
+        "print(json.dumps({'all': all(opened), 'ros': 'rclpy' in sys.modules, 'environment': same}))"
     )
-    assert seen == {"all": True, "ros": False}
+    assert seen == {"all": True, "ros": False, "environment": True}
     assert set(rsea.__all__) == set(DOOR)
 
 

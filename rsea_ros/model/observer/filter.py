@@ -13,8 +13,8 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.model.drive import LONGEST_STEP

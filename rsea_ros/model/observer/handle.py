@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
-from numba import carray, njit, types  # type: ignore[attr-defined]
+from numba import carray, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
+from rsea_ros.compiler import njit
 from rsea_ros.model.observer.filter import Model, State, inner
 from rsea_ros.model.observer.log import NONE, Log, take_in
 from rsea_ros.model.step import Calls, Linear

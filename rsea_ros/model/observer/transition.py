@@ -10,7 +10,8 @@ Source: Moler, Van Loan, SIAM Review 45, 2003, method 3; Anderson, Moore, Optima
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from rsea_ros.compiler import njit
 
 SMALL, TERMS = 0.25, 10
 """Norm of A t at which the series is cut after so many terms: 0.25^11 / 11! = 6e-15."""
