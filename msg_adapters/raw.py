@@ -21,17 +21,18 @@ class RawReader:
     """Reads the stamp and some numbers of the messages of a topic.
 
     fields: name and index of each number; one that a message does not have is nan.
+    joint: name that the joint of a message with names must have; empty: any.
     """
 
-    def __init__(self, msgtype: str, fields: Sequence[tuple[str, int]]) -> None:
-        self._msgtype, self._fields = msgtype, fields
+    def __init__(self, msgtype: str, fields: Sequence[tuple[str, int]], joint: str = "") -> None:
+        self._msgtype, self._fields, self._joint = msgtype, fields, joint
         self._length = -1
         self._fixed: list[tuple[int, int, bytes]] = []
         self._stamp, self._double = struct.Struct("<iI"), struct.Struct("<d")
         self._at: list[int] = []
 
     def read(self, raw: bytes) -> tuple[int, list[float]]:
-        """Return the stamp, ns, and the numbers. Raises ParameterError for a message of several joints."""
+        """Return the stamp, ns, and the numbers. Raises ParameterError for several or another joint."""
         if len(raw) != self._length or any(raw[a:b] != same for a, b, same in self._fixed):
             self._learn(raw)
         seconds, nanoseconds = self._stamp.unpack_from(raw, STAMP)
@@ -47,6 +48,8 @@ class RawReader:
         if len(layout.names) > 1:
             names = ", ".join(layout.names)
             raise ParameterError(f"{len(layout.names)} joints ({names}), expected one")
+        if self._joint and layout.names and layout.names[0] != self._joint:
+            raise ParameterError(f"joint {layout.names[0]!r}, expected {self._joint!r} (parameter joint)")
         self._at = [_position(layout, name, index) for name, index in self._fields]
         self._fixed = [(a, b, raw[a:b]) for a, b in _runs(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))

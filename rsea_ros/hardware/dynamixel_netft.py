@@ -73,6 +73,7 @@ class DynamixelNetft:
             temperature=sample.temperature,
             hardware_error=sample.hardware_error,
             ft_trouble=trouble,
+            motor_trouble=sample.trouble,
         )
         return self._last
 
@@ -81,8 +82,7 @@ class DynamixelNetft:
         if self._sensor is None:
             return
         wrenches, trouble = self._sensor.take()
-        slipped = self._epoch + time.monotonic_ns() - time.time_ns()  # the system clock may have been set
-        self._waiting += [(stamp + slipped, wrench) for stamp, wrench in wrenches]
+        self._waiting += [(instant + self._epoch, wrench) for instant, wrench in wrenches]
         self._trouble = self._trouble or trouble
 
     def write(self, torque: float) -> None:

@@ -23,7 +23,8 @@ class SimulatedDevice:
 
     The fixed step divides the period of `rate` (Hz). A torque written within a step acts from that instant
     on: the step gets the mean of what was held in it. A reading is the end of the last whole step.
-    clock: returns the time, ns since the epoch. duration: over which drifts come to their full size, s.
+    clock: returns the time, ns since the epoch, without a jump; by default the monotonic clock with the
+    system clock's time when the device is made. duration: over which drifts come to their full size, s.
     """
 
     def __init__(
@@ -34,9 +35,9 @@ class SimulatedDevice:
         seed: int = 0,
         noise: bool = True,
         duration: float = 60.0,
-        clock: Callable[[], int] = time.time_ns,
+        clock: Callable[[], int] | None = None,
     ) -> None:
-        self._rig, self._noise, self._clock = rig, noise, clock
+        self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
         self._per_second = rate * steps_per_sample(1.0 / rate)
         self._machine = build(rig, 1.0 / self._per_second, duration)
@@ -127,3 +128,9 @@ class SimulatedDevice:
 
     def _measured(self, channel: str, value: FloatArray) -> float:
         return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
+
+
+def _steady_clock() -> Callable[[], int]:
+    """Return a clock with the system clock's time that goes on evenly when that is set."""
+    epoch = time.time_ns() - time.monotonic_ns()
+    return lambda: epoch + time.monotonic_ns()

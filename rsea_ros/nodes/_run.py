@@ -16,6 +16,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.nodes._alarm import ENDING
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import Parameter, declare, usage
 
@@ -71,19 +72,19 @@ def run_node(
 
 
 class _Stop:
-    """SIGINT and SIGTERM only ask: the node publishes its zeros before it goes."""
+    """SIGINT, SIGTERM and SIGHUP only ask: the node publishes its zeros before it goes."""
 
     def __init__(self) -> None:
         self.asked = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDING:
             signal.signal(number, self._ask)
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
 
     def interrupt(self) -> None:
-        """From now on SIGINT and SIGTERM raise KeyboardInterrupt."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        """From now on they raise KeyboardInterrupt."""
+        for number in ENDING:
             signal.signal(number, signal.default_int_handler)
 
 

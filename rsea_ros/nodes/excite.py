@@ -12,7 +12,7 @@ from rclpy.node import Node
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
 from rsea_ros.nodes._cycle import SECOND, Cycle
-from rsea_ros.nodes._health import OK, WARN, Health, Report
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
 from rsea_ros.nodes._run import run_node
@@ -58,7 +58,7 @@ class Excite:
         self._cycle = Cycle(self._rate, self._step, catch_up=True)
         self._started = False
         self._health = Health(node, self._report)
-        node.create_timer(1.0, self._tell)
+        node.create_timer(1.0, self._tell, clock=STEADY)
 
     def _begin(self, message: JointState) -> None:
         """Start at a whole number of periods after a measurement, once everybody listens."""
