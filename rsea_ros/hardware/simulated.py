@@ -40,6 +40,7 @@ class SimulatedDevice:
         self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
         self._per_second = rate * steps_per_sample(1.0 / rate)
+        self._duration = duration
         self._machine = build(rig, 1.0 / self._per_second, duration)
         self._values = np.zeros(len(OUTPUTS))
         self._start: int | None = None
@@ -48,7 +49,11 @@ class SimulatedDevice:
         run(self._machine, np.zeros(1), np.empty((1, len(OUTPUTS))))  # compiles while there is time
 
     def open(self) -> None:
-        """Start at rest, now."""
+        """Start at rest, now, also after a `close`."""
+        if self._steps:
+            self._machine = build(self._rig, 1.0 / self._per_second, self._duration)
+            self._values = np.zeros(len(OUTPUTS))
+        self._steps, self._torque, self._writes = 0, 0.0, []
         self._start = self._clock()
 
     def read(self) -> State:

@@ -47,7 +47,7 @@ SENSOR = (
 LIMITS = (
     Parameter("torque_limit", 68.0, "largest torque that is commanded", "N m", 0.0, 1000.0),
     Parameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
-    Parameter("soft_start", 140.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6),
+    Parameter("soft_start", 500.0, "growth of the limit after activation, fault, pause", "N m/s", 1.0, 1e6),
     Parameter("deflection_limit", 0.0873, "of the spring; 0: none", "rad", 0.0, 100.0),
     Parameter("velocity_limit", 5.0, "of the gear output; 0: none", "rad/s", 0.0, 1000.0),
     Parameter("position_limit", 0.0, "either way from where configure finds it; 0: none", "rad", 0.0, 1e4),

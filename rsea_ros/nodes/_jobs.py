@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -15,10 +16,11 @@ TICK = 0.02
 
 
 class Jobs:
-    """Threads of a node's services."""
+    """Threads of a node's services. group: of these services, which wait beside everything else."""
 
     def __init__(self, node: Node) -> None:
-        self._tick = node.create_timer(TICK, lambda: None, clock=STEADY)
+        self.group = ReentrantCallbackGroup()
+        self._tick = node.create_timer(TICK, lambda: None, self.group, clock=STEADY)
         self._tick.cancel()
         self._threads: set[threading.Thread] = set()
 

@@ -206,7 +206,7 @@ class Driver(ManagedEntity):
             self._health.publish()
             return response
 
-        self._node.create_service(Trigger, f"~/{name}", serve)
+        self._node.create_service(Trigger, f"~/{name}", serve, callback_group=self._jobs.group)
 
     def _tell(self) -> None:
         """Log and publish what has changed: a fault, commands that were cut down."""
