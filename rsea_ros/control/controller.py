@@ -93,11 +93,14 @@ class TorqueController:
         self._age, self._desired = 0, desired
         self.share = Share()
 
-    def step(self, reading: Reading, desired: float, missed: int = 0, *, late: bool = False) -> float:
+    def step(
+        self, reading: Reading, desired: float, missed: int = 0, *, late: bool = False, trust: float = 1.0
+    ) -> float:
         """Return the torque (N m) that acts from the next sample on.
 
         desired: N m, at this sample, or two samples later with preview. missed: samples lost before it.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
+        trust: part of the feedback that counts, as lateness.py has it.
         """
         for wanted in np.linspace(self._desired, desired, missed + 2)[1:-1]:
             self._coast(float(wanted))
@@ -105,7 +108,7 @@ class TorqueController:
         ahead, model = self._ahead(desired), self._reference
         forward, reference = model.torque(ahead), float(model.now[FT])
         back, state = feedback(self._law, self._state, reference - reading.ft, reading.ft, reading.velocity)
-        back = 0.0 if late else back
+        back = 0.0 if late else trust * back
         known, crossing = self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + back + known + crossing
         torque = self._within(asked)
