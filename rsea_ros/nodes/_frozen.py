@@ -1,4 +1,4 @@
-"""Sensors that have stopped: a value that never changes, where noise or what is felt beside it would change it."""
+"""Sensors that have stopped: a value that never changes, where its noise would change it."""
 
 from __future__ import annotations
 

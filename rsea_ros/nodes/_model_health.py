@@ -47,7 +47,8 @@ class ModelHealth:
             )
         tests = self._observer.consistency()
         stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
-        troubles = [*stopped, *self._silence(), *(_told(name, test) for name, test in tests.items() if test.broken)]
+        doubts = (_told(name, test) for name, test in tests.items() if test.broken)
+        troubles = [*stopped, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._flag.verdict
         return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
 

@@ -30,8 +30,8 @@ class Inputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
     def __init__(
-        self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool, *, joint: str = "",
-        ft_noise: float = 0.0,
+        self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool, *,
+        joint: str = "", ft_noise: float = 0.0,
     ) -> None:  # fmt: skip
         """ft_noise: standard deviation, N m. joint: name that the joint must have."""
         self._observer = observer
