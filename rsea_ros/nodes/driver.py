@@ -240,8 +240,10 @@ class Driver(ManagedEntity):
             **report.values,
             **self._guarded.device.health(),
         }
-        level, summary = (report.level, report.summary) if fault is None else (ERROR, f"fault {fault}")
-        return Report(level, summary, values)
+        if fault is None:
+            return Report(report.level, report.summary, values)
+        besides = "" if report.level == OK else f"; {report.summary}"
+        return Report(ERROR, f"fault {fault}{besides}", values)
 
 
 def _hardware(values: dict[str, Any], health: Mapping[str, object]) -> str:
