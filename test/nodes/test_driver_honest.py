@@ -135,6 +135,7 @@ def test_another_joint_is_refused_and_named(driver):
 
 def test_stamps_that_are_off_are_told(driver):
     driver.off = 10 * 10**9
+    driver.health.clear()
     driver.push(30.0, lambda: driver.told("commands with a stamp that is off"))
     driver.off = 0
     assert driver.value("furthest_stamp_s").startswith("+10.0")
