@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 FULL, NONE = 0.7, 2.0
 """Samples more than the one of the design up to which all feedback counts, and from which on none does."""
+MOST = 10
+"""Samples of one pause that count: several pauses are lateness that persists, one is not."""
 RETURN = 0.3
 """s in which feedback comes back from none to all."""
 
@@ -38,19 +40,27 @@ class Lateness:
 
     def clear(self) -> None:
         """Begin anew, with all feedback."""
-        self.trust, self.worst, self.count = 1.0, 0.0, 0
+        self.trust, self.count = 1.0, 0
         self._recent: deque[bool] = deque(maxlen=self._window)
 
-    def take(self, late: float) -> float:
-        """Take in how late a command will act (samples); return the trust."""
+    def take(self, late: float, count: int = 1) -> float:
+        """Take in how late a command will act (samples); return the trust.
+
+        count: for how many samples it stands, of which a pause makes many; 0: another one replaces it.
+        """
+        for _ in range(min(count, MOST)):
+            self._count(late > self.tolerance.late)
+        if not count:
+            return self.trust
         wanted = min(max((NONE - late) / (NONE - FULL), 0.0), 1.0)
         self.trust = min(wanted, self.trust + self._gain)
-        self.worst = max(self.worst, late)
+        return self.trust
+
+    def _count(self, late: bool) -> None:
         if len(self._recent) == self._window:
             self.count -= self._recent[0]
-        self._recent.append(late > self.tolerance.late)
-        self.count += self._recent[-1]
-        return self.trust
+        self._recent.append(late)
+        self.count += late
 
     @property
     def persists(self) -> bool:

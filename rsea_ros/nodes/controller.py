@@ -64,15 +64,19 @@ class Controller:
         """Command for each measurement that came, and see to their absence."""
         with self._lock:
             self._anchor.follow()
-            for stamp, reading in self._inputs.take():
+            arrived = list(self._inputs.take())
+            for k, (stamp, reading) in enumerate(arrived):
                 if not self._fault:
-                    self._measured(stamp, reading)
+                    self._measured(stamp, reading, len(arrived) if k == len(arrived) - 1 else 0)
             if time.monotonic_ns() - self._watched > WATCH * SECOND:
                 self._watched = time.monotonic_ns()
                 self._watch()
 
-    def _measured(self, stamp: int, reading: Reading) -> None:
-        """Command for a measurement, one for each period of the grid that they lie on."""
+    def _measured(self, stamp: int, reading: Reading, together: int) -> None:
+        """Command for a measurement, one for each period of the grid that they lie on.
+
+        together: how many came at once, for the newest of them; 0 for the others, which it replaces.
+        """
         self._heard = time.monotonic_ns()
         if self._grid.jumps(stamp):
             self._begin_again(stamp)
@@ -80,7 +84,7 @@ class Controller:
         if periods and (missed := periods - 1) > self._values["stale"] * self._values["rate"]:
             self._last = 0  # the model would be led through a pause that nobody has seen
         if periods:
-            self._command(stamp, reading, missed if self._last else 0)
+            self._command(stamp, reading, missed if self._last else 0, together)
 
     def _begin_again(self, stamp: int) -> None:
         """Follow stamps that have jumped: the clock of the bench was set."""
@@ -88,13 +92,13 @@ class Controller:
         self._grid.forget()
         self._last, self._restarts = 0, self._restarts + 1
 
-    def _command(self, stamp: int, reading: Reading, missed: int) -> None:
+    def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
         self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
         if not self._last:
             self._controller.start(reading, self._desired.torque)
-        late = (self._anchor.now() - stamp) / self._period - 1.0
-        trust = self._judge.lateness.take(late)
+        late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
+        trust = self._judge.lateness.take(late, together)
         torque = self._controller.step(reading, self._desired.torque, missed, trust=trust)
         if fault := self._judge.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
