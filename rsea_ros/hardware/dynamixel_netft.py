@@ -101,14 +101,19 @@ class DynamixelNetft:
     def recover(self) -> None:
         """Connect again; raises DeviceError while motor or sensor still complain."""
         self._motor.recover()
-        if self._sensor is not None:
-            self._sensor.recover()
+        self._recover_sensor()
 
     def reboot(self) -> None:
         """Reboot the motor, then see to the sensor."""
         self._motor.reboot()
+        self._recover_sensor()
+
+    def _recover_sensor(self) -> None:
+        """Wait for the sensor; what records said of themselves before that counts no more."""
         if self._sensor is not None:
             self._sensor.recover()
+            self._take_wrenches()
+            self._trouble = ""
 
     def health(self) -> Mapping[str, object]:
         """Return errors of bus and stream by kind, and what the motor said of itself last."""

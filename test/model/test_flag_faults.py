@@ -1,6 +1,7 @@
 """Figures of the model never end a node, and what is no number never says pure."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -25,7 +26,10 @@ def run(made, torque, seconds, start=0.0, sigma=SIGMA):
     """Verdicts on a torque of the time."""
     times = start + np.arange(round(seconds * RATE)) / RATE
     noise = SIGMA * np.random.default_rng(1).normal(size=len(times))
-    return [made.take(t, Estimate(torque(t) + n, 0.0, 0.0, sigma, 0.0, 0.0)) for t, n in zip(times, noise)]
+    read = [torque(t) for t in times] + noise
+    return [
+        made.take(t, Estimate(y, 0.0, 0.0, sigma, 0.0, 0.0)) for t, y in zip(times, read, strict=True)
+    ]
 
 
 def slow(t):
@@ -68,7 +72,7 @@ def test_an_estimate_that_is_no_number_is_not_pure():
 def test_a_slow_and_a_fast_torque_together_do_not_make_it_flutter():
     """Ten changes a second for 5 Hz 0.5 N m and 70 Hz 0.4 N m."""
     verdicts = run(flag(), lambda t: 0.5 * slow(t) + 0.4 * math.sin(2.0 * math.pi * 70.0 * t), 6.0)
-    changes = sum(a != b for a, b in zip(verdicts[1000:], verdicts[1001:]))
+    changes = sum(a != b for a, b in pairwise(verdicts[1000:]))
     assert changes <= 2, changes
     assert run(flag(), slow, 2.0)[-1] == "pure"
 

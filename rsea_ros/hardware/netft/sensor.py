@@ -90,12 +90,16 @@ class Sensor:
 
     def recover(self) -> None:
         """Return when the stream is sound, at once where it goes on. Raises DeviceError when it is not."""
-        if self._age() > self._settings.timeout * 1e9:
+        if self._age() > self._settings.timeout * 1e9 or self._complains():
             self._collect()
-        complaint = _complaint([self._receiver.newest] if self._receiver.newest else [])
-        if complaint:
+        if complaint := self._complains():
             raise DeviceError(f"F/T sensor: {complaint} is still there, expected it to be over")
         self._restart_watch()
+
+    def _complains(self) -> str:
+        """Return what the newest record complains of."""
+        self._receiver.drain()
+        return _complaint([self._receiver.newest] if self._receiver.newest else [])
 
     def counts(self) -> dict[str, int]:
         """Return what came and what is gone, by kind."""
