@@ -1,9 +1,9 @@
 """What the driver reaches on the bench on a wire, beside a bare loop with absolute deadlines in the same run.
 
 Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
-The sections: timing, loss, faults, random, stream, fuzz; all of them without a name. `random --minutes 30
---seed 1` is the long one of faults, `timing --rate 280
---seconds 600` is the long soak. A machine that is busy or virtual stalls both loops: look at the ratios.
+The sections: timing, loss, faults, random, controller, stream, fuzz; all of them without a name. `random
+--minutes 30 --seed 1` is the long one of faults, `timing --rate 280 --seconds 600` the long soak. A machine
+that is busy or virtual stalls both loops: look at the ratios.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from bench.driver_controller import controller
 from bench.driver_faults import faults
 from bench.driver_fuzz import fuzz
 from bench.driver_loss import loss
@@ -29,6 +30,7 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, st
     "loss": loss,
     "faults": faults,
     "random": random_faults,
+    "controller": controller,
     "stream": stream,
     "fuzz": fuzz,
 }

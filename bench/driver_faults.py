@@ -6,13 +6,15 @@ Times are the bench's own, over the cycle's period: a machine that stalls shows 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
 from bench.driver_loop import Loop
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.limits import Fault
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._devices import limits_of
 from rsea_ros.nodes.driver import TABLE
@@ -49,6 +51,11 @@ def reads(name: str, value: float, right: float, within: float = QUICK) -> Trial
     return Trial(("set", {name: value}), ("set", {name: right}), within=within)
 
 
+def host(what: str, within: float, service: str = "clear") -> Trial:
+    """Return a trial of what happens to the driver itself, a function of this file."""
+    return Trial(("host", {"what": what}), None, service, within)
+
+
 def alerts(bits: int) -> Trial:
     """Return a trial of the motor's own alert."""
     return Trial(("alert", {"bits": bits}), None, "reboot")
@@ -62,6 +69,13 @@ def complains(bits: int, latched: bool = True) -> Trial:
 FAULTS: dict[str, Trial] = {
     "silent motor": misbehaves(silent=True),
     "all replies dropped": misbehaves(drop=1.0),
+    "a fifth of the replies dropped": misbehaves(2000.0, drop=0.2),
+    "half of the replies truncated": misbehaves(300.0, truncate=0.5),
+    "half of the replies corrupt": misbehaves(300.0, corrupt=0.5),
+    "half of the replies 20 ms late": misbehaves(300.0, delay=0.5, late=0.02),
+    "late, corrupt and dropped at once": misbehaves(300.0, drop=0.3, corrupt=0.3, delay=0.3, late=0.01),
+    "dropped, and F/T silent": misbehaves(10.0, drop=1.0, ft_silent=True),
+    "replies unstuffed": misbehaves(latched=False, unstuffed=True),
     "half of the replies dropped": misbehaves(300.0, drop=0.5),
     "1 % of the replies dropped": misbehaves(latched=False, drop=0.01),
     "wrong CRC": misbehaves(wrong_crc=1.0),
@@ -74,6 +88,9 @@ FAULTS: dict[str, Trial] = {
     "replies 6 ms late": misbehaves(delay=1.0, late=0.006),
     "hot, 71 °C": reads("temperature", 71, 30),
     "hot, 90 °C": reads("temperature", 90, 30),
+    "hot, 127 °C": reads("temperature", 127, 30),
+    "supply at 0 V": reads("voltage", 0, 240),
+    "supply at 19 V": reads("voltage", 190, 240),
     "supply at 17 V": reads("voltage", 170, 240),
     "torque switched off": reads("torque_enable", 0, 0, SLOW),
     "mode changed": reads("mode", 3, 0, SLOW),
@@ -81,17 +98,30 @@ FAULTS: dict[str, Trial] = {
     "F/T saturated": complains(0x8002_0000),
     "F/T supply out of range": complains(0x8800_0000),
     "F/T gauge broken": complains(0x8400_0000),
+    **{
+        f"F/T status bit {bit}": complains(0x8000_0000 | 1 << bit)
+        for bit in (0, 1, 2, 3, 4, 16, 18, 19, 25, 28, 29, 30)
+    },
     "F/T condition latch alone": complains(0x8001_0000, latched=False),
     "F/T silent": misbehaves(10.0, ft_silent=True),
     "half of the F/T records dropped": misbehaves(latched=False, ft_drop=0.5),
+    "all F/T records but one in a hundred dropped": misbehaves(20.0, ft_drop=0.99),
+    "a tenth of the F/T records dropped": misbehaves(latched=False, ft_drop=0.1),
     "F/T restart": Trial(("ft_restart", {}), None, within=10.0),
     "F/T gap of 1000 records": Trial(("ft_gap", {"records": 1000}), None, latched=False),
     "F/T gap of 2 million records": Trial(("ft_gap", {"records": 2_000_000}), None, latched=False),
+    "driver stands still for 0.3 s": host("stand_still", 120.0),
+    "supervisor killed": host("kill_supervisor", 40.0),
+    "service stop": host("stop", QUICK),
+    "asked to end by a signal": host("halt", QUICK)._replace(latched=False),
+    "commands cease": host("silence", 25.0),
+    "motor reboots by itself": host("reboot", 10.0, "reboot"),
     "adapter pulled out": Trial(("vanish", {}), ("appear", {}), within=1e9),
     **{
         f"hardware alert: {name}": alerts(bits)
         for name, bits in (
-            ("hall", 2), ("heat", 4), ("encoder", 8), ("shock", 16), ("overload", 32), ("two", 36),
+            ("voltage", 1), ("hall", 2), ("heat", 4), ("encoder", 8), ("shock", 16), ("overload", 32),
+            ("two", 36),
         )
     },
 }  # fmt: skip
@@ -119,14 +149,19 @@ def faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]
 def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[float, str, str]:
     """Return periods until the torque is zero at the motor, the cause that is latched, what ended it."""
     _calm(loop)
-    begun = bench.ask(trial.wrong[0], **trial.wrong[1])["t"]
+    age = 0.0
+    if trial.wrong[0] == "host":
+        begun = bench.ask("torque")["t"]
+        age = HOST[trial.wrong[1]["what"]](loop) or 0.0
+    else:
+        begun = bench.ask(trial.wrong[0], **trial.wrong[1])["t"]
     cycles = 0
     while loop.guarded.fault is None and cycles < (400 if trial.latched else 60):
-        loop.cycle(10.0)
+        loop.cycle(10.0, age and age + cycles / RATE)
         cycles += 1
     cause = loop.guarded.fault.cause if loop.guarded.fault else ""
     for _ in range(6):
-        loop.cycle(10.0)
+        loop.cycle(10.0, age)
     ended = next((t for t, goal, on in bench.log(begun)["torque"] if goal == 0 or not on), begun)
     if trial.right is not None:
         bench.ask(trial.right[0], **trial.right[1])
@@ -135,8 +170,26 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[float, str, str
     return (ended - begun) * RATE / 1e9, cause, _recover(loop, trial.service)
 
 
+def _kill_supervisor(loop: Loop) -> None:
+    supervisor = loop.device._motor._supervisor
+    assert supervisor is not None
+    supervisor._end._process.kill()  # type: ignore[attr-defined]
+
+
+HOST: dict[str, Callable[[Loop], float | None]] = {
+    "stand_still": lambda loop: time.sleep(0.3),
+    "kill_supervisor": _kill_supervisor,
+    "stop": lambda loop: loop.guarded.guard.trip(Fault("stopped")),
+    "halt": lambda loop: setattr(loop.guarded.guard, "halted", True),
+    "silence": lambda loop: 1.0 / RATE,
+    "reboot": lambda loop: loop.device._motor.bus.reboot(),
+}
+"""What happens to the driver; the age of its command where that ceases."""
+
+
 def _recover(loop: Loop, service: str) -> str:
     """Call the service until it ends the fault; return how it did."""
+    loop.guarded.guard.halted = False
     for attempt in range(1, 6):
         try:
             getattr(loop.guarded, service)()

@@ -34,13 +34,13 @@ class Loop:
         self.states: list[State] = []
         self.spent: list[float] = []
 
-    def cycle(self, torque: float) -> State | None:
-        """Wait for the next deadline and do one cycle."""
+    def cycle(self, torque: float, age: float = 0.0) -> State | None:
+        """Wait for the next deadline and do one cycle. age: of the command, s."""
         now = time.monotonic_ns()
         self._due = max(self._due + self._period, now - self._period)
         time.sleep(max(0.0, self._due - now) / 1e9)
         begin = time.monotonic_ns()
-        state = self.guarded.cycle(torque, 0.0)
+        state = self.guarded.cycle(torque, age)
         self.spent.append((time.monotonic_ns() - begin) / 1e9)
         if state is not None:
             self.states.append(state)
