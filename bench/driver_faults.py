@@ -100,7 +100,7 @@ FAULTS: dict[str, Trial] = {
     "F/T gauge broken": complains(0x8400_0000),
     **{
         f"F/T status bit {bit}": complains(0x8000_0000 | 1 << bit)
-        for bit in (0, 1, 2, 3, 4, 16, 18, 19, 25, 28, 29, 30)
+        for bit in (0, 1, 2, 3, 4, 17, 18, 19, 25, 28, 29, 30)
     },
     "F/T condition latch alone": complains(0x8001_0000, latched=False),
     "F/T silent": misbehaves(10.0, ft_silent=True),

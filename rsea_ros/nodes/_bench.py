@@ -100,7 +100,7 @@ class Bench:
             **(more or {}),
         }
         new = {kind: count - self._told.get(kind, 0) for kind, count in counts.items()}
-        self._told = counts
+        self._told = {**self._told, **counts}
         troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
         values = {
             **timing.values(),

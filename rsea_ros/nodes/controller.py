@@ -54,7 +54,7 @@ class Controller:
         self._writer = RawWriter(template, TYPES["torque_command"], "effort")
         self._lock = threading.Lock()
         node.create_service(Trigger, "~/clear_fault", self._clear)
-        self._health = Health(node, self._report)
+        self._health = Health(node, self._report, values["rig"])
         for line in summary(self._design):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)

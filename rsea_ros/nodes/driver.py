@@ -230,7 +230,7 @@ class Driver(ManagedEntity):
         self._cycle.rest()
         fault: Fault | None = self._guarded.fault
         cycles = self._guarded.cycles
-        lost = {words: cycles[name] for name, words in LOST.items()}
+        lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
         report = self._bench.report(self._cycle, lost)
         values = {
             "active": self._guarded.enabled,

@@ -76,7 +76,7 @@ class Model:
         )  # fmt: skip
         self._assess = ModelHealth(rig, observer, self._flag, self._inputs)
         self._lock = threading.Lock()
-        self._health = Health(node, self._report)
+        self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
         keep_time(node, self._waiter, values["realtime_priority"])
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._flag.edge:.1f} Hz")

@@ -49,7 +49,7 @@ class Plant:
         )
         self._bench = Bench(node, values)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
-        self._health = Health(node, lambda: self._bench.report(self._cycle))
+        self._health = Health(node, lambda: self._bench.report(self._cycle), f"simulated {values['rig']}")
         self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
         self._cycle.start()
 
