@@ -7,6 +7,9 @@ from typing import Any
 
 from rsea_ros.control.lateness import Lateness, Tolerance
 
+OBEYED, SEEN = 0.05, 3.0
+"""s after which a motor makes the torque that is commanded, N m, of which so much is surely seen."""
+
 
 class Judge:
     """Follows commands and torques sample by sample. lateness: of the commands."""
@@ -16,12 +19,24 @@ class Judge:
         self._error_limit, self._ft_limit = values["error_limit"], values["ft_limit"]
         self._longest = max(1, round(values["error_time"] * values["rate"]))
         self.lateness = Lateness(values["rate"], Tolerance(values["late_share"], values["late_time"]))
-        self._off = 0
+        self._off = self._idle = 0
+        self._patience = max(1, round(OBEYED * values["rate"]))
 
     def clear(self) -> None:
         """Begin anew."""
         self.lateness.clear()
-        self._off = 0
+        self._off = self._idle = 0
+
+    def idle(self, commanded: float, made: float) -> bool:
+        """Tell whether the motor makes no torque although one is commanded (N m): its driver has a fault.
+
+        What is commanded then must not be there when the driver's fault is cleared.
+        """
+        self._idle = self._idle + 1 if abs(commanded) > SEEN and abs(made) < 0.2 * SEEN else 0
+        if self._idle < self._patience:
+            return False
+        self._idle = 0
+        return True
 
     def fault(self, ft: float, desired: float) -> str:
         """Return what must end the torque, in words; empty for nothing. ft, desired: N m, of this sample.

@@ -95,7 +95,7 @@ class Controller:
     def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
         self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
-        if not self._last:
+        if not self._last or self._judge.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._judge.lateness.take(late, together)

@@ -83,3 +83,11 @@ def test_an_error_that_stays_is_a_fault_and_a_step_is_none():
 
 def test_a_torque_beyond_the_sensor_is_a_fault_at_once():
     assert "ft of -111 N m" in _judge.Judge(VALUES).fault(-111.0, -111.0)
+
+
+def test_a_motor_that_makes_nothing_is_seen_and_one_that_is_late_is_not():
+    """A driver with a fault: what was commanded meanwhile, 25 N m for 10, came when that was cleared."""
+    judge = _judge.Judge(VALUES)
+    assert [judge.idle(25.0, 0.0) for _ in range(15)].index(True) == 13
+    assert not any(judge.idle(25.0, 20.0) or judge.idle(1.0, 0.0) for _ in range(100))
+    assert not any(judge.idle(25.0, math.nan) for _ in range(100))
