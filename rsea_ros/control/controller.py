@@ -104,9 +104,9 @@ class TorqueController:
         """
         for wanted in np.linspace(self._desired, desired, missed + 2)[1:-1]:
             self._coast(float(wanted))
-        self._hear(reading, missed)
         ahead, model = self._ahead(desired), self._reference
         forward, reference = model.torque(ahead), float(model.now[FT])
+        self._hear(reading, missed, reference - reading.ft)
         back, state = feedback(self._law, self._state, reference - reading.ft, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
         known, crossing = self._compensated(reading, forward), self._crossing(ahead)
@@ -133,11 +133,12 @@ class TorqueController:
         self._sent, self._known = torque, (self._known[1], known)
         self._age += 1
 
-    def _hear(self, reading: Reading, missed: int) -> None:
+    def _hear(self, reading: Reading, missed: int, error: float) -> None:
         """Take the measured motor torque for the one that acted; after lost samples, read those between."""
         s, share = self._state, missed / (missed + 1)
         acted = reading.motor_torque - self._known[0]
         self._state = s._replace(
+            error=s.error + share * (error - s.error),
             ft=s.ft + share * (reading.ft - s.ft),
             velocity=s.velocity + share * (reading.velocity - s.velocity),
             applied=acted if math.isfinite(acted) else s.applied,

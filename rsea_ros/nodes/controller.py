@@ -98,7 +98,7 @@ class Controller:
         if not self._last or self._judge.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
-        trust = self._judge.lateness.take(late, together)
+        trust = self._judge.lateness.take(max(late, missed), max(together, int(missed > 0)))
         torque = self._controller.step(reading, self._desired.torque, missed, trust=trust)
         if fault := self._judge.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
