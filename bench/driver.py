@@ -1,8 +1,9 @@
 """What the driver reaches on the bench on a wire, beside a bare loop with absolute deadlines in the same run.
 
 Run: python bench/driver.py [SECTION …] [--seconds 30] [--strings 1000000] [--rate 280 1000] [--priority 0 80]
-The sections: timing, loss, faults, stream, fuzz; all of them without a name. `timing --rate 280
---seconds 600` is the long soak. A machine that is busy or virtual stalls both loops: look at the ratios.
+The sections: timing, loss, faults, random, controller, stream, fuzz; all of them without a name. `random
+--minutes 30 --seed 1` is the long one of faults, `timing --rate 280 --seconds 600` the long soak. A machine
+that is busy or virtual stalls both loops: look at the ratios.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from bench.driver_controller import controller
 from bench.driver_faults import faults
 from bench.driver_fuzz import fuzz
 from bench.driver_loss import loss
+from bench.driver_random import random_faults
 from bench.driver_stream import stream
 from bench.driver_timing import timing
 from bench.sections import chosen, parser_of
@@ -26,6 +29,8 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Path], list[tuple[str, str, st
     "timing": timing,
     "loss": loss,
     "faults": faults,
+    "random": random_faults,
+    "controller": controller,
     "stream": stream,
     "fuzz": fuzz,
 }
@@ -38,6 +43,8 @@ def main() -> None:
     parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of `timing`, Hz")
     parser.add_argument("--priority", type=int, nargs="+", default=[0, 80], help="of `timing`; 0: none")
     parser.add_argument("--strings", type=int, default=1_000_000, help="damaged byte strings")
+    parser.add_argument("--minutes", type=float, default=1.0, help="of `random`")
+    parser.add_argument("--seed", type=int, default=1, help="of `random`")
     args, sections = chosen(parser, SECTIONS)
     print(f"{'what':58} {'asked':22} measured")
     for _, section in sections:

@@ -21,8 +21,8 @@ class Loop:
     """A device on a bench and its limits, `rate` cycles a second. spent: time in each cycle, s."""
 
     def __init__(self, bench: RemoteBench, rate: float, *, lost_cycles: int = 3, ft_timeout: float = 0.01,
-                 latency: float = 0.0) -> None:  # fmt: skip
-        limits = Limits(68.0, lost_cycles=lost_cycles)
+                 latency: float = 0.0, limits: Limits | None = None) -> None:  # fmt: skip
+        limits = limits or Limits(68.0, lost_cycles=lost_cycles)
         self.device = DynamixelNetft(
             MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate)),
             SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
@@ -34,13 +34,13 @@ class Loop:
         self.states: list[State] = []
         self.spent: list[float] = []
 
-    def cycle(self, torque: float) -> State | None:
-        """Wait for the next deadline and do one cycle."""
+    def cycle(self, torque: float, age: float = 0.0) -> State | None:
+        """Wait for the next deadline and do one cycle. age: of the command, s."""
         now = time.monotonic_ns()
         self._due = max(self._due + self._period, now - self._period)
         time.sleep(max(0.0, self._due - now) / 1e9)
         begin = time.monotonic_ns()
-        state = self.guarded.cycle(torque, 0.0)
+        state = self.guarded.cycle(torque, age)
         self.spent.append((time.monotonic_ns() - begin) / 1e9)
         if state is not None:
             self.states.append(state)

@@ -15,6 +15,12 @@ ARGUMENTS = {
     "namespace": ("rsea", "namespace of all topics"),
     "rig": ("paper_high_impedance", "the bench: a name in config/rigs or a file"),
     "bag": ("", "bag that replay plays"),
+    "device": ("dynamixel_netft", "what the driver drives: dynamixel_netft or simulated"),
+    "port": ("/dev/ttyUSB0", "serial port of the motor"),
+    "baud": ("1000000", "of the serial port, as the motor is set, bit/s"),
+    "ft_host": ("192.168.1.1", "address of the F/T sensor"),
+    "activate": ("false", "switch the driver's torque on at once; else by its lifecycle"),
+    "params": (str(CONFIG / "driver.yaml"), "parameter file of the driver; the arguments above win"),
     "model": ("true", "estimate the torques, and say whether the actuator is a pure torque source"),
     "identify": ("true", "fit the rig to what is measured"),
     "controller": ("false", "make the torque follow desired_torque"),
@@ -23,9 +29,13 @@ ARGUMENTS = {
 }
 
 
-FIRST = {"plant": "rig", "driver": "rig", "replay": "bag"}
-OTHERS = {"model": "rig", "identify": "rig", "controller": "rig", "record": None, "excite": None}
-"""Executables, and the launch argument that is a parameter of theirs."""
+RIG = {"rig": "rig"}
+DRIVER = {name: name for name in ("rig", "device", "port", "baud", "ft_host")} | {"autostart": "activate"}
+FIRST = {"plant": RIG, "driver": DRIVER, "replay": {"bag": "bag"}}
+OTHERS: dict[str, dict[str, str]] = {
+    "model": RIG, "identify": RIG, "controller": RIG, "record": {}, "excite": {},
+}  # fmt: skip
+"""Executables, and for parameters of theirs the launch arguments that set them."""
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -44,13 +54,16 @@ def generate_launch_description() -> LaunchDescription:
     )
 
 
-def node(name: str, own: str | None, wanted: Substitution) -> Node:
+def node(name: str, own: dict[str, str], wanted: Substitution) -> Node:
     """Return a node of the package with its parameter file, started if `wanted` is true."""
     return Node(
         package="rsea_ros",
         executable=name,
         namespace=LaunchConfiguration("namespace"),
-        parameters=[str(CONFIG / f"{name}.yaml"), {own: LaunchConfiguration(own)} if own else {}],
+        parameters=[
+            LaunchConfiguration("params") if name == "driver" else str(CONFIG / f"{name}.yaml"),
+            {parameter: LaunchConfiguration(argument) for parameter, argument in own.items()},
+        ],
         condition=IfCondition(wanted),
         output="screen",
     )

@@ -1,7 +1,7 @@
 """The real bench: the driver node in front of the graph.
 
-ros2 launch rsea_ros hardware.launch.py rig:=my_rig.yaml record:=true
-The driver is a lifecycle node: it powers the actuator only when it is activated.
+ros2 launch rsea_ros hardware.launch.py rig:=my_rig.yaml port:=/dev/ttyUSB0 ft_host:=192.168.1.1 record:=true
+The driver is a lifecycle node: it powers the actuator only when it is activated, or with activate:=true.
 """
 
 from pathlib import Path

@@ -24,10 +24,11 @@ class RawReader:
     """Reads the stamp and some numbers of the messages of a topic.
 
     fields: name and index of each number; one that a message does not have is nan.
+    joint: name that the joint of a message with names must have; empty: any.
     """
 
-    def __init__(self, msgtype: str, fields: Sequence[tuple[str, int]]) -> None:
-        self._msgtype, self._fields = msgtype, fields
+    def __init__(self, msgtype: str, fields: Sequence[tuple[str, int]], joint: str = "") -> None:
+        self._msgtype, self._fields, self._joint = msgtype, fields, joint
         self._length = -1
         self._fixed: list[tuple[int, int, bytes]] = []
         self._stamp, self._double = struct.Struct("<iI"), struct.Struct("<d")
@@ -36,7 +37,7 @@ class RawReader:
     def read(self, raw: bytes) -> tuple[int, list[float]]:
         """Return the stamp, ns, and the numbers.
 
-        Raises ParameterError for a message of several joints, a damaged one, and one of more than 64 KiB.
+        Raises ParameterError for several joints or another one, a damaged message, one of more than 64 KiB.
         """
         if len(raw) > LONGEST:
             raise ParameterError(f"{len(raw)} bytes, expected at most {LONGEST} of a {self._msgtype}")
@@ -55,6 +56,8 @@ class RawReader:
         if len(layout.names) > 1:
             names = brief(", ".join(layout.names[:5]))
             raise ParameterError(f"{len(layout.names)} joints ({names}), expected one")
+        if self._joint and layout.names and layout.names[0] != self._joint:
+            raise ParameterError(f"joint {layout.names[0]!r}, expected {self._joint!r} (parameter joint)")
         self._at = [_position(layout, name, index) for name, index in self._fields]
         self._fixed = [(a, b, raw[a:b]) for a, b in _joined(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))

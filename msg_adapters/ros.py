@@ -51,13 +51,14 @@ def efforts_message(stamp_ns: int, efforts: Mapping[str, float]) -> JointState:
 
 
 def joint_state_message(
-    stamp_ns: int, position: float, velocity: float, effort: float, joint: str = "joint"
+    stamp_ns: int, position: float, velocity: float, effort: float, joint: str = "joint", frame: str = ""
 ) -> JointState:
     """Return a state: rad, rad/s, N m."""
     message = JointState(name=[joint], position=[float(position)])
     message.velocity = [float(velocity)]
     message.effort = [float(effort)]
     message.header.stamp = time_of(stamp_ns)
+    message.header.frame_id = frame
     return message
 
 
@@ -90,12 +91,14 @@ def clock_message(stamp_ns: int) -> Clock:
 
 
 def diagnostics_message(
-    stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object]
+    stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object], hardware: str = ""
 ) -> DiagnosticArray:
-    """Return the health of one node; level is OK, WARN, ERROR or STALE."""
+    """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: what it is about."""
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     message = DiagnosticArray(
-        status=[DiagnosticStatus(level=level, name=name, message=summary, values=pairs)]
+        status=[
+            DiagnosticStatus(level=level, name=name, message=summary, values=pairs, hardware_id=hardware)
+        ]
     )
     message.header.stamp = time_of(stamp_ns)
     return message

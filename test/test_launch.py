@@ -104,9 +104,20 @@ def test_only_the_first_node_model_and_identify_start_unasked(describe):
 def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
     for name, node in nodes(describe("graph")).items():
         file, own = node["parameters"]
+        if isinstance(file, Part):
+            file = defaults(describe("graph"))[file.arguments[0]]
         given = set(yaml.safe_load(Path(file).read_text())["/**"]["ros__parameters"]) | set(own)
         table = importlib.import_module(f"rsea_ros.nodes.{name}").TABLE
         assert given <= {parameter.name for parameter in table}, name
+
+
+def test_hardware_is_a_real_device_that_is_activated_only_where_that_is_asked(describe):
+    """It started the simulation, whatever was plugged in."""
+    parts = describe("graph")
+    own = nodes(parts)["driver"]["parameters"][1]
+    given = {name: defaults(parts)[part.arguments[0]] for name, part in own.items()}
+    assert given["device"] == "dynamixel_netft" and given["autostart"] == "false"
+    assert {"port", "baud", "ft_host", "rig"} < set(given)
 
 
 def nodes(parts: list[Part]) -> dict[str, dict[str, Any]]:

@@ -34,6 +34,8 @@ SPREAD = 0.1
 PACE = 10.0
 PATIENT = {"latency": 0.02, "lost_cycles": 30, "ft_timeout": 0.5, "command_timeout": 0.5, "watchdog": 1.0}
 """The bench on a wire is a process too, which a busy machine may hold up for longer than a motor would be."""
+EXCITED = {"slew_limit": 25_000.0, "effort_limit": 0.0}
+"""The paper's excitation changes by 23 000 N m/s."""
 START_UP = 60.0
 """Seconds that a node may take beside its work: a cold start compiles the simulation."""
 
@@ -115,7 +117,7 @@ def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[st
         yield "plant"
         return
     with RemoteBench(out / "tty", "--rig", rig, "--seed", args.seed) as bench:
-        nodes.start("driver", {**bench.parameters(), **PATIENT, "rig": RIG, "autostart": True})
+        nodes.start("driver", {**bench.parameters(), **PATIENT, **EXCITED, "rig": RIG, "autostart": True})
         yield "driver"
     faults = [line for line in nodes.log("driver").read_text().splitlines() if "[ERROR]" in line]
     if faults:

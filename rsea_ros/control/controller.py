@@ -93,19 +93,22 @@ class TorqueController:
         self._age, self._desired = 0, desired
         self.share = Share()
 
-    def step(self, reading: Reading, desired: float, missed: int = 0, *, late: bool = False) -> float:
+    def step(
+        self, reading: Reading, desired: float, missed: int = 0, *, late: bool = False, trust: float = 1.0
+    ) -> float:
         """Return the torque (N m) that acts from the next sample on.
 
         desired: N m, at this sample, or two samples later with preview. missed: samples lost before it.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
+        trust: part of the feedback that counts, as lateness.py has it.
         """
         for wanted in np.linspace(self._desired, desired, missed + 2)[1:-1]:
             self._coast(float(wanted))
-        self._hear(reading, missed)
         ahead, model = self._ahead(desired), self._reference
         forward, reference = model.torque(ahead), float(model.now[FT])
+        self._hear(reading, missed, reference - reading.ft)
         back, state = feedback(self._law, self._state, reference - reading.ft, reading.ft, reading.velocity)
-        back = 0.0 if late else back
+        back = 0.0 if late else trust * back
         known, crossing = self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + back + known + crossing
         torque = self._within(asked)
@@ -130,11 +133,12 @@ class TorqueController:
         self._sent, self._known = torque, (self._known[1], known)
         self._age += 1
 
-    def _hear(self, reading: Reading, missed: int) -> None:
+    def _hear(self, reading: Reading, missed: int, error: float) -> None:
         """Take the measured motor torque for the one that acted; after lost samples, read those between."""
         s, share = self._state, missed / (missed + 1)
         acted = reading.motor_torque - self._known[0]
         self._state = s._replace(
+            error=s.error + share * (error - s.error),
             ft=s.ft + share * (reading.ft - s.ft),
             velocity=s.velocity + share * (reading.velocity - s.velocity),
             applied=acted if math.isfinite(acted) else s.applied,

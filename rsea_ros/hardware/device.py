@@ -28,12 +28,14 @@ class PortLost(DeviceError):
 class State:
     """One reading.
 
-    stamp, ft_stamp: instants of acquisition, ns since the epoch. position: rad, velocity: rad/s, of the gear
+    stamp, ft_stamp: instants of acquisition, ns since the epoch, on a clock that goes on evenly from `open`
+    on when the system clock is set. position: rad, velocity: rad/s, of the gear
     output relative to the housing. motor_torque: N m at the gear output, from measured current. wrench:
     force x, y, z (N) and torque x, y, z (N m) of the F/T sensor; None without one.
     wrenches: all that came since the last reading, as (stamp, wrench), where the sensor is faster.
     current A, voltage V, temperature °C: nan where the device does not measure them.
     hardware_error, ft_trouble: what motor and sensor complain of, in words; empty when of nothing.
+    motor_trouble: what the motor has become that it was not made to be, such as torque off, in words.
     """
 
     stamp: int
@@ -48,6 +50,7 @@ class State:
     temperature: float = math.nan
     hardware_error: str = ""
     ft_trouble: str = ""
+    motor_trouble: str = ""
 
 
 class Device(Protocol):

@@ -73,6 +73,7 @@ class DynamixelNetft:
             temperature=sample.temperature,
             hardware_error=sample.hardware_error,
             ft_trouble=trouble,
+            motor_trouble=sample.trouble,
         )
         return self._last
 
@@ -81,8 +82,7 @@ class DynamixelNetft:
         if self._sensor is None:
             return
         wrenches, trouble = self._sensor.take()
-        slipped = self._epoch + time.monotonic_ns() - time.time_ns()  # the system clock may have been set
-        self._waiting += [(stamp + slipped, wrench) for stamp, wrench in wrenches]
+        self._waiting += [(instant + self._epoch, wrench) for instant, wrench in wrenches]
         self._trouble = self._trouble or trouble
 
     def write(self, torque: float) -> None:
@@ -101,14 +101,19 @@ class DynamixelNetft:
     def recover(self) -> None:
         """Connect again; raises DeviceError while motor or sensor still complain."""
         self._motor.recover()
-        if self._sensor is not None:
-            self._sensor.recover()
+        self._recover_sensor()
 
     def reboot(self) -> None:
         """Reboot the motor, then see to the sensor."""
         self._motor.reboot()
+        self._recover_sensor()
+
+    def _recover_sensor(self) -> None:
+        """Wait for the sensor; what records said of themselves before that counts no more."""
         if self._sensor is not None:
             self._sensor.recover()
+            self._take_wrenches()
+            self._trouble = ""
 
     def health(self) -> Mapping[str, object]:
         """Return errors of bus and stream by kind, and what the motor said of itself last."""

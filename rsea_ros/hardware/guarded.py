@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import threading
 from collections import Counter
+from collections.abc import Callable
+from contextlib import suppress
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import Device, NoReply, State
-from rsea_ros.hardware.limits import Fault, Guard, Limits
+from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
+
+BUSY = "clear_fault or reboot is under way, expected it to be over"
 
 
 class Guarded:
     """Reads and writes once a cycle; turns what goes wrong into latched faults, never into an exception.
 
     enabled: whether commands get through. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    away: whether somebody else talks to the device, which takes longer than a cycle; cycles leave it alone.
     """
 
     def __init__(self, device: Device, limits: Limits, rate: float) -> None:
@@ -20,7 +26,8 @@ class Guarded:
         self.enabled = False
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
-        self._taring = False
+        self._taring = self.away = False
+        self._turn = threading.Lock()
         self._lost = {"read": 0, "write": 0}
 
     @property
@@ -33,12 +40,15 @@ class Guarded:
 
         The write comes first, so that a command takes effect as near to the start of its cycle as can be.
         """
-        before = self.guard.fault
-        self.write(wanted, age)
-        state = self.read()
-        if self.guard.fault is not before:
-            self.write(0.0, age)
-        return state
+        with self._turn:
+            if self.away:
+                return None
+            before = self.guard.fault
+            self.write(wanted, age)
+            state = self.read()
+            if self.guard.fault is not before:
+                self.write(0.0, age)
+            return state
 
     def read(self) -> State | None:
         """Return the reading of this cycle; None when there was none."""
@@ -67,18 +77,23 @@ class Guarded:
         """Switch the torque on, at zero. Raises DeviceError while a fault is latched."""
         if self.guard.fault is not None:
             raise DeviceError(f"fault {self.guard.fault}, expected clear_fault first")
-        self.guard.clear()
-        self.device.enable()
-        self.enabled = True
+        with self._turn:
+            if self.away:
+                raise DeviceError(BUSY)
+            self.guard.clear()
+            self.device.enable()
+            self.enabled = True
 
     def disable(self) -> None:
-        """Command zero torque and switch it off."""
+        """Command zero torque and switch it off. Whoever has the device does it where that is away."""
         self.enabled = False
-        self.guard.torque = 0.0
-        self.device.disable()
+        with self._turn:
+            self.guard.torque = 0.0
+            if not self.away:
+                self.device.disable()
 
     def zero_ft(self) -> None:
-        """Tare the F/T sensor. Raises DeviceError while torque is commanded."""
+        """Tare the F/T sensor, beside the cycles. Raises DeviceError while torque is commanded."""
         if self.guard.torque != 0.0:
             raise DeviceError(f"zero_ft: {self.guard.torque:.4g} N m is commanded, expected 0 N m")
         self._taring = True
@@ -87,21 +102,45 @@ class Guarded:
         finally:
             self._taring = False
 
-    def clear(self) -> None:
-        """Connect again if need be and forget the fault. Raises DeviceError while its cause is there."""
-        self.device.recover()
-        self._again()
+    def clear(self) -> bool:
+        """Connect again if need be and forget the fault; tell whether there was one.
+
+        Raises DeviceError while its cause is there: a reading is asked.
+        """
+        if self.guard.fault is None:
+            return False
+        self._alone(self._recover)
+        return True
 
     def reboot(self) -> None:
         """Restart the actuator; the fault is forgotten, the torque is on as before, at zero."""
-        self.device.reboot()
-        self._again()
+        self.guard.torque = 0.0
+        self._alone(self.device.reboot)
 
-    def _again(self) -> None:
-        self._lost = dict.fromkeys(self._lost, 0)
-        if self.enabled:
-            self.device.enable()
-        self.guard.clear()
+    def _recover(self) -> None:
+        self.device.recover()
+        fault = complaint(self.guard.limits, self.device.read())
+        if fault is not None:
+            raise DeviceError(f"{fault} is still there, expected it to be over")
+
+    def _alone(self, work: Callable[[], None]) -> None:
+        """Do something with the device while the cycles leave it alone, then begin anew, at zero torque."""
+        with self._turn:
+            if self.away:
+                raise DeviceError(BUSY)
+            self.away = True
+        try:
+            work()
+            self._lost = dict.fromkeys(self._lost, 0)
+            if self.enabled:
+                self.device.enable()
+            self.guard.clear()
+        finally:
+            with self._turn:
+                self.away = False
+                if not self.enabled:  # also where it was asked for meanwhile
+                    with suppress(DeviceError):
+                        self.device.disable()
 
     def _failed(self, what: str, error: DeviceError) -> None:
         """Count a failure. One lost answer costs a cycle; several in a row, and any other failure, trip."""

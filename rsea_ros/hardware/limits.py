@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.device import State
 
 COMMAND_TIMEOUT = "command_timeout"
+HEARD_LATE = 3
+"""Cycles until a torque that was written shows in the measured one."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """SI. torque N m, slew N m/s, deflection rad, temperature °C, current A, voltage V (at least).
+    """SI. torque N m, slew N m/s, temperature °C, current A, voltage V (at least), velocity rad/s, position
+    rad from where the device was opened, ft N m about the actuator's axis, power W, measured, either way.
 
+    deflection: rad, of the spring: of the drive's angle where that is the spring's.
+    soft_start: N m/s, by which the largest torque grows after an activation and a fault.
+    effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
     command_timeout: s without a command while torque is commanded. ramp: s from there to zero torque.
-    lost_cycles: cycles in a row without an answer.
+    lost_cycles: cycles in a row without an answer. ft_axis: place in the wrench.
     """
 
     torque: float
@@ -28,6 +35,14 @@ class Limits:
     command_timeout: float = 0.05
     ramp: float = 0.02
     lost_cycles: int = 3
+    velocity: float = math.inf
+    position: float = math.inf
+    ft: float = math.inf
+    power: float = math.inf
+    soft_start: float = math.inf
+    effort: float = math.inf
+    effort_time: float = 0.1
+    ft_axis: int = 5
 
 
 @dataclass(frozen=True)
@@ -45,10 +60,37 @@ class Fault:
         return f"{self.cause}:" + ("" if math.isnan(self.value) else measured) + f" {self.detail}".rstrip()
 
 
+def complaint(limits: Limits, state: State) -> Fault | None:
+    """Return what a reading says is wrong, the first of it."""
+    for cause, words in (
+        ("hardware_error", state.hardware_error),
+        ("motor_state", state.motor_trouble),
+        ("ft", state.ft_trouble),
+    ):
+        if words:
+            return Fault(cause, detail=words)
+    ft = abs(state.wrench[limits.ft_axis]) if state.wrench is not None else math.nan
+    for cause, value, limit, unit in (
+        ("deflection", abs(state.position), limits.deflection, "rad"),
+        ("temperature", state.temperature, limits.temperature, "°C"),
+        ("current", abs(state.current), limits.current, "A"),
+        ("velocity", abs(state.velocity), limits.velocity, "rad/s"),
+        ("position", abs(state.position), limits.position, "rad"),
+        ("ft_torque", ft, limits.ft, "N m"),
+        ("power", abs(state.motor_torque * state.velocity), limits.power, "W"),
+    ):
+        if value > limit:
+            return Fault(cause, value, limit, unit)
+    if state.voltage < limits.voltage:
+        return Fault("voltage", state.voltage, limits.voltage, "V", "too low")
+    return None
+
+
 class Guard:
     """Keeps the torque within limits, and at zero once a fault is latched.
 
-    fault: the first one since it was cleared. limited: commands that were cut down.
+    fault: the first one since it was cleared. limited: commands that were cut down. halted: whether the end
+    of the program was asked for: from then on there is no torque, and no fault either.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
@@ -56,7 +98,10 @@ class Guard:
         self.fault: Fault | None = None
         self.limited = 0
         self.torque = 0.0
-        self._ramp = 0.0
+        self.halted = False
+        self._ramp = self._room = 0.0
+        self._written: deque[float] = deque(maxlen=HEARD_LATE)
+        self._missed = 0
 
     def trip(self, fault: Fault) -> None:
         """Latch a fault, unless there is one."""
@@ -65,45 +110,57 @@ class Guard:
             self._ramp = abs(self.torque) * self._period / max(self.limits.ramp, self._period)
 
     def clear(self) -> None:
-        """Forget the fault. The torque begins at zero."""
-        self.fault, self.torque = None, 0.0
+        """Forget the fault. The torque begins at zero, and softly."""
+        self.fault, self.torque, self._room, self._missed = None, 0.0, 0.0, 0
+        self._written.clear()
 
     def look(self, state: State) -> None:
         """Latch what a reading says is wrong."""
-        limits = self.limits
-        if state.hardware_error:
-            self.trip(Fault("hardware_error", detail=state.hardware_error))
-        if state.ft_trouble:
-            self.trip(Fault("ft", detail=state.ft_trouble))
-        for cause, value, limit, unit in (
-            ("deflection", abs(state.position), limits.deflection, "rad"),
-            ("temperature", state.temperature, limits.temperature, "°C"),
-            ("current", abs(state.current), limits.current, "A"),
-        ):
-            if value > limit:
-                self.trip(Fault(cause, value, limit, unit))
-        if state.voltage < limits.voltage:
-            self.trip(Fault("voltage", state.voltage, limits.voltage, "V", "too low"))
+        fault = complaint(self.limits, state) or self._missing(state.motor_torque)
+        if fault is not None:
+            self.trip(fault)
 
     def allowed(self, wanted: float, age: float | None) -> float:
         """Return the torque to write now (N m). age: of the command, s; None when there is none."""
         limits = self.limits
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
             self.trip(Fault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
-        if self.fault is None:
+        if self.halted:
+            self.torque = 0.0
+        elif self.fault is None:
+            self._open(age)
             self.torque = self._within(0.0 if age is None else wanted)
         elif self.fault.cause == COMMAND_TIMEOUT:
             self.torque = math.copysign(max(0.0, abs(self.torque) - self._ramp), self.torque)
         else:
             self.torque = 0.0
+        self._written.append(self.torque)
         return self.torque
+
+    def _open(self, age: float | None) -> None:
+        """Let the largest torque grow while commands come; it begins anew when they have ceased."""
+        if age is None or age > self.limits.command_timeout:
+            self._room = 0.0
+        else:
+            self._room = min(self._room + self.limits.soft_start * self._period, self.limits.torque)
 
     def _within(self, wanted: float) -> float:
         step = self.limits.slew * self._period
-        torque = min(max(wanted, -self.limits.torque), self.limits.torque)
+        torque = min(max(wanted, -self._room), self._room)
         torque = min(max(torque, self.torque - step), self.torque + step)
         self.limited += torque != wanted
         return torque
+
+    def _missing(self, measured: float) -> Fault | None:
+        """Return a fault when the motor has not made the torque that was written for too long."""
+        if not self._written or self.fault is not None:
+            return None
+        low, high = min(self._written), max(self._written)
+        off = max(low - measured, measured - high)
+        self._missed = self._missed + 1 if off > self.limits.effort else 0
+        if self._missed * self._period <= self.limits.effort_time:
+            return None
+        return Fault("effort", off, self.limits.effort, "N m", "between commanded and measured torque")
 
 
 def check_limits(limits: Limits, motor_limit: float, stiffness: float) -> None:

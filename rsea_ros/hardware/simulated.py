@@ -23,7 +23,8 @@ class SimulatedDevice:
 
     The fixed step divides the period of `rate` (Hz). A torque written within a step acts from that instant
     on: the step gets the mean of what was held in it. A reading is the end of the last whole step.
-    clock: returns the time, ns since the epoch. duration: over which drifts come to their full size, s.
+    clock: returns the time, ns since the epoch, without a jump; by default the monotonic clock with the
+    system clock's time when the device is made. duration: over which drifts come to their full size, s.
     """
 
     def __init__(
@@ -34,11 +35,12 @@ class SimulatedDevice:
         seed: int = 0,
         noise: bool = True,
         duration: float = 60.0,
-        clock: Callable[[], int] = time.time_ns,
+        clock: Callable[[], int] | None = None,
     ) -> None:
-        self._rig, self._noise, self._clock = rig, noise, clock
+        self._rig, self._noise, self._clock = rig, noise, clock or _steady_clock()
         self._rng = np.random.default_rng(seed)
         self._per_second = rate * steps_per_sample(1.0 / rate)
+        self._duration = duration
         self._machine = build(rig, 1.0 / self._per_second, duration)
         self._values = np.zeros(len(OUTPUTS))
         self._start: int | None = None
@@ -47,7 +49,11 @@ class SimulatedDevice:
         run(self._machine, np.zeros(1), np.empty((1, len(OUTPUTS))))  # compiles while there is time
 
     def open(self) -> None:
-        """Start at rest, now."""
+        """Start at rest, now, also after a `close`."""
+        if self._steps:
+            self._machine = build(self._rig, 1.0 / self._per_second, self._duration)
+            self._values = np.zeros(len(OUTPUTS))
+        self._steps, self._torque, self._writes = 0, 0.0, []
         self._start = self._clock()
 
     def read(self) -> State:
@@ -127,3 +133,9 @@ class SimulatedDevice:
 
     def _measured(self, channel: str, value: FloatArray) -> float:
         return float(measure(self._rig, channel, value, self._rng) if self._noise else value)
+
+
+def _steady_clock() -> Callable[[], int]:
+    """Return a clock with the system clock's time that goes on evenly when that is set."""
+    epoch = time.time_ns() - time.monotonic_ns()
+    return lambda: epoch + time.monotonic_ns()

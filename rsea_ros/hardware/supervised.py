@@ -1,13 +1,17 @@
-"""The driver's end of the supervisor: start it, beat, end it in peace."""
+"""The driver's end of the supervisor: start it or connect to it, beat, end it in peace."""
 
 from __future__ import annotations
 
+import json
 import os
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Protocol
 
 from rsea_ros.errors import DeviceError
 
@@ -15,6 +19,8 @@ SURE = 0.8
 """Share of the time-out from which on the supervisor may have acted."""
 BEATS = 20
 """A time-out; a beat each cycle would wake the supervisor a thousand times a second."""
+ANSWER = 1.0
+"""s that a service may take to answer."""
 SCRIPT = Path(__file__).with_name("supervisor.py")
 
 
@@ -26,19 +32,99 @@ class HeldUp(DeviceError):
     """This process stood still with torque on for about as long as the supervisor bears."""
 
 
-class Supervisor:
-    """Sends `frames` on `descriptor` when this process ends, or does not beat for `timeout` s."""
+class _End(Protocol):
+    """Where beats go."""
 
-    def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes]) -> None:
-        self._timeout, self._last, self._told, self._armed = timeout, 0.0, 0.0, False
-        words = [str(descriptor), f"{timeout:g}", *(frame.hex() for frame in frames)]
+    def send(self, beat: bytes) -> None:
+        """Send a beat. Raises OSError when nobody is there."""
+
+    def alive(self) -> bool:
+        """Tell whether the supervisor runs."""
+
+    def close(self) -> None:
+        """End the connection."""
+
+
+class _Child:
+    """A process of this driver, in a session of its own: it survives every signal to the driver's group."""
+
+    def __init__(self, descriptor: int, timeout: float, frames: Sequence[str]) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-I", "-S", str(SCRIPT), *words], stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
-            start_new_session=True,
+            [sys.executable, "-I", "-S", str(SCRIPT), str(descriptor), f"{timeout:g}", *frames],
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            pass_fds=(descriptor,), start_new_session=True,
         )  # fmt: skip
         assert self._process.stdin is not None
-        self._beats = self._process.stdin.fileno()
+        self._stdin = self._process.stdin
+
+    def send(self, beat: bytes) -> None:
+        os.write(self._stdin.fileno(), beat)
+
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def close(self) -> None:
+        self._stdin.close()
+        self._process.wait()
+
+
+class _Service:
+    """A supervisor that runs apart from the driver, at a Unix socket: it survives the driver's group."""
+
+    def __init__(self, path: str, descriptor: int, timeout: float, frames: Sequence[str]) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.settimeout(ANSWER)
+        order = json.dumps({"timeout": timeout, "frames": list(frames)}).encode() + b"\n"
+        try:
+            self._socket.connect(path)
+            socket.send_fds(self._socket, [order], [descriptor])
+            answer = self._socket.recv(64)
+        except OSError as error:
+            answer = str(error).encode()
+        if answer != b"ready\n":
+            self._socket.close()
+            raise SupervisorLost(
+                f"parameter supervisor = {path!r}: {answer.decode() or 'no answer'}, expected a supervisor"
+                " that listens there (docs/hardware.md)"
+            )
+        self._socket.settimeout(0.0)
+
+    def send(self, beat: bytes) -> None:
+        self._socket.send(beat)
+
+    def alive(self) -> bool:
+        try:
+            return self._socket.recv(1, socket.MSG_PEEK) != b""
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+
+    def close(self) -> None:
+        """Wait until it has let the port go, which nobody else can open before."""
+        self._socket.settimeout(ANSWER)
+        with suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+            self._socket.recv(64)
+        self._socket.close()
+
+
+class Supervisor:
+    """Sends `frames` on `descriptor` when this process ends, or does not beat for `timeout` s.
+
+    service: path of the Unix socket of one that runs apart; empty: a child process.
+    """
+
+    def __init__(self, descriptor: int, timeout: float, frames: Sequence[bytes], service: str = "") -> None:
+        self._timeout, self._last, self._told, self._armed = timeout, 0.0, 0.0, False
+        words = [frame.hex() for frame in frames]
+        self._end: _End = (
+            _Service(service, descriptor, timeout, words) if service else _Child(descriptor, timeout, words)
+        )
+
+    def alive(self) -> bool:
+        """Tell whether it runs."""
+        return self._end.alive()
 
     def beat(self, armed: bool | None = None) -> None:
         """Say that this process lives, and whether torque is commanded (None: as before).
@@ -58,14 +144,13 @@ class Supervisor:
 
     def _tell(self) -> None:
         try:
-            os.write(self._beats, b"a" if self._armed else b"d")
+            self._end.send(b"a" if self._armed else b"d")
         except OSError as error:
             raise SupervisorLost(f"supervisor process: {error.strerror}, expected it to run") from None
 
     def close(self, *, safe: bool = True) -> None:
         """End it. safe: the motor has acknowledged zero torque; else the supervisor sends its frames."""
-        assert self._process.stdin is not None
-        if safe and self._process.poll() is None:
-            os.write(self._beats, b"q")
-        self._process.stdin.close()
-        self._process.wait()
+        if safe:
+            with suppress(OSError):
+                self._end.send(b"q")
+        self._end.close()

@@ -3,14 +3,21 @@
 Run as a file of its own with nothing but the standard library:
 supervisor.py DESCRIPTOR TIMEOUT_S FRAME_HEX… with the driver's beats on stdin: `a` torque is on, `d` it is
 off, `q` all is well, end. End of input without `q` is the death of the driver, by whatever signal.
+supervisor.py --listen SOCKET is the same as a service, which outlives whatever takes driver and children
+together (a control group, a container, a login): a driver connects to the Unix socket, sends a line
+{"timeout": S, "frames": [HEX, …]} with the descriptor of its port, and its beats.
 """
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import select
 import signal
+import socket
 import sys
+import threading
 import time
 
 REPEAT, SPACING = 20, 0.005
@@ -36,7 +43,10 @@ def watch(inlet: int, descriptor: int, timeout: float, frames: list[bytes]) -> N
             if armed:
                 send(descriptor, frames)
             continue
-        beats = os.read(inlet, 4096)
+        try:
+            beats = os.read(inlet, 4096)
+        except OSError:  # a connection that was reset
+            beats = b""
         if beats.endswith(b"q"):
             return
         if not beats:
@@ -46,8 +56,36 @@ def watch(inlet: int, descriptor: int, timeout: float, frames: list[bytes]) -> N
         armed = beats.endswith(b"a")
 
 
+def serve(connection: socket.socket) -> None:
+    """Watch one driver over its connection until it is gone."""
+    with connection:
+        line, (descriptor, *_), _, _ = socket.recv_fds(connection, 65536, 1)
+        order = json.loads(line)
+        connection.sendall(b"ready\n")
+        try:
+            frames = [bytes.fromhex(text) for text in order["frames"]]
+            watch(connection.fileno(), descriptor, float(order["timeout"]), frames)
+        finally:
+            os.close(descriptor)
+
+
+def listen(path: str) -> None:
+    """Serve every driver that connects to a Unix socket, each in a thread, until a signal ends it."""
+    with contextlib.suppress(FileNotFoundError):
+        os.unlink(path)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as place:
+        place.bind(path)
+        os.chmod(path, 0o660)
+        place.listen()
+        while True:
+            threading.Thread(target=serve, args=(place.accept()[0],), daemon=True).start()
+
+
 def main() -> None:
     """Watch the process at the other end of stdin; signals of the terminal are not meant for this one."""
+    if sys.argv[1:2] == ["--listen"]:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        return listen(sys.argv[2])
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     descriptor, timeout, *frames = sys.argv[1:]

@@ -58,6 +58,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     for record in records:
         check_usable(record)
     records = [bounded(record) for record in records]
+    _check_excited(records)
     cases = tuple(case_from(record, rig) for record in records)
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
@@ -92,6 +93,16 @@ def check_usable(record: Record) -> None:
                 f"{record.source}: {name} stamp {k} = {channel.t[k]:.6f} s after {channel.t[k - 1]:.6f} s, "
                 "expected rising stamps"
             )
+
+
+def _check_excited(records: Sequence[Record]) -> None:
+    """Raise IdentificationError where no record has a command that changes."""
+    commands = [record["command"].y for record in records if "command" in record]
+    if commands and all(len(y) == 0 or np.ptp(y) == 0.0 for y in commands):
+        held = f"{commands[0][0]:.4g} N m throughout" if len(commands[0]) else "empty"
+        raise IdentificationError(
+            f"{records[0].source}: torque_command is {held}, expected an excitation (chirp, multisine, noise)"
+        )
 
 
 def fit(

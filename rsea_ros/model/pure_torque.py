@@ -21,6 +21,7 @@ from rsea_ros.model.observer import ErrorModel, Estimate
 from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_filter import (
     CORNER,
+    FELL,
     HEARD,
     HIGH,
     LAST,
@@ -47,6 +48,13 @@ FALSE_ALARM = 1e-8
 
 STILL_THERE = 0.01
 """The same while there is torque: one that is heard is not lost at every crossing of zero."""
+
+DEAF = (math.inf, math.inf, 1.0)
+"""Noise in high and low, sigma, with which nothing is heard: until it is calibrated."""
+
+
+AGAIN = 1.0
+"""s by which a stamp may be before the last one and of the same run."""
 
 
 @dataclass(frozen=True)
@@ -100,12 +108,11 @@ class PureTorque:
         on, off = ((1.0 + sign * s.hysteresis) ** 4 / odds for sign in (-1.0, 1.0))
         surprise, faint = (float(chdtri(1, p)) for p in (FALSE_ALARM, STILL_THERE))
         values = max(1.0, 2.0 * corner * s.window)  # independent ones of the noise in a window
-        deaf = (math.inf, math.inf, 1.0)  # until it is calibrated
         self._limits = np.array(
-            [corner, s.window, *deaf, surprise, faint, s.quiet, on, off, values, s.hold_on, s.hold_off]
+            [corner, s.window, *DEAF, surprise, faint, s.quiet, on, off, values, s.hold_on, s.hold_off]
         )
         self._memory = np.zeros(MEMORY)
-        self._memory[[HEARD, SINCE, LAST]] = -math.inf
+        self._memory[[HEARD, SINCE, LAST, FELL]] = -math.inf
         self._pair, self._period = empty_pair(), math.nan
 
     @property
@@ -114,16 +121,25 @@ class PureTorque:
         return VERDICTS[int(self._memory[VERDICT])]
 
     def calibrate(self, error: ErrorModel, dt: float) -> None:
-        """Take in what the sensors' noise makes of the estimates at a sample period of dt s."""
+        """Take in what the sensors' noise makes of the estimates at a sample period of dt s.
+
+        Noise that is no finite number, such as of an observer that does not settle, makes the flag deaf.
+        """
         corner = self._limits[CORNER]
         floor = np.array([0.0, error.sigma**2])
         if corner * dt < SEEN:
-            floor = split(error.a, error.k, error.c, error.r, corner, dt)
-        self._limits[[NOISE_HIGH, NOISE_LOW, SIGMA]] = *floor, error.sigma
+            with np.errstate(over="ignore", invalid="ignore"):
+                floor = split(error.a, error.k, error.c, error.r, corner, dt)
+        heard = (*floor, error.sigma)
+        self._limits[[NOISE_HIGH, NOISE_LOW, SIGMA]] = heard if np.isfinite(heard).all() else DEAF
         self._period = dt
 
     def take(self, t: float, estimate: Estimate) -> Verdict:
-        """Take in an estimate and return the verdict."""
+        """Take in an estimate and return the verdict. A stamp far before the last is of another run."""
+        if self._memory[LAST] - t > AGAIN:
+            self._memory[:] = 0.0
+            self._memory[[HEARD, SINCE, LAST, FELL]] = -math.inf
+            self._pair = empty_pair()
         judge(self._pair, self._limits, self._memory, t, estimate.distal, estimate.sigma_distal)
         return self.verdict
 

@@ -74,8 +74,13 @@ CORNER, WINDOW, NOISE_HIGH, NOISE_LOW, SIGMA, SURPRISE, FAINT = range(7)
 QUIET, ON, OFF, VALUES, HOLD_ON, HOLD_OFF = range(7, 13)
 """In `limits`. Corner: Hz. Noise: N^2 m^2, while the sigma of the torque is so, N m. Surprise, faint: times
 the noise that are a torque, one that begins and one that goes on. On, off: ratios of powers. Times: s."""
-VERDICT, HEARD, SINCE, LAST, HIGH, LOW, MEMORY = range(7)
-"""In `memory`: verdict, when torque was heard last, since when the powers agree with the verdict, powers."""
+VERDICT, HEARD, SINCE, LAST, HIGH, LOW, FELL, FALLS, MEMORY = range(9)
+"""In `memory`: verdict, when torque was heard last, since when the powers agree with the verdict, powers;
+when the flag fell last, and how often just now."""
+
+FLUTTER, CALM = 2, 0.5
+"""Falls, each within so many s of the one before, after which the flag rises only when it could for that
+time: a slow torque beside a fast one crosses zero twice a period, and is beyond the edge for a moment."""
 
 DECIDED = 3.0
 """Sigmas by which the powers must tell on which side of the edge the torque is."""
@@ -87,6 +92,9 @@ def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-de
     if t <= memory[LAST]:
         return
     memory[LAST] = t
+    if not (math.isfinite(torque) and math.isfinite(sigma)):
+        memory[VERDICT], memory[SINCE] = NOTHING, t
+        return
     high, low = powers(pair, limits[CORNER], limits[WINDOW], t, torque)
     memory[HIGH], memory[LOW] = high, low
     excess = max(1.0, (sigma / limits[SIGMA]) ** 2)
@@ -98,10 +106,15 @@ def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-de
         memory[VERDICT], memory[SINCE] = NOTHING, t
         return
     wanted = _wanted(limits, memory[VERDICT], high - noise_high, low - noise_low, noise_high, noise_low)
-    hold = limits[HOLD_ON] if wanted == PURE else limits[HOLD_OFF]
+    hold = limits[HOLD_OFF]
+    if wanted == PURE:
+        hold = max(limits[HOLD_ON], CALM) if memory[FALLS] >= FLUTTER else limits[HOLD_ON]
     if wanted == memory[VERDICT]:
         memory[SINCE] = t
     elif t - memory[SINCE] >= hold:
+        if wanted == BEYOND and memory[VERDICT] == PURE:
+            memory[FALLS] = memory[FALLS] + 1.0 if t - memory[FELL] < CALM else 1.0
+            memory[FELL] = t
         memory[VERDICT], memory[SINCE] = wanted, t
 
 

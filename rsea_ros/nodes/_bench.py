@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from typing import Any
 
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
@@ -11,11 +13,23 @@ from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, WrenchStamped, joint_state_message, wrench_message
 from msg_adapters.topics import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
-from rsea_ros.nodes._commands import CommandQueue
+from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes._commands import HORIZON, CommandQueue
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.nodes._mailbox import Mailbox
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from rsea_ros.nodes._parameters import JOINT, Parameter
+from rsea_ros.nodes._publishers import Obeyed
+from rsea_ros.nodes._qos import COMMAND, MEASURED, OVERRIDES
+
+NAMES = (
+    JOINT,
+    Parameter("frame", "", "frame_id of joint_states"),
+    Parameter("ft_frame", "ft_sensor", "frame_id of ft"),
+)
+"""Parameters of every bench."""
+MOST = 100
+"""Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
 
 
 class Bench:
@@ -24,47 +38,78 @@ class Bench:
     Messages are serialised ones with the numbers put in: to make them of Python objects takes 60 us a cycle.
     """
 
-    def __init__(self, node: Node, *, strict: bool = False, every_record: bool = False) -> None:
-        """strict: see CommandQueue. every_record: ft gets all that came since the last reading, not one."""
-        self._node, self._every_record = node, every_record
-        self.commands = CommandQueue(strict=strict)
-        self._told = (0, 0, 0)
-        self._states = node.create_publisher(JointState, "joint_states", MEASUREMENT)
-        self._ft = node.create_publisher(WrenchStamped, "ft", MEASUREMENT)
+    def __init__(
+        self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False
+    ) -> None:
+        """names: values of NAMES. strict: see CommandQueue; then one publisher is obeyed at a time.
+
+        every_record: ft gets all that came since the last reading, not one.
+        """
+        self._node, self._every_record, self._strict = node, every_record, strict
+        self.commands, self._obeyed = CommandQueue(strict=strict), Obeyed()
+        self._told: Mapping[str, int] = {}
+        self._polled = 0
+        self._states = _publisher(node, JointState, "joint_states")
+        self._ft = _publisher(node, WrenchStamped, "ft")
+        joint, frame, ft_frame = (names[p.name] for p in NAMES)
         self._state_writer = RawWriter(
-            serialize_message(joint_state_message(0, 0.0, 0.0, 0.0)), TYPES["joint_states"],
+            serialize_message(joint_state_message(0, 0.0, 0.0, 0.0, joint, frame)), TYPES["joint_states"],
             "position", "velocity", "effort",
         )  # fmt: skip
-        wrench = serialize_message(wrench_message(0, (0.0,) * 6))
+        wrench = serialize_message(wrench_message(0, (0.0,) * 6, frame=ft_frame))
         self._ft_writer = RawWriter(wrench, TYPES["ft"], "wrench")
         self._wanted = Mailbox(
-            node, JOINT_STATE, "torque_command", COMMAND, self.commands.refuse, ("effort", 0)
-        )
+            node, JOINT_STATE, "torque_command", COMMAND, self.commands.refuse, ("effort", 0), joint=joint,
+            admit=self._admit if strict else None,
+        )  # fmt: skip
 
-    def poll(self) -> None:
-        """Put all commands that have arrived into the queue."""
-        for stamp, (torque,), received in self._wanted.take():
-            self.commands.add(stamp, torque, received)
+    def poll(self, anchor: Anchor) -> None:
+        """Put all commands that have arrived into the queue; of a flood no more than a cycle has time for."""
+        now = anchor.now()
+        for stamp, (torque,), received in self._wanted.take(*((MOST,) if self._strict else ())):
+            arrival = anchor.arrived(received, self._polled)
+            if self._strict and now - arrival > HORIZON:
+                self.commands.refuse()
+            else:
+                self.commands.add(stamp, torque, arrival)
+        self._polled = now
 
-    def publish(self, state: State) -> None:
-        """Publish one reading under its stamps."""
+    def publish(self, state: State, shift: int = 0) -> None:
+        """Publish one reading under its stamps, moved by so many ns."""
         numbers = (state.position, state.velocity, state.motor_torque)
-        self._states.publish(self._state_writer.write(state.stamp, numbers))
+        self._states.publish(self._state_writer.write(state.stamp + shift, numbers))
         if self._every_record:
             for stamp, wrench in state.wrenches:
-                self._ft.publish(self._ft_writer.write(stamp, wrench))
+                self._ft.publish(self._ft_writer.write(stamp + shift, wrench))
         elif state.wrench is not None:
-            self._ft.publish(self._ft_writer.write(state.ft_stamp, state.wrench))
+            self._ft.publish(self._ft_writer.write(state.ft_stamp + shift, state.wrench))
 
-    def report(self, cycle: Cycle) -> Report:
-        """Return the health of a bench that runs in a cycle; warnings are of what is new since the last."""
+    def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
+        """Return the health of a bench that runs in a cycle; warnings are of what is new since the last.
+
+        more: counts besides, by what they count in words.
+        """
         timing, commands = cycle.timing(), self.commands
-        counts = (timing.missed, commands.late, commands.refused)
-        new = [now - before for now, before in zip(counts, self._told, strict=True)]
-        self._told = counts
-        kinds = ("cycles missed", "commands late", "commands refused")
-        troubles = [f"{count} {kind}" for count, kind in zip(new, kinds, strict=True) if count]
-        values = {**timing.values(), "lost_cycles": cycle.left_out, **commands.values(time.time_ns())}
+        counts = {
+            "cycles missed": timing.missed,
+            "commands late": commands.late,
+            "commands with a stamp that is off": commands.off,
+            "commands refused": commands.refused - (commands.off if self._strict else 0),
+            "commands of a second publisher ignored": self._obeyed.ignored,
+            "steps of the system clock": cycle.anchor.steps,
+            **(more or {}),
+        }
+        new = {kind: count - self._told.get(kind, 0) for kind, count in counts.items()}
+        self._told = {**self._told, **counts}
+        troubles = [f"{count} {kind}" for kind, count in new.items() if count > 0]
+        values = {
+            **timing.values(),
+            "lost_cycles": cycle.left_out,
+            **commands.values(cycle.anchor.now()),
+            "ignored_commands": self._obeyed.ignored,
+            "furthest_stamp_s": f"{commands.furthest:+.3f}",
+            **cycle.anchor.values(),
+        }
         return Report(WARN if troubles else OK, ", ".join(troubles) or "running", values)
 
     def close(self) -> None:
@@ -72,3 +117,10 @@ class Bench:
         for publisher in (self._states, self._ft):
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._wanted.subscription)
+
+    def _admit(self, who: object) -> bool:
+        return self._obeyed.admit(who, time.monotonic_ns())
+
+
+def _publisher(node: Node, kind: Any, topic: str) -> Any:
+    return node.create_publisher(kind, topic, MEASURED, qos_overriding_options=OVERRIDES)

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import math
 import threading
+from typing import NamedTuple
 
-MILLISECOND = 1_000_000
+from rsea_ros.nodes._anchor import SECOND
+
+MILLISECOND = SECOND // 1000
 HORIZON = 300 * MILLISECOND
 WATCHDOG = 50 * MILLISECOND
 
 
-class CommandQueue:
-    """What came on `torque_command`, until it is due. The executor's thread adds, the cycle's takes.
+class Waiting(NamedTuple):
+    """A command until it is due: when it takes effect and when it came, ns; torque N m."""
 
+    when: int
+    torque: float
+    arrival: int
+
+
+class CommandQueue:
+    """What came on `torque_command`, until it is due. One thread adds, another may take.
+
+    Instants are ns on a clock that never jumps, and that has the system clock's time (Anchor).
     A command takes effect at its stamp. One whose stamp is over takes effect at once (`late` counts them);
-    one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`). Not-a-number is
+    one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`, of these `off` by
+    their stamp). What takes effect at once overtakes what came before it and waits. Not-a-number is
     dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
     is none, and the last torque stays in force: to end it is the work of the machine's limits.
@@ -23,17 +36,22 @@ class CommandQueue:
     def __init__(self, *, strict: bool = False) -> None:
         self._strict = strict
         self._lock = threading.Lock()
-        self._waiting: list[tuple[int, float]] = []
-        self._taken_until = 0
+        self._waiting: list[Waiting] = []
+        self._taken_until = self._from = 0
         self._newest: int | None = None
-        self.torque = 0.0
-        self.late = self.unstamped = self.refused = self.expired = 0
+        self.torque, self.furthest = 0.0, 0.0
+        self.late = self.unstamped = self.off = self.refused = self.expired = self.dropped = 0
 
     def add(self, stamp: int, torque: float, now: int) -> None:
         """Put in a command (N m) with its stamp; now: when it arrived, ns."""
         with self._lock:
-            strange = self._strict and stamp != 0 and abs(stamp - now) > HORIZON
-            if not math.isfinite(torque) or strange:
+            if now < self._from:
+                self.dropped += 1
+                return
+            strange = stamp != 0 and abs(stamp - now) > HORIZON
+            if strange:
+                self.off, self.furthest = self.off + 1, (stamp - now) / SECOND
+            if not math.isfinite(torque) or (self._strict and strange):
                 self.refuse()
                 return
             if abs(stamp - now) > HORIZON:
@@ -41,8 +59,10 @@ class CommandQueue:
                 stamp = now
             elif stamp < self._taken_until:
                 self.late += 1
-            self._waiting.append((max(stamp, self._taken_until), torque))
-            self._waiting.sort(key=lambda waiting: waiting[0])  # of one instant, the last that came counts
+            if stamp <= now:
+                self._waiting = [w for w in self._waiting if w.when <= now]
+            self._waiting.append(Waiting(max(stamp, self._taken_until), torque, now))
+            self._waiting.sort(key=lambda waiting: waiting.when)  # of one instant, the last that came counts
 
     def refuse(self) -> None:
         """Count a command that is none."""
@@ -51,11 +71,12 @@ class CommandQueue:
     def take(self, until: int) -> list[tuple[int, float]]:
         """Return the changes of torque up to an instant (ns), in order: (when, N m)."""
         with self._lock:
-            changes = [w for w in self._waiting if w[0] <= until]
-            self._waiting = self._waiting[len(changes) :]
+            due = [w for w in self._waiting if w.when <= until]
+            changes = [(w.when, w.torque) for w in due]
+            self._waiting = self._waiting[len(due) :]
             self._taken_until = until
-            if changes:
-                self._newest, self.torque = changes[-1]
+            if due:
+                self.torque, self._newest = due[-1].torque, max(due[-1].when, due[-1].arrival)
             elif not self._strict and self._newest is not None and until - self._newest > WATCHDOG:
                 self.expired += self.torque != 0.0
                 changes = [(until, 0.0)] if self.torque != 0.0 else []
@@ -63,13 +84,24 @@ class CommandQueue:
             return changes
 
     def age(self, now: int) -> float | None:
-        """Return how long the command in force has been so, s; None when there is none."""
-        return None if self._newest is None else (now - self._newest) / (1000 * MILLISECOND)
+        """Return how long the command in force has been so, s; None when there is none.
 
-    def clear(self) -> None:
-        """Forget all commands; the torque is zero."""
+        It counts from its arrival, or from its stamp where it came ahead of that.
+        """
+        return None if self._newest is None else (now - self._newest) / SECOND
+
+    def shift(self, by: int) -> None:
+        """Move all instants by so many ns: the clock that they belong to was anchored anew."""
+        with self._lock:
+            self._waiting = [w._replace(when=w.when + by, arrival=w.arrival + by) for w in self._waiting]
+            self._taken_until, self._from = self._taken_until + by, self._from + by
+            self._newest = None if self._newest is None else self._newest + by
+
+    def clear(self, since: int = 0) -> None:
+        """Forget all commands; the torque is zero. since: what came before, ns, is dropped also later."""
         with self._lock:
             self._waiting, self._newest, self.torque = [], None, 0.0
+            self._from = max(self._from, since)
 
     def values(self, now: int) -> dict[str, object]:
         """Return it as diagnostics show it."""
@@ -79,5 +111,6 @@ class CommandQueue:
             "late_commands": self.late,
             "unstamped_commands": self.unstamped,
             "refused_commands": self.refused,
+            "dropped_commands": self.dropped,
             "watchdog_trips": self.expired,
         }

@@ -11,7 +11,7 @@ from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.synthesis import Demand, Design, check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._parameters import AXIS, Parameter
+from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
 from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
@@ -33,10 +33,16 @@ TABLE = (
     Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
     Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
     Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
-    Parameter("slew_limit", 40_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
+    Parameter("slew_limit", 10_000.0, "largest change of torque in a second", "N m/s", 1.0, 1e6),
     Parameter("ramp", 0.25, "in which the limit grows after a start", "s", 0.0, 10.0),
     Parameter("stale", 0.05, "time without a measurement that ends the torque", "s", 0.005, 1.0),
     Parameter("release", 0.02, "from there to zero torque", "s", 0.0, 1.0),
+    Parameter("error_limit", 15.0, "of the torque against the desired one, for error_time", "N m", 0.1, 1e3),
+    Parameter("error_time", 0.5, "for which the error may be larger", "s", 0.0, 60.0),
+    Parameter("ft_limit", 110.0, "largest torque that ft may measure", "N m", 0.1, 1e3),
+    Parameter("late_share", 0.5, "of the commands of late_time that may be late", "", 0.01, 1.0),
+    Parameter("late_time", 1.0, "over which late commands are counted", "s", 0.05, 60.0),
+    JOINT,
     REALTIME,
 )
 

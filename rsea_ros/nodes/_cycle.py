@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import fmean
 
+from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._realtime import exact_timers
 
-SECOND = 1_000_000_000
+__all__ = ["SECOND", "Cycle", "Timing", "wait_until"]
+
 LONGEST_CATCH_UP = SECOND
 
 
@@ -40,11 +42,15 @@ class Cycle:
     A cycle is missed when the next one was due before it began. catch_up: missed cycles are worked off late,
     each with its own stamp (no more than a second of them); else they are left out.
     `left_out` counts those that never run.
-    The system clock is read once: stamps are even whatever is done to the clock later.
+    anchor: what makes stamps out of deadlines. Without one that the work lets follow, the system clock is
+    read once, at the start: stamps are even whatever is done to it later.
     """
 
-    def __init__(self, rate: float, work: Callable[[int], None], *, catch_up: bool) -> None:
+    def __init__(
+        self, rate: float, work: Callable[[int], None], *, catch_up: bool, anchor: Anchor | None = None
+    ) -> None:
         self._rate, self._work, self._catch_up = rate, work, catch_up
+        self._given, self.anchor = anchor, anchor or Anchor()
         self._stop, self._over = threading.Event(), threading.Event()
         self.thread = threading.Thread(target=self._run, daemon=True)
         self._began: list[int] = []
@@ -53,8 +59,9 @@ class Cycle:
 
     def start(self, first: int | None = None) -> None:
         """Begin with the cycle of stamp `first`, by default one period from now."""
-        self._offset = time.time_ns() - time.monotonic_ns()
-        self._first = time.time_ns() + self._instant(1) if first is None else first
+        self.anchor = self._given or Anchor()
+        begin = time.monotonic_ns()
+        self._first = begin + self._instant(1) if first is None else first - self.anchor.offset
         self.thread.start()
 
     def stop(self) -> None:
@@ -89,13 +96,13 @@ class Cycle:
         exact_timers()
         try:
             while not self._stop.is_set():
-                due = self._first + self._instant(k) - self._offset
+                due = self._first + self._instant(k)
                 wait_until(due)
                 now = time.monotonic_ns()
                 self._began.append(now)
                 late = int((now - due) * self._rate / SECOND)
                 self._missed += late > 0
-                self._work(due + self._offset)
+                self._work(due + self.anchor.offset)
                 self._over.set()
                 allowed = int(LONGEST_CATCH_UP * self._rate / SECOND) if self._catch_up else 0
                 skipped = late if late > allowed else 0

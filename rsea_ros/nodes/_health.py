@@ -6,12 +6,17 @@ import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, diagnostics_message
 from rsea_ros.nodes._qos import COMMAND
 
-__all__ = ["ERROR", "OK", "WARN", "Health", "Report"]
+__all__ = ["ERROR", "OK", "STEADY", "WARN", "Health", "Report"]
+
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+"""Of timers: rclpy's own stand still for as long as the system clock is set back."""
 
 
 class Report(NamedTuple):
@@ -23,14 +28,20 @@ class Report(NamedTuple):
 
 
 class Health:
-    """Publish what `assess` returns."""
+    """Publish what `assess` returns. hardware: what it is about."""
 
-    def __init__(self, node: Node, assess: Callable[[], Report]) -> None:
-        self._name, self._assess = node.get_fully_qualified_name(), assess
+    def __init__(self, node: Node, assess: Callable[[], Report], hardware: str = "") -> None:
+        self._node, self._assess, self.hardware = node, assess, hardware
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", COMMAND)
-        node.create_timer(1.0, self.publish)
+        node.create_timer(1.0, self.publish, clock=STEADY)
 
     def publish(self) -> None:
-        """Publish now."""
-        report = self._assess()
-        self._publisher.publish(diagnostics_message(time.time_ns(), self._name, *report))
+        """Publish now. An assessment that fails is an error of its own, and ends no node."""
+        name = self._node.get_fully_qualified_name()
+        try:
+            report = self._assess()
+        except Exception as error:
+            text = f"no assessment: {type(error).__name__}: {error}"
+            self._node.get_logger().error(text, throttle_duration_sec=10.0)
+            report = Report(ERROR, text, {})
+        self._publisher.publish(diagnostics_message(time.time_ns(), name, *report, self.hardware))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from rclpy.qos import QoSProfile
 from msg_adapters.raw import RawReader
 from msg_adapters.ros import message_type
 from rsea_ros.errors import ParameterError
+from rsea_ros.nodes._qos import OVERRIDES
 
 
 class Polled(CallbackGroup):
@@ -30,24 +32,39 @@ class Polled(CallbackGroup):
 
 
 class Mailbox:
-    """A subscription that is asked. refuse: hears of each message that cannot be read."""
+    """A subscription that is asked. refuse: hears of each message that cannot be read.
+
+    admit: tells of a publisher's identity whether its messages count; None: all.
+    """
 
     def __init__(
         self, node: Node, msgtype: str, topic: str, qos: QoSProfile, refuse: Callable[[], None],
-        *fields: tuple[str, int],
+        *fields: tuple[str, int], joint: str = "", admit: Callable[[object], bool] | None = None,
     ) -> None:  # fmt: skip
-        """fields: name and index of each number; one that a message does not have is nan."""
-        self._node, self._topic, self._refuse = node, topic, refuse
-        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields)
-        self.subscription: Any = node.create_subscription(
-            self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True
-        )
+        """fields: name and index of each number; one that a message does not have is nan.
 
-    def take(self) -> Iterator[tuple[int, Sequence[float], int]]:
-        """Yield stamp (ns), numbers and instant of arrival (ns) of each message that waits."""
+        joint: name that a message with names must have; empty: any.
+        """
+        self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
+        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields, joint)
+        self.subscription: Any = node.create_subscription(
+            self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True,
+            qos_overriding_options=OVERRIDES,
+        )  # fmt: skip
+
+    def take(self, most: int = sys.maxsize) -> Iterator[tuple[int, Sequence[float], int]]:
+        """Yield stamp (ns), numbers and instant of arrival (ns) of each message that waits.
+
+        most: what is taken at once; of more the middleware keeps the newest.
+        """
         handle = self.subscription.handle
         with handle:
-            while (message := handle.take_message(self._kind, True)) is not None:
+            for _ in range(most):
+                message = handle.take_message(self._kind, True)
+                if message is None:
+                    return
+                if self._admit is not None and not self._admit(message[1]["publisher_gid"]["data"]):
+                    continue
                 try:
                     stamp, numbers = self._reader.read(message[0])
                 except ParameterError as error:

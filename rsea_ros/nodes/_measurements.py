@@ -10,12 +10,16 @@ from rclpy.node import Node
 
 from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.controller import Reading
+from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._mailbox import Mailbox
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
 WAITING = 500
 """Measurements that wait for their other half."""
+
+MOST = 100
+"""Desired torques that are taken at once."""
 
 
 class Measurements:
@@ -24,18 +28,20 @@ class Measurements:
     unusable: readings that were not finite, and messages of several joints.
     """
 
-    def __init__(self, node: Node, axis: str, period: float) -> None:
+    def __init__(self, node: Node, axis: str, period: float, joint: str = "") -> None:
         self._period = period
         self._sign, along = sign_and_index(axis)
         self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
         self._waiting_fts: deque[tuple[int, float]] = deque(maxlen=WAITING)
         self.desired = CommandQueue()
-        self.unusable = 0
+        self.unusable = self._heard = 0
         state = (("position", 0), ("velocity", 0), ("effort", 0))
-        self._states = Mailbox(node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state)
+        self._states = Mailbox(
+            node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state, joint=joint
+        )
         self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, ("wrench", along))
         self._desired = Mailbox(
-            node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0)
+            node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0), joint=joint
         )
         self.subscriptions = [self._states.subscription, self._fts.subscription]
 
@@ -59,10 +65,12 @@ class Measurements:
             else:
                 self._refuse()
 
-    def hear_desired(self) -> None:
+    def hear_desired(self, anchor: Anchor) -> None:
         """Put all desired torques that have arrived into their queue."""
-        for stamp, (torque,), received in self._desired.take():
-            self.desired.add(stamp, torque, received)
+        now = anchor.now()
+        for stamp, (torque,), received in self._desired.take(MOST):
+            self.desired.add(stamp, torque, anchor.arrived(received, self._heard))
+        self._heard = now
 
     def _refuse(self) -> None:
         self.unusable += 1

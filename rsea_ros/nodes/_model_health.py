@@ -49,7 +49,9 @@ class ModelHealth:
                 WARN, "no measurement yet, expected joint_states and ft", {"bandwidth_hz": self._edge()}
             )
         tests = self._observer.consistency()
-        troubles = [*self._silence(), *(_told(name, test) for name, test in tests.items() if test.broken)]
+        stopped = [f"{topic} repeats one value: the sensor has stopped" for topic in self._inputs.frozen]
+        doubts = (_told(name, test) for name, test in tests.items() if test.broken)
+        troubles = [*stopped, *self._silence(), *doubts]
         summary = "; ".join(troubles) or self._error.verdict
         return Report(WARN if troubles else OK, summary, {**self._band(), **self._doubt(), **_tested(tests)})
 

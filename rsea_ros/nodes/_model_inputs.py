@@ -14,10 +14,14 @@ from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.model.observer import Estimate, Observer
 from rsea_ros.nodes._commands import HORIZON
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._frozen import Frozen
 from rsea_ros.nodes._mailbox import Mailbox
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, RECORD_RELIABLE
 
 PERIODS = 64
+MOVED, LEAST = 12.0, 0.1
+"""Standard deviations of ft, and N m, by which it must move while joint_states stand still, to tell that they
+have stopped: more than noise does in a second, less than what matters."""
 
 _STATE, _FT = range(2)
 
@@ -25,7 +29,11 @@ _STATE, _FT = range(2)
 class Inputs:
     """Feeds the observer. Stamps are ns; the observer's seconds count from the first one."""
 
-    def __init__(self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool) -> None:
+    def __init__(
+        self, node: Node, observer: Observer, ft_timeout: float, axis: str, reliable: bool, *,
+        joint: str = "", ft_noise: float = 0.0,
+    ) -> None:  # fmt: skip
+        """ft_noise: standard deviation, N m. joint: name that the joint must have."""
         self._observer = observer
         self._sign, along = sign_and_index(axis)
         self._timeout = round(ft_timeout * SECOND)
@@ -33,9 +41,12 @@ class Inputs:
         self._state_stamp = self._ft_stamp = self._told = 0
         self._periods: deque[float] = deque(maxlen=PERIODS)
         self.refused = self.unstamped = 0
+        self._still, self._numb = Frozen(max(MOVED * ft_noise, LEAST)), Frozen()
         deep = RECORD_RELIABLE if reliable else None
         self._commands, self._states, self.ft = (
-            Mailbox(node, kind, topic, deep or usual, self._refuse, *fields)
+            Mailbox(
+                node, kind, topic, deep or usual, self._refuse, *fields, joint="" if topic == "ft" else joint
+            )
             for kind, topic, usual, *fields in (
                 (JOINT_STATE, "torque_command", COMMAND, ("effort", 0)),
                 (JOINT_STATE, "joint_states", MEASUREMENT, ("position", 0), ("effort", 0)),
@@ -52,7 +63,7 @@ class Inputs:
         samples.sort(key=itemgetter(0, 3))
         for stamp, a, b, kind in samples:
             estimate = self._measured(stamp, a, b, kind)
-            if estimate is not None and (kind == _FT or self.ft_silent):
+            if estimate is not None and (kind == _FT or self.ft_silent or self._numb.frozen):
                 self._note_period(stamp)
                 yield stamp, estimate
 
@@ -77,13 +88,25 @@ class Inputs:
         """Median time between estimates, s; nan before there are enough."""
         return median(self._periods) if len(self._periods) == PERIODS else math.nan
 
+    @property
+    def frozen(self) -> list[str]:
+        """Topics that repeat a value where it should change."""
+        topics = (("joint_states", self._still), ("ft", self._numb))
+        return [topic for topic, sensor in topics if sensor.frozen]
+
     def _measured(self, stamp: int, a: float, b: float, kind: int) -> Estimate | None:
+        """Give a sample to the observer, unless its sensor has stopped."""
         if kind == _FT:
             self._ft_stamp = stamp
+            self._still.beside(a)
+            if self._numb.take(stamp, (a,)):
+                return None
             return self._observer.ft(self.seconds(stamp), a)
         if not self._ft_stamp or stamp < self._ft_stamp - SECOND:
             self._ft_stamp = stamp
         self._state_stamp = stamp
+        if self._still.take(stamp, (a, b)):
+            return None
         return self._observer.state(self.seconds(stamp), a, b)
 
     def _note_period(self, stamp: int) -> None:

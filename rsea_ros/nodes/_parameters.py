@@ -64,6 +64,8 @@ AXIS = Parameter(
     "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
 )
 """Of every node that listens to ft."""
+JOINT = Parameter("joint", "joint", "name of the joint in commands and states; another one is refused")
+"""Of every node that commands or measures it."""
 
 
 def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:

@@ -7,15 +7,21 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 
 COMMAND = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
+MEASURED = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
 MEASUREMENT = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Of who publishes measurements, heard by any subscription (REP 2003); of who listens for the newest."""
 LATCHED = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 RECORD = QoSProfile(depth=5000, reliability=ReliabilityPolicy.BEST_EFFORT)
 RECORD_RELIABLE = QoSProfile(depth=5000, reliability=ReliabilityPolicy.RELIABLE)
 """RECORD matches every publisher; RECORD_RELIABLE only reliable ones, and then nothing is lost."""
+
+OVERRIDES = QoSOverridingOptions.with_default_policies()
+"""Depth, history and reliability by parameter: qos_overrides./rsea/ft.publisher.reliability and so on."""
 
 ARRIVAL = Duration(seconds=1)
 """Usual are 5 to 11 ms; a subscriber that hangs is waited for so long."""

@@ -15,9 +15,12 @@ from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
 from msg_adapters.topics import TYPES
 from rsea_ros.control.controller import Reading
+from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._grid import Grid
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
+from rsea_ros.nodes._judge import Judge
 from rsea_ros.nodes._measurements import Measurements
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
@@ -28,8 +31,6 @@ WATCH = 0.005
 """s between two looks at the age of the last measurement."""
 
 CLOSING_ZEROS = 3
-LATEST = 1.0
-"""Samples by which a command may come late and still be feedback: what the least delay margin is made for."""
 
 
 class Controller:
@@ -40,18 +41,20 @@ class Controller:
         self._design = design_of(values)
         self._controller = controller_of(values, self._design)
         self._period = SECOND / values["rate"]
-        self._inputs = Measurements(node, values["axis"], self._period)
+        self._inputs = Measurements(node, values["axis"], self._period, values["joint"])
         self._desired = self._inputs.desired
+        self._anchor, self._grid = Anchor(), Grid(self._period)
+        self._judge = Judge(values)
         self._last, self._heard, self._watched, self._torque = 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
-        self._steps = self._missed = self._limited = self._late = self._told = 0
+        self._steps = self._missed = self._limited = self._late = self._told = self._restarts = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
-        template = serialize_message(torque_command_message(0, 0.0))
+        template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
         self._writer = RawWriter(template, TYPES["torque_command"], "effort")
         self._lock = threading.Lock()
         node.create_service(Trigger, "~/clear_fault", self._clear)
-        self._health = Health(node, self._report)
+        self._health = Health(node, self._report, values["rig"])
         for line in summary(self._design):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
@@ -60,27 +63,55 @@ class Controller:
     def _work(self) -> None:
         """Command for each measurement that came, and see to their absence."""
         with self._lock:
-            for stamp, reading in self._inputs.take():
-                if stamp > self._last and not self._fault:
-                    self._command(stamp, reading)
+            self._anchor.follow()
+            arrived = list(self._inputs.take())
+            for k, (stamp, reading) in enumerate(arrived):
+                if not self._fault:
+                    self._measured(stamp, reading, len(arrived) if k == len(arrived) - 1 else 0)
             if time.monotonic_ns() - self._watched > WATCH * SECOND:
                 self._watched = time.monotonic_ns()
                 self._watch()
 
-    def _command(self, stamp: int, reading: Reading) -> None:
-        missed = round((stamp - self._last) / self._period) - 1 if self._last else 0
-        self._inputs.hear_desired()
+    def _measured(self, stamp: int, reading: Reading, together: int) -> None:
+        """Command for a measurement, one for each period of the grid that they lie on.
+
+        together: how many came at once, for the newest of them; 0 for the others, which it replaces.
+        """
+        self._heard = time.monotonic_ns()
+        if self._grid.jumps(stamp):
+            self._begin_again(stamp)
+        periods = self._grid.place(stamp)
+        if periods and (missed := periods - 1) > self._values["stale"] * self._values["rate"]:
+            self._last = 0  # the model would be led through a pause that nobody has seen
+        if periods:
+            self._command(stamp, reading, missed if self._last else 0, together)
+
+    def _begin_again(self, stamp: int) -> None:
+        """Follow stamps that have jumped: the clock of the bench was set."""
+        self._desired.shift(stamp - self._last)
+        self._grid.forget()
+        self._last, self._restarts = 0, self._restarts + 1
+
+    def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
+        self._inputs.hear_desired(self._anchor)
         self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
-        if not self._last:
+        if not self._last or self._judge.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
-        late = time.time_ns() - stamp > (1.0 + LATEST) * self._period
-        self._torque = self._controller.step(reading, self._desired.torque, missed, late=late)
+        late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
+        trust = self._judge.lateness.take(max(late, missed), max(together, int(missed > 0)))
+        torque = self._controller.step(reading, self._desired.torque, missed, trust=trust)
+        if fault := self._judge.fault(reading.ft, self._desired.torque):
+            return self._latch(fault)
+        self._torque = torque
         self._publish(stamp + round(self._period))
-        self._last, self._heard = stamp, time.monotonic_ns()
+        self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
         self._limited += self._controller.share.limited
-        self._late += late
+        self._late += late > self._judge.lateness.tolerance.late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
+
+    def _latch(self, fault: str) -> None:
+        self._fault, self._release = fault, (time.monotonic_ns(), self._torque)
 
     def _watch(self) -> None:
         """Latch a fault when measurements cease, and take the torque to zero."""
@@ -88,13 +119,12 @@ class Controller:
         age = (now - self._heard) / SECOND
         if self._last and not self._fault and age > self._values["stale"]:
             limit = 1e3 * self._values["stale"]
-            self._fault = f"no usable measurement for {1e3 * age:.0f} ms, expected one within {limit:.0f} ms"
-            self._release = (now, self._torque)
+            self._latch(f"no usable measurement for {1e3 * age:.0f} ms, expected one within {limit:.0f} ms")
         if self._fault:
             begun, torque = self._release
             share = (now - begun) / SECOND / max(self._values["release"], WATCH)
             self._torque = torque * max(0.0, 1.0 - share)
-            self._publish(time.time_ns())
+            self._publish(self._anchor.now())
 
     def _publish(self, stamp: int) -> None:
         self._commands.publish(self._writer.write(stamp, (self._torque,)))
@@ -103,7 +133,9 @@ class Controller:
         """Begin anew, at zero torque, with the next measurement."""
         with self._lock:
             self._fault, self._last, self._torque = "", 0, 0.0
-            self._desired.clear()
+            self._grid.forget()
+            self._judge.clear()
+            self._desired.clear(self._anchor.now())
         response.success, response.message = True, "clear_fault: done"
         return response
 
@@ -121,9 +153,9 @@ class Controller:
     def close(self) -> None:
         """Command zero torque, and wait until that has arrived."""
         self._waiter.stop()
-        after = max(self._last + round(self._period), time.time_ns())
+        after = max(self._last + round(self._period), self._anchor.now())
         for k in range(1, CLOSING_ZEROS + 1 if self._last else 1):
-            self._commands.publish(torque_command_message(after + round(k * self._period), 0.0))
+            self._commands.publish(self._writer.write(after + round(k * self._period), (0.0,)))
         await_arrival(self._commands)
         self._node.get_logger().info(f"torque zero after {self._steps} commands")
 
@@ -142,6 +174,9 @@ class Controller:
             "unusable_measurements": self._inputs.unusable,
             "limited_commands": self._limited,
             "late_commands": self._late,
+            "feedback_share": f"{self._judge.lateness.trust:.2f}",
+            "restarts": self._restarts,
+            **self._anchor.values(),
             "crossover_hz": f"{self._design.margins['locked'].crossover:.2f}",
             "phase_margin_deg": f"{worst.phase:.1f}",
             "gain_margin_db": f"{worst.gain:.1f}",
@@ -155,7 +190,7 @@ class Controller:
             return Report(WARN, "waiting for joint_states and ft", values)
         new, self._told = self._late - self._told, self._late
         if new:
-            return Report(WARN, f"{new} commands more than a sample late, without feedback", values)
+            return Report(WARN, f"{new} commands more than a sample late, with less feedback", values)
         return Report(OK, "running", values)
 
 

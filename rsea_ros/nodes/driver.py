@@ -2,27 +2,30 @@
 
 configure opens the device and starts the cycle: measurements are published, the torque is off. activate
 switches it on, at zero, and lets commands through. deactivate, cleanup, shutdown, a signal and an exception
-zero it and switch it off. A fault zeroes it until the service clear_fault or reboot; the node stays active.
+zero it and switch it off. A fault, and the service stop, zero it until the service clear_fault or reboot; the
+node stays active.
 """
 
 from __future__ import annotations
 
 import sys
-import threading
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, TransitionCallbackReturn
 
 from msg_adapters.ros import Trigger
-from rsea_ros.errors import RseaError
+from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
-from rsea_ros.nodes._bench import Bench
-from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._alarm import Alarm
+from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes._bench import NAMES, Bench
+from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
+from rsea_ros.nodes._drive import Drive
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
+from rsea_ros.nodes._jobs import Jobs
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
 from rsea_ros.nodes._run import run_node
@@ -37,7 +40,13 @@ TABLE = (
     *MOTOR,
     *SENSOR,
     *LIMITS,
+    *NAMES,
 )
+
+
+LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
+PATIENCE = 10.0
+"""s that a reboot may take which is under way when the program ends."""
 
 
 class Driver(ManagedEntity):
@@ -45,16 +54,21 @@ class Driver(ManagedEntity):
 
     def __init__(self, node: LifecycleNode, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
+        if node.get_parameter("use_sim_time").value:
+            raise ParameterError("parameter use_sim_time = true, expected false: the device keeps real time")
         self._guarded = Guarded(DEVICES[values["device"]](values), limits_of(values), values["rate"])
         self._cycle: Cycle | None = None
         self._bench: Bench | None = None
+        self._drive: Drive | None = None
         self._ended = ""
         self._told: tuple[Fault | None, int] = (None, 0)
-        self._lock = threading.Lock()
         self._health = Health(node, self._report)
-        self._offer("zero_ft", self._guarded.zero_ft)
-        self._offer("clear_fault", lambda: self._alone(self._guarded.clear))
-        self._offer("reboot", lambda: self._alone(self._guarded.reboot))
+        self._jobs, self._alarm = Jobs(node), Alarm(self._halt)
+        for name, work in (
+            ("zero_ft", self._zero_ft), ("clear_fault", self._clear_fault), ("reboot", self._reboot),
+            ("stop", self._stop),
+        ):  # fmt: skip
+            self._offer(name, work)
         node.add_managed_entity(self)
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
@@ -67,16 +81,21 @@ class Driver(ManagedEntity):
             self._fail(error)
             return TransitionCallbackReturn.FAILURE
         self._ended = ""
+        self._health.hardware = _hardware(self._values, self._guarded.device.health())
         self._guarded.guard.clear()
-        self._bench = Bench(self._node, strict=True, every_record=self._values["ft_all"])
-        self._cycle = Cycle(self._values["rate"], self._step, catch_up=False)
+        self._bench = Bench(self._node, self._values, strict=True, every_record=self._values["ft_all"])
+        anchor = Anchor()
+        self._drive = Drive(self._guarded, self._bench, anchor, self._values["rate"])
+        self._cycle = Cycle(self._values["rate"], self._step, catch_up=False, anchor=anchor)
         keep_time(self._node, self._cycle, self._values["realtime_priority"])
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Switch the torque on and let commands through, from the next one on; not with a fault latched."""
+        assert self._drive is not None
         try:
-            self._alone(self._guarded.enable)
+            with self._drive.deaf():
+                self._guarded.enable()
         except RseaError as error:
             self._node.get_logger().error(f"not activated: {error}")
             return TransitionCallbackReturn.FAILURE
@@ -85,7 +104,7 @@ class Driver(ManagedEntity):
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Zero torque, switched off; measurements go on."""
         try:
-            self._alone(self._guarded.disable)
+            self._guarded.disable()
         except RseaError as error:
             self._node.get_logger().error(f"while deactivating: {error}")
         return TransitionCallbackReturn.SUCCESS
@@ -119,6 +138,7 @@ class Driver(ManagedEntity):
     def close(self) -> None:
         """Zero torque, device closed, topics gone; also when there are none."""
         self._guarded.enabled = False
+        self._jobs.join(PATIENCE)
         try:
             if self._cycle is not None:
                 self._cycle.stop()
@@ -130,46 +150,63 @@ class Driver(ManagedEntity):
             self._bench.close()
         if self._cycle is not None:
             self._node.get_logger().info("torque zero, device closed")
-        self._cycle = self._bench = None
+        self._cycle = self._bench = self._drive = None
+
+    def _halt(self) -> None:
+        """End the torque with the next cycle: the process was asked to end."""
+        self._guarded.guard.halted = True
 
     def _step(self, stamp: int) -> None:
-        """Write the command that is in force from this cycle on (its stamp rounded), read, publish."""
-        bench = self._bench
-        assert bench is not None
+        """Do a cycle of the device and publish what it read."""
+        drive, bench = self._drive, self._bench
+        assert drive is not None and bench is not None
         try:
-            with self._lock:
-                bench.poll()
-                bench.commands.take(stamp + round(0.5 * SECOND / self._values["rate"]))
-                state = self._guarded.cycle(bench.commands.torque, bench.commands.age(time.time_ns()))
+            state = drive.step(stamp)
             if state is not None:
-                bench.publish(state)
+                bench.publish(state, drive.anchor.shift)
         except Exception:
             self._guarded.device.close()
             raise
 
-    def _alone(self, work: Callable[[], None]) -> None:
-        """Do something with the device between two cycles; commands from before it are forgotten."""
-        with self._lock:
-            work()
-            if self._bench is not None:
-                self._bench.commands.clear()
+    def _zero_ft(self) -> str:
+        self._guarded.zero_ft()
+        return "done"
 
-    def _offer(self, name: str, work: Callable[[], None]) -> None:
+    def _clear_fault(self) -> str:
+        assert self._drive is not None
+        if self._guarded.fault is None:
+            return "there is no fault; nothing was done"
+        with self._drive.deaf():
+            self._guarded.clear()
+        return "done"
+
+    def _reboot(self) -> str:
+        assert self._drive is not None
+        with self._drive.deaf():
+            self._guarded.reboot()
+        return "done"
+
+    def _stop(self) -> str:
+        assert self._drive is not None
+        self._drive.stop()
+        return "torque zero until clear_fault"
+
+    def _offer(self, name: str, work: Callable[[], str]) -> None:
         """Offer a service that does some work, and answers with the error where it fails."""
 
-        def serve(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        async def serve(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             try:
-                if self._cycle is None:
+                if self._drive is None:
                     raise RseaError(f"{name}: the driver is not configured, expected it to be")
-                work()
-                response.success, response.message = True, f"{name}: done"
+                text = await self._jobs.do(work)
+                response.success, response.message = True, f"{name}: {text}"
             except RseaError as error:
                 response.success, response.message = False, " ".join(str(error).split())
             self._node.get_logger().info(response.message)
             self._health.publish()
             return response
 
-        self._node.create_service(Trigger, f"~/{name}", serve)
+        self._node.create_service(Trigger, f"~/{name}", serve, callback_group=self._jobs.group)
 
     def _tell(self) -> None:
         """Log and publish what has changed: a fault, commands that were cut down."""
@@ -192,17 +229,29 @@ class Driver(ManagedEntity):
             return Report(ERROR if self._ended else OK, self._ended or "not configured", {})
         self._cycle.rest()
         fault: Fault | None = self._guarded.fault
-        report = self._bench.report(self._cycle)
+        cycles = self._guarded.cycles
+        lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
+        report = self._bench.report(self._cycle, lost)
         values = {
             "active": self._guarded.enabled,
             "fault": fault or "none",
             "limited_commands": self._guarded.guard.limited,
-            **self._guarded.cycles,
+            **cycles,
             **report.values,
             **self._guarded.device.health(),
         }
-        level, summary = (report.level, report.summary) if fault is None else (ERROR, f"fault {fault}")
-        return Report(level, summary, values)
+        if fault is None:
+            return Report(report.level, report.summary, values)
+        besides = "" if report.level == OK else f"; {report.summary}"
+        return Report(ERROR, f"fault {fault}{besides}", values)
+
+
+def _hardware(values: dict[str, Any], health: Mapping[str, object]) -> str:
+    """Return what diagnostics are about: which motor where, or which simulation."""
+    if "motor" not in health:
+        return f"{values['device']} {values['rig']}"
+    sensor = f", F/T sensor at {values['ft_host']}" if values["ft_host"] else ""
+    return f"{health['motor']}, ID {values['id']} on {values['port']}{sensor}"
 
 
 def main() -> int:

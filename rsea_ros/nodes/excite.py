@@ -12,8 +12,8 @@ from rclpy.node import Node
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
 from rsea_ros.nodes._cycle import SECOND, Cycle
-from rsea_ros.nodes._health import OK, WARN, Health, Report
-from rsea_ros.nodes._parameters import Parameter
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
+from rsea_ros.nodes._parameters import JOINT, Parameter
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
 from rsea_ros.nodes._run import run_node
 
@@ -35,6 +35,7 @@ TABLE = (
     Parameter("ramp", 0.5, "raised cosine at either end", "s", 0.0, 100.0),
     Parameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
     Parameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
+    JOINT,
 )
 SETTLE = SECOND // 2
 CLOSING_ZEROS = 3
@@ -53,12 +54,13 @@ class Excite:
         self._node, self._lead = node, round(values["lead"] * SECOND)
         self._wanted = values["subscribers"]
         self._next, self._left_out, self._stamp = 0, 0, 0
+        self._joint = values["joint"]
         self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
         self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
         self._cycle = Cycle(self._rate, self._step, catch_up=True)
         self._started = False
         self._health = Health(node, self._report)
-        node.create_timer(1.0, self._tell)
+        node.create_timer(1.0, self._tell, clock=STEADY)
 
     def _begin(self, message: JointState) -> None:
         """Start at a whole number of periods after a measurement, once everybody listens."""
@@ -83,7 +85,7 @@ class Excite:
         if self._lead and self._stamp - time.time_ns() < min(MARGIN, self._lead // 2):
             self._left_out += 1
         else:
-            self._publisher.publish(torque_command_message(self._stamp, torque))
+            self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
 
     def finished(self) -> bool:
         """Tell whether the whole excitation is out."""
@@ -99,7 +101,8 @@ class Excite:
         self._cycle.stop()
         last = max(self._stamp, time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self._started else 1):
-            self._publisher.publish(torque_command_message(last + round(k * SECOND / self._rate), 0.0))
+            stamp = last + round(k * SECOND / self._rate)
+            self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
         await_arrival(self._publisher)
         self._node.get_logger().info(f"torque zero after {self._next} commands, {self._left_out} left out")
 

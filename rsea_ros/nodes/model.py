@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
-from msg_adapters.ros import Bool, JointState, bool_message, efforts_message
+from msg_adapters.ros import JointState, efforts_message
 from msg_adapters.topics import TYPES
 from rsea_ros.model.observer import Observer
 from rsea_ros.model.pure_torque import PureTorque, Settings
@@ -18,12 +18,13 @@ from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._flags import Flags
 from rsea_ros.nodes._health import Health, Report
 from rsea_ros.nodes._model_health import ModelHealth
 from rsea_ros.nodes._model_inputs import Inputs
 from rsea_ros.nodes._model_noise import noise_from
-from rsea_ros.nodes._parameters import AXIS, Parameter
-from rsea_ros.nodes._qos import COMMAND, LATCHED, await_arrival
+from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._realtime import REALTIME, keep_time
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._waiter import Waiter
@@ -52,6 +53,7 @@ TABLE = (
     Parameter("hold_on", 0.005, "how long the powers must say so before the flag rises", "s", 0.0, 10.0),
     Parameter("hold_off", 0.005, "how long before it falls", "s", 0.0, 10.0),
     Parameter("quiet", 0.2, "time below the noise floor that is no torque", "s", 0.0, 100.0),
+    JOINT,
     REALTIME,
 )
 NAMES = ("distal", "proximal", "disturbance")
@@ -73,12 +75,14 @@ class Model:
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)
         template = serialize_message(efforts_message(0, dict.fromkeys(NAMES, 0.0)))
         self._writer = RawWriter(template, TYPES["joint_states"], "effort")
-        self._pure = node.create_publisher(Bool, "pure_torque", LATCHED)
-        self._pure.publish(bool_message(False))
-        self._inputs = Inputs(node, observer, values["ft_timeout"], values["axis"], values["reliable"])
+        self._flags = Flags(node)
+        self._inputs = Inputs(
+            node, observer, values["ft_timeout"], values["axis"], values["reliable"], joint=values["joint"],
+            ft_noise=noise.ft,
+        )  # fmt: skip
         self._assess = ModelHealth(rig, observer, self._flag, self._error, self._inputs)
         self._lock = threading.Lock()
-        self._health = Health(node, self._report)
+        self._health = Health(node, self._report, values["rig"])
         self._waiter = Waiter(node, [self._inputs.ft.subscription], self._work, TICK)
         keep_time(node, self._waiter, values["realtime_priority"])
         node.get_logger().info(f"rig {rig.name}: pure torque up to {self._error.edge.hz:.1f} Hz")
@@ -88,12 +92,10 @@ class Model:
         with self._lock:
             for stamp, estimate in self._inputs.take():
                 self._estimates.publish(self._writer.write(stamp, estimate))
-                was = self._error.verdict == "pure"
                 t = self._inputs.seconds(stamp)
                 heard = self._flag.take(t, estimate) != "no torque"
-                now = self._error.take(t, estimate, heard=heard) == PURE
-                if now != was:
-                    self._pure.publish(bool_message(now))
+                pure = self._error.take(t, estimate, heard=heard) == PURE
+                self._flags.show(stamp, pure and not self._inputs.frozen)
                 self._assess.tell(estimate)
 
     def _report(self) -> Report:
@@ -110,8 +112,7 @@ class Model:
     def close(self) -> None:
         """Leave nothing behind: the flag of a node that is gone is down, and its subscribers know."""
         self._waiter.stop()
-        self._pure.publish(bool_message(False))
-        await_arrival(self._pure)
+        self._flags.lower()
 
 
 def main() -> int:

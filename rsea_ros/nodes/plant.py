@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._bench import Bench
+from rsea_ros.nodes._bench import NAMES, Bench
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import Parameter
@@ -22,6 +22,7 @@ TABLE = (
     Parameter("seed", 0, "seed of the sensors' noise", "", 0, 1_000_000_000),
     Parameter("noise", True, "whether the sensors have their noise and quantum"),
     Parameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
+    *NAMES,
 )
 STALL, PAUSE = SECOND // 50, 0.005
 """After a stall of so many ns, the pause (s) in which commands arrive that were held up with this process."""
@@ -46,9 +47,9 @@ class Plant:
             duration=values["duration"],
             clock=lambda: self._now,
         )
-        self._bench = Bench(node)
+        self._bench = Bench(node, values)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
-        self._health = Health(node, lambda: self._bench.report(self._cycle))
+        self._health = Health(node, lambda: self._bench.report(self._cycle), f"simulated {values['rig']}")
         self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
         self._cycle.start()
 
@@ -56,8 +57,8 @@ class Plant:
         if not self._now:
             self._now = stamp
             self._device.open()
-        self._let_commands_in(time.time_ns() - stamp)
-        self._bench.poll()
+        self._let_commands_in(self._cycle.anchor.now() - stamp)
+        self._bench.poll(self._cycle.anchor)
         for instant, torque in self._bench.commands.take(stamp):
             self._now = instant
             self._device.write(torque)

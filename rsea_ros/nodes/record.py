@@ -14,7 +14,7 @@ from msg_adapters import BagWriter
 from msg_adapters.ros import message_type
 from msg_adapters.topics import JOINT_STATE, WRENCH
 from rsea_ros.new_files import unused
-from rsea_ros.nodes._health import OK, WARN, Health, Report
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
@@ -55,7 +55,7 @@ class Record:
         self._taps = {name: self._tap(name, kind) for name, kind in TOPICS.items()}
         self._begin = self._commanded = 0.0
         self._health = Health(node, self._report)
-        node.create_timer(2.0, self._tell)
+        node.create_timer(2.0, self._tell, clock=STEADY)
         node.get_logger().info(f"recording into {self._bag.path}")
 
     def _tap(self, name: str, kind: str) -> Tap:

@@ -16,7 +16,7 @@ from msg_adapters import iterate
 from msg_adapters.ros import Clock, clock_message, message_type
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.nodes._cycle import SECOND, wait_until
-from rsea_ros.nodes._health import OK, Health, Report
+from rsea_ros.nodes._health import OK, STEADY, Health, Report
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._qos import COMMAND, LATCHED, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
@@ -62,7 +62,7 @@ class Replay:
         self._played, self._stop, self._done = 0, threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._health = Health(node, self._report)
-        node.create_timer(1.0, self._tell)
+        node.create_timer(1.0, self._tell, clock=STEADY)
         self._thread.start()
 
     def _advertise(self, topics: Iterable[tuple[str, str]]) -> dict[str, Publisher[Any]]:

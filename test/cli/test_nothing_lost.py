@@ -14,11 +14,12 @@ import pytest
 
 import rsea_ros.files as files
 from msg_adapters import read_record, write_record
+from rsea_ros.checks import usable
 from rsea_ros.cli import paper
 from rsea_ros.cli.main import main
 from rsea_ros.control import study
 from rsea_ros.design import judge, margins
-from rsea_ros.diagnosis import diagnose, usable
+from rsea_ros.diagnosis import diagnose
 from rsea_ros.errors import OutputError
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation

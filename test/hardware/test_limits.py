@@ -7,7 +7,7 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, Refused, State
 from rsea_ros.hardware.guarded import Guarded
-from rsea_ros.hardware.limits import Guard, Limits
+from rsea_ros.hardware.limits import Fault, Guard, Limits
 
 PERIOD = 0.01
 
@@ -126,3 +126,51 @@ def test_two_lost_replies_are_none_and_three_in_a_row_a_fault():
 def test_any_other_error_is_a_fault_at_once(error):
     faults, written = cycles([error], 2)
     assert faults[0] == type(error).__name__.lower() and written == [0.0, 0.0]
+
+
+def test_the_first_command_does_not_act_in_full_after_start_fault_and_pause():
+    soft = guard(slew=1e6, soft_start=300.0)
+    begin = [3.0, 6.0, 9.0, 10.0]
+    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
+    soft.trip(Fault("any"))
+    assert soft.allowed(10.0, 0.0) == 0.0
+    soft.clear()
+    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
+    soft.allowed(0.0, 0.0)
+    soft.allowed(0.0, 9.0)
+    assert [soft.allowed(10.0, 0.0) for _ in range(4)] == begin
+
+
+def test_a_motor_that_does_not_make_its_torque_for_long_enough_is_a_fault():
+    watched = guard(slew=1e6, effort=6.0, effort_time=0.05)
+    for k in range(6):
+        watched.allowed(10.0, 0.0)
+        assert watched.fault is None, k
+        watched.look(State(0, 0.0, 0.0, 3.0))
+    assert str(watched.fault) == "effort: 7 N m, limit 6 N m between commanded and measured torque"
+
+
+def test_a_torque_that_changes_from_cycle_to_cycle_and_is_measured_late_is_none():
+    watched, torques = guard(slew=1e6, effort=6.0, effort_time=0.05), [0.0, 0.0]
+    for k in range(100):
+        torques.append(watched.allowed(60.0 * (-1) ** k, 0.0))
+        watched.look(State(0, 0.0, 0.0, torques[-2]))
+    assert watched.fault is None
+
+
+@pytest.mark.parametrize(
+    ("limits", "reading", "told"),
+    [
+        ({"velocity": 2.0}, {"velocity": -2.5}, "velocity: 2.5 rad/s, limit 2 rad/s"),
+        ({"position": 0.05}, {"position": -0.06}, "position: 0.06 rad, limit 0.05 rad"),
+        ({"ft": 50.0}, {"wrench": (0, 0, 0, 0, 0, -51.0)}, "ft_torque: 51 N m, limit 50 N m"),
+        ({"ft": 50.0, "ft_axis": 0}, {"wrench": (60, 0, 0, 0, 0, 0)}, "ft_torque: 60 N m, limit 50 N m"),
+        ({"power": 100.0}, {"velocity": 3.0, "motor_torque": -40.0}, "power: 120 W, limit 100 W"),
+        ({}, {"motor_trouble": "torque_enable is 0, expected 1"},
+         "motor_state: torque_enable is 0, expected 1"),
+    ],
+)  # fmt: skip
+def test_limits_hold_for_every_rig(limits, reading, told):
+    seen = guard(**limits)
+    seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
+    assert str(seen.fault) == told

@@ -4,6 +4,7 @@ import math
 import random
 import socket
 import struct
+import threading
 import time
 
 import pytest
@@ -177,3 +178,36 @@ def test_a_stream_that_falls_silent_is_asked_for_again(streamed):
     sensor.sendto(datagram(1, 20), client)
     _until(lambda: receiver.newest.record.ft_sequence == 20)
     assert receiver.sequence.counts["lost"] == 0
+
+
+def test_a_stream_is_followed_again_after_its_counters_moved_on_unheard():
+    """150 s of silence at 7 kHz: every record after it was taken for damage, for ever."""
+    sequence, far = Sequence(), 1 << 21
+    assert sequence.accept(decode(datagram(1)))
+    accepted = [sequence.accept(decode(datagram(far + k))) for k in range(8)]
+    assert accepted == [False] * 3 + [True] * 5
+    assert sequence.counts["resynchronised"] == 1
+
+
+def test_a_new_stream_after_which_only_the_sensors_own_counter_has_moved_on_is_followed():
+    sequence = Sequence()
+    assert sequence.accept(decode(datagram(1)))
+    sequence.begin()
+    records = [decode(datagram(k))._replace(ft_sequence=(1 << 22) + k) for k in range(1, 9)]
+    assert [sequence.accept(r) for r in records][-1]
+
+
+def test_a_tare_collects_beside_the_cycle(streamed):
+    """Both took from one queue, and the one that came second raised IndexError."""
+    receiver, sensor, client = streamed
+    found = []
+    thread = threading.Thread(target=lambda: found.extend(receiver.collect(0.2)))
+    thread.start()
+    sent = taken = 0
+    while thread.is_alive():
+        sent += 1
+        sensor.sendto(datagram(sent), client)
+        taken += len(receiver.take())
+    _until(lambda: receiver.newest is not None and receiver.newest.record.sequence == sent)
+    taken += len(receiver.take())
+    assert taken == sent and len(found) > 1

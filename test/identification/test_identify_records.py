@@ -145,3 +145,15 @@ def test_nan_and_stamps_that_go_back_are_refused(case):
     t[6] = t[4]
     with pytest.raises(IdentificationError, match=r"ft stamp 6 = .* expected rising stamps"):
         identify([record.with_channels(ft=Channel(t, record["ft"].y))], load_rig("paper_high_impedance"))
+
+
+@pytest.mark.parametrize("torque", [0.0, 10.0])
+def test_a_constant_torque_is_refused_in_words(torque):
+    """It ended in LinAlgError, or in a report that JSON cannot hold."""
+    t = np.arange(2800) / 280.0
+    channels = {
+        name: Channel(t, np.full(len(t), value))
+        for name, value in (("command", torque), ("ft", torque), ("position", torque / 1530.0))
+    }
+    with pytest.raises(IdentificationError, match=f"is {torque:g} N m throughout, expected an excitation"):
+        identify([Record(channels, source="held")], load_rig("paper_high_impedance"))

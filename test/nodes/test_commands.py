@@ -89,3 +89,32 @@ def test_cleared_is_zero_and_empty():
     queue.clear()
     assert queue.torque == 0.0
     assert queue.take(NOW + 20) == []
+
+
+def test_a_command_that_acts_now_overtakes_those_that_came_before_it_and_wait():
+    queue = _queue((NOW + 20 * MILLISECOND, 5.0), (NOW + 40 * MILLISECOND, 6.0))
+    queue.add(NOW, 0.0, NOW + MILLISECOND)
+    assert queue.take(NOW + 100 * MILLISECOND) == [(NOW, 0.0)]
+
+
+def test_what_came_before_it_was_cleared_is_dropped_whenever_it_is_added():
+    queue = _queue()
+    queue.clear(NOW)
+    queue.add(NOW - MILLISECOND, 5.0, NOW - MILLISECOND)
+    queue.add(NOW + MILLISECOND, 6.0, NOW + MILLISECOND)
+    assert queue.take(NOW + 2 * MILLISECOND) == [(NOW + MILLISECOND, 6.0)] and queue.dropped == 1
+
+
+def test_a_clock_that_is_anchored_anew_moves_everything_that_waits():
+    queue = _queue((NOW + 10, 1.0))
+    queue.take(NOW)
+    queue.shift(-1000)
+    assert queue.take(NOW - 990) == [(NOW - 990, 1.0)] and queue.age(NOW - 990) == 0.0
+
+
+def test_an_age_counts_from_the_arrival_of_a_late_command():
+    queue = _queue()
+    queue.take(NOW)
+    queue.add(NOW - 100 * MILLISECOND, 1.0, NOW + MILLISECOND)
+    queue.take(NOW + 2 * MILLISECOND)
+    assert queue.age(NOW + 2 * MILLISECOND) == 0.001

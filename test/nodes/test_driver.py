@@ -198,3 +198,28 @@ def _called(client, listener):
     future = client.call_async(Trigger.Request())
     listener.until(future.done)
     return future.result()
+
+
+def test_two_actuators_side_by_side_take_their_commands_alone(listener, monkeypatch):
+    """A command for left_knee moved whatever listened."""
+    spies = {name: Spy() for name in ("left", "right")}
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"][:-5]]})
+    values = {parameter.name: parameter.default for parameter in driver.TABLE} | {
+        "rate": 200.0, "autostart": True, "command_timeout": 5.0, "effort_limit": 0.0,
+    }  # fmt: skip
+    made, topic = [], {}
+    for name in spies:
+        node = LifecycleNode("driver", namespace=name)
+        made.append((driver.Driver(node, values | {"joint": f"{name}_knee"}), node))
+        topic[name] = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
+
+    def pushed():
+        for name in spies:
+            topic[name].publish(torque_command_message(0, 5.0, "left_knee"))
+        return spies["left"].written[-1:] == [5.0] and made[1][0]._bench.commands.refused > 3
+
+    listener.until(pushed)
+    assert not any(spies["right"].written)
+    for program, node in made:
+        program.close()
+        node.destroy_node()

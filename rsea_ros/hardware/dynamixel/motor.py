@@ -26,6 +26,8 @@ RETURN_DELAY_UNIT = 2e-6
 WATCHDOG_UNIT = 0.02
 WRITE = 0x03
 BOOT_TIME, BOOT_POLL = 5.0, 0.02
+LOOK = 0.8
+"""s in which each register is looked at once; a fault is latched within a second."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Settings:
     baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
     per A. latency: what adapter and scheduler may add to the time on the wire, s; a reading gets in addition
     what the write before it has left of it. watchdog: s without the host after which the motor's own
-    watchdog, or the supervisor, takes the torque away.
+    watchdog, or the supervisor, takes the torque away. supervisor: socket of one that runs as a service;
+    empty: a child of this process.
     """
 
     path: str
@@ -45,6 +48,7 @@ class Settings:
     torque_constant: float = 6.826
     latency: float = 1e-3
     watchdog: float = 0.1
+    supervisor: str = ""
 
 
 def usual_latency(rate: float) -> float:
@@ -54,7 +58,10 @@ def usual_latency(rate: float) -> float:
 
 @dataclass(frozen=True)
 class Sample:
-    """What one read holds. instant: middle of the transaction, monotonic ns. counts: of the encoder."""
+    """What one read holds. instant: middle of the transaction, monotonic ns. counts: of the encoder.
+
+    trouble: what the motor's registers are and should not be, in words.
+    """
 
     instant: int
     counts: int
@@ -64,6 +71,7 @@ class Sample:
     voltage: float
     temperature: float
     hardware_error: str
+    trouble: str = ""
 
 
 class Motor:
@@ -75,6 +83,8 @@ class Motor:
         self.bus = Bus(self._port, settings.identity)
         self._supervisor: Supervisor | None = None
         self._longer, self._spared = 0, 0.0
+        self._expected: tuple[tuple[str, Item, int], ...] = ()
+        self._looks, self._looked = 0, 0.0
         self.table: ControlTable | None = None
         self.torque_limit = math.nan
 
@@ -95,18 +105,17 @@ class Motor:
             self._put(table.operating_mode, TORQUE_MODE)
         limit = self.patiently(lambda: self.bus.get(table.torque_limit))
         self.torque_limit = limit * table.ampere * self._settings.torque_constant
-        if table.bus_watchdog is None:
-            self._supervisor = Supervisor(
-                self._port.descriptor, self._settings.watchdog, self._stop_frames()
-            )
+        self._supervise()
 
     def enable(self) -> None:
         """Switch the torque on, at zero, with a watchdog. Raises DeviceError."""
         table = self._known
         self._stop()
+        armed = max(1, round(self._settings.watchdog / WATCHDOG_UNIT))
         if table.bus_watchdog is not None:
-            self._put(table.bus_watchdog, max(1, round(self._settings.watchdog / WATCHDOG_UNIT)))
+            self._put(table.bus_watchdog, armed)
         self._put(table.torque_enable, 1)
+        self._expect(1, armed)
 
     def disable(self) -> None:
         """Command zero torque and switch it off."""
@@ -138,6 +147,7 @@ class Motor:
             self._port.latency, self._spared = usual, 0.0
         instant = (begin + time.monotonic_ns()) // 2
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
+        trouble = "" if error else self._look_after()
         counts = table.position.value(data, start)
         return Sample(
             instant=instant,
@@ -148,7 +158,35 @@ class Motor:
             voltage=table.voltage.value(data, start) * 0.1,
             temperature=float(table.temperature.value(data, start)),
             hardware_error=error,
+            trouble=trouble,
         )
+
+    def _look_after(self) -> str:
+        """Read one of the registers that the torque hangs on when its turn has come, each once a second.
+
+        Return what is wrong with it. A lost reply is no news: its turn comes again.
+        """
+        now = time.monotonic()
+        if not self._expected or now - self._looked < LOOK / len(self._expected):
+            return ""
+        name, item, expected = self._expected[self._looks % len(self._expected)]
+        self._looked = now
+        try:
+            value = self.bus.get(item)
+        except NoReply:
+            return ""
+        self._looks += 1
+        return "" if value == expected else f"{name} is {value}, expected {expected}"
+
+    def _expect(self, torque: int, watchdog: int) -> None:
+        """Note what the registers shall be from now on."""
+        table = self._known
+        kept = [("torque_enable", table.torque_enable, torque)]
+        if torque:
+            kept.append(("operating_mode", table.operating_mode, TORQUE_MODE))
+            if table.bus_watchdog is not None:
+                kept.append(("bus_watchdog", table.bus_watchdog, watchdog))
+        self._expected = tuple(kept)
 
     def write(self, torque: float) -> None:
         """Command a torque (N m). Raises NoReply, PortLost, Refused."""
@@ -165,10 +203,12 @@ class Motor:
     def recover(self) -> None:
         """Open the port again if it is lost; raises DeviceError while the motor reports a hardware error."""
         try:
+            self._known  # noqa: B018  a motor that was away when the port was opened again is not set up
             self.patiently(self.bus.ping)
         except DeviceError:
             self.close()
             self.open()
+        self._supervise()
         error = self.patiently(lambda: self.bus.get(self._known.hardware_error))
         if error:
             raise DeviceError(f"motor: hardware error {error_names(error)}, expected a reboot first")
@@ -208,10 +248,21 @@ class Motor:
     def _stop(self) -> None:
         """Switch the torque off, then clear the watchdog: a tripped one refuses a new goal."""
         table = self._known
+        self._expected = ()
         self._put(table.torque_enable, 0)
         if table.bus_watchdog is not None:
             self._put(table.bus_watchdog, 0)
         self._put(table.goal_torque, 0)
+
+    def _supervise(self) -> None:
+        """Start a supervisor for a motor without a watchdog, and a new one for one that is dead."""
+        if self._supervisor is not None and not self._supervisor.alive():
+            self._supervisor.close()
+            self._supervisor = None
+        if self._supervisor is None and self._known.bus_watchdog is None:
+            self._supervisor = Supervisor(
+                self._port.descriptor, self._settings.watchdog, self._stop_frames(), self._settings.supervisor
+            )
 
     def _stop_frames(self) -> list[bytes]:
         """Return the frames that zero the torque and switch it off, for the supervisor."""

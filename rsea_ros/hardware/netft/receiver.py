@@ -22,15 +22,18 @@ PAUSE = 0.01
 ASK_AGAIN = 0.2
 """s of silence after which the stream is asked for again."""
 KEPT = 4096
+LONGEST_AGO = 1_000_000_000
+"""ns; so long no datagram waits for the thread."""
 STAMPING = 100
 """Tries, of 1 ms each."""
 
 
 class Arrival(NamedTuple):
-    """A record and when it arrived, ns since the epoch."""
+    """A record and when it arrived: stamp by the system clock, ns since the epoch; instant: monotonic, ns."""
 
     stamp: int
     record: Record
+    instant: int
 
 
 class Receiver:
@@ -44,6 +47,7 @@ class Receiver:
         self.sequence = Sequence()
         self.refused: Counter[str] = Counter()
         self._waiting: deque[Arrival] = deque(maxlen=KEPT)
+        self._aside: deque[Arrival] | None = None
         self.newest: Arrival | None = None
         self._heard = 0.0
         self._draining = threading.Lock()
@@ -78,9 +82,20 @@ class Receiver:
         """Return the records that have come since the last call, oldest first."""
         self.drain()
         taken = []
-        while self._waiting:
-            taken.append(self._waiting.popleft())
+        with contextlib.suppress(IndexError):
+            while True:
+                taken.append(self._waiting.popleft())
         return taken
+
+    def collect(self, seconds: float) -> list[Arrival]:
+        """Return the records of so many seconds from now on, beside those that `take` gives to a cycle."""
+        self.drain()
+        aside: deque[Arrival] = deque(maxlen=KEPT)
+        self._aside = aside
+        time.sleep(seconds)
+        self.drain()
+        self._aside = None
+        return list(aside)
 
     def close(self) -> None:
         """Stop the stream and the thread."""
@@ -118,8 +133,11 @@ class Receiver:
         if record is None:
             self.refused["length"] += 1
         elif self.sequence.accept(record):
-            arrival = Arrival(_arrived(ancillary), record)
+            stamp = _arrived(ancillary)
+            arrival = Arrival(stamp, record, _monotonic(stamp))
             self._waiting.append(arrival)
+            if (aside := self._aside) is not None:
+                aside.append(arrival)
             self.newest = arrival
 
 
@@ -140,6 +158,12 @@ def _until_stamped() -> None:
             time.sleep(1e-3)
             if _arrived(probe.recvmsg(1, ANCILLARY)[1]) <= sent:
                 return
+
+
+def _monotonic(stamp: int) -> int:
+    """Return a stamp of just now on the monotonic clock; now where the system clock was set since."""
+    now, ago = time.monotonic_ns(), time.time_ns() - stamp
+    return now - ago if 0 <= ago <= LONGEST_AGO else now
 
 
 def _arrived(ancillary: list[tuple[int, int, bytes]]) -> int:

@@ -66,7 +66,7 @@ class Sequence:
         self.counts: Counter[str] = Counter()
         self._rdt: int | None = None
         self._ft: int | None = None
-        self._stray: int | None = None
+        self._stray: tuple[int, int] | None = None
         self._strays = 0
 
     def begin(self) -> None:
@@ -80,19 +80,15 @@ class Sequence:
     def accept(self, record: Record) -> bool:
         """Count a record; tell whether it is newer than all before and may be used."""
         step = 1 if self._rdt is None else (record.sequence - self._rdt) % _WORD
-        kind = _kind(step)
-        if kind and self._another_stream(record):
-            self.counts["resynchronised"] += 1
-            step, kind = 1, ""
         ft_step = 1 if self._ft is None else (record.ft_sequence - self._ft) % _WORD
-        if not kind and ft_step >= LONGEST_GAP:
-            if _WORD - ft_step <= REORDERED:
-                kind = "reordered"
-            else:
-                self._restart(record)
-                return False
+        kind = _kind(step) or _ft_kind(ft_step, record.ft_sequence)
+        if kind and kind != "restarted" and self._another_stream(record):
+            self.counts["resynchronised"] += 1
+            step, ft_step, kind = 1, 1, ""
         if kind:
             self.counts[kind] += 1
+            if kind == "restarted":
+                self._rdt, self._ft = record.sequence, record.ft_sequence
             return False
         self.counts["lost"] += step - 1
         self.counts["received"] += 1
@@ -103,17 +99,25 @@ class Sequence:
 
     def _another_stream(self, record: Record) -> bool:
         """Tell whether the last few records that did not fit follow each other."""
-        follows = self._stray is not None and record.sequence == (self._stray + 1) % _WORD
+        follows = False
+        if self._stray is not None:
+            step, ft_step = ((new - old) % _WORD for new, old in zip(record[:2], self._stray, strict=True))
+            follows = step == 1 and ft_step < LONGEST_GAP
         self._strays = self._strays + 1 if follows else 1
-        self._stray = record.sequence
+        self._stray = (record.sequence, record.ft_sequence)
         return self._strays >= RESYNCHRONISE
 
-    def _restart(self, record: Record) -> None:
-        """Follow a counter that begins anew at about zero; take any other jump for damage."""
-        back = record.ft_sequence < LONGEST_GAP
-        self.counts["restarted" if back else "damaged"] += 1
-        if back:
-            self._rdt, self._ft = record.sequence, record.ft_sequence
+
+def _ft_kind(step: int, counter: int) -> str:
+    """Return what is wrong with a step of ft_sequence; '' for none, also after a gap.
+
+    A counter that begins anew at about zero was switched off; any other jump is damage, until it goes on.
+    """
+    if step < LONGEST_GAP:
+        return ""
+    if _WORD - step <= REORDERED:
+        return "reordered"
+    return "restarted" if counter < LONGEST_GAP else "damaged"
 
 
 def _kind(step: int) -> str:

@@ -66,10 +66,10 @@ class Sensor:
         self._receiver.drain()
 
     def take(self) -> tuple[list[tuple[int, Wrench]], str]:
-        """Return the records since the last call as (stamp, wrench), and what is wrong: '' for nothing."""
+        """Return the records since the last call as (monotonic ns, wrench), and what is wrong: '' nothing."""
         arrivals = self._receiver.take()
         wrong = self._silence(arrivals) or self._jump() or _complaint(arrivals)
-        return [(a.stamp, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
+        return [(a.instant, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
 
     def zero(self) -> None:
         """Let the sensor take its present load for zero. Raises DeviceError when the load is not at rest."""
@@ -89,12 +89,17 @@ class Sensor:
             raise DeviceError(f"F/T sensor: {AXES[axis]} {verb} {values[axis]:.3g} {when}, {expected}")
 
     def recover(self) -> None:
-        """Wait for the stream to be sound. Raises DeviceError when it is not."""
-        self._collect()
-        complaint = _complaint([self._receiver.newest] if self._receiver.newest else [])
-        if complaint:
+        """Return when the stream is sound, at once where it goes on. Raises DeviceError when it is not."""
+        if self._age() > self._settings.timeout * 1e9 or self._complains():
+            self._collect()
+        if complaint := self._complains():
             raise DeviceError(f"F/T sensor: {complaint} is still there, expected it to be over")
         self._restart_watch()
+
+    def _complains(self) -> str:
+        """Return what the newest record complains of."""
+        self._receiver.drain()
+        return _complaint([self._receiver.newest] if self._receiver.newest else [])
 
     def counts(self) -> dict[str, int]:
         """Return what came and what is gone, by kind."""
@@ -106,15 +111,14 @@ class Sensor:
 
     def _collect(self) -> Values:
         """Return the wrenches of the next SETTLE seconds, one a row. Raises DeviceError without any."""
-        self._receiver.take()
         deadline = time.monotonic() + FIRST
-        while not (arrivals := self._receiver.take()):
+        while not self._receiver.collect(0.005):
             if time.monotonic() > deadline:
                 where = f"{self._settings.host}:{self._settings.port}"
                 raise DeviceError(f"F/T sensor {where}: no record within {FIRST:g} s, expected a stream")
-            time.sleep(0.005)
-        time.sleep(SETTLE)
-        arrivals += self._receiver.take()
+        arrivals = self._receiver.collect(SETTLE)
+        if not arrivals:
+            raise DeviceError(f"F/T sensor {self._settings.host}: the stream has ended, expected it to go on")
         return np.array([self._calibration.wrench(a.record.counts) for a in arrivals])
 
     def _restart_watch(self) -> None:
@@ -122,11 +126,15 @@ class Sensor:
 
     def _silence(self, arrivals: list[Arrival]) -> str:
         self._quiet = 0 if arrivals else self._quiet + 1
-        newest = self._receiver.newest
-        age = time.time_ns() - newest.stamp if newest else 0
+        age = self._age()
         if self._quiet < QUIET_CYCLES or age < self._settings.timeout * 1e9:
             return ""
         return f"no record for {age / 1e6:.1f} ms, limit {1e3 * self._settings.timeout:g} ms"
+
+    def _age(self) -> int:
+        """Return how old the newest record is, ns; 0 before the first."""
+        newest = self._receiver.newest
+        return time.monotonic_ns() - newest.instant if newest else 0
 
     def _jump(self) -> str:
         """Tell whether the sensor's own counter stood still or went back since it was last looked at."""

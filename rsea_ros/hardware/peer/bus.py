@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import secrets
 import tty
+from collections import deque
 from contextlib import suppress
 from pathlib import Path
 
 from rsea_ros.files import PREFIX
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import LENGTH, UNKNOWN, Motor
+from rsea_ros.hardware.peer.motor import KEPT, LENGTH, UNKNOWN, Motor
 from rsea_ros.hardware.peer.protocol2 import Listener, Request, checksum, status
 
 EVERYONE = 254
@@ -33,7 +34,7 @@ class Bus:
         self._listener = Listener()
         self._waiting: list[tuple[int, bytes]] = []
         self._busy_until = 0
-        self.sent: list[tuple[int, int, bytes]] = []
+        self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=KEPT)
         self.unknown = 0
         self.descriptor = -1
         self.appear()

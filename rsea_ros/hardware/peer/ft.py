@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import socket
 import threading
+from collections import deque
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.motor import Plant
 
+RECORDS = 500_000
+"""Records of the log, where somebody watches: a minute at 7 kHz."""
 STOP, STREAM, BUFFERED, RESET_LATCH, SET_BIAS = 0, 2, 3, 0x41, 0x42
 SATURATED = 0x8002_0000
 COUNTS_PER_NEWTON, COUNTS_PER_NEWTON_MILLIMETRE = 1_000_000, 1_000
@@ -38,7 +41,7 @@ class ForceSensor:
         self._due = 0
         self.gone = 0
         self.keep = False
-        self.sent: list[tuple[int, tuple[int, ...]]] = []
+        self.sent: deque[tuple[int, tuple[int, ...]]] = deque(maxlen=RECORDS)
         self.page = _serve_page(host, PAGE.format(rate=round(rate)))
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Protocol
 
 from rsea_ros.hardware.device import State
@@ -13,6 +14,8 @@ TORQUE_MODE = 0
 WATCHDOG_UNIT = 20_000_000
 """ns"""
 TRIPPED = -1
+KEPT = 60_000
+"""Entries of each log: a minute at 1 kHz. A bench that runs for days does not grow."""
 
 
 class Plant(Protocol):
@@ -35,7 +38,7 @@ class Motor:
         self.model, self._plant = MODELS[number], plant
         self._constant, self._origin = torque_constant, origin
         self.memory = bytearray(TABLE_SIZE)
-        self.history: list[tuple[int, int, bool]] = []
+        self.history: deque[tuple[int, int, bool]] = deque(maxlen=KEPT)
         self._touched = 0
         for name, register in self.model.registers.items():
             self.put(name, register.start)

@@ -34,11 +34,14 @@ class Consistency(NamedTuple):
 
 
 def consistency(score: FloatArray) -> dict[str, Consistency]:
-    """Return the test of each channel that had samples. score: sums of nu^2 / S, 1, nu, shape (3, 3)."""
+    """Return the test of each channel that had samples. score: sums of nu^2 / S, 1, nu, shape (3, 3).
+
+    A sample that comes late changes innovations that were counted before, so a sum may go back: then to zero.
+    """
     return {
-        name: Consistency(math.sqrt(total / count), _limit(round(count)), sum_ / count)
+        name: Consistency(math.sqrt(max(total, 0.0) / count), _limit(round(count)), sum_ / count)
         for name, (total, count, sum_) in zip(CHANNELS, score.tolist(), strict=True)
-        if count >= 1.0
+        if count >= 1.0 and math.isfinite(total + sum_)
     }
 
 

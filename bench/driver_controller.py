@@ -1,0 +1,100 @@
+"""Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
+
+A sine of 5 Hz, 10 N m: its error, RMS, and the largest |ft|, which a load may not raise. The bare loop of the
+same minute tells what the machine can.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from statistics import median
+
+import rclpy
+
+from bench.torque_control_nodes import Outside, running, sine
+from msg_adapters.ros import Trigger
+from rsea_ros.hardware.peer.remote import RemoteBench
+
+AMPLITUDE = 10.0
+BURN = "while True: pass"
+
+
+@contextmanager
+def burning(count: int) -> Iterator[None]:
+    """Run so many processes that do nothing but compute."""
+    processes = [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
+    """Try every rate, quiet and loaded, with the defaults of config/nodes."""
+    os.environ["ROS_DOMAIN_ID"] = str(random.randint(60, 100))
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    rclpy.init()
+    rows = []
+    for rate in args.rate:
+        for load in (0, os.cpu_count() or 1):
+            rows += _trial(rate, load, folder / f"tty{rate:g}-{load}")
+    rclpy.shutdown()
+    return rows
+
+
+def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
+    """Run one trial; a fault ends the sine, which is part of what is asked."""
+    outside = Outside()
+    with ExitStack() as kept:
+        bench = kept.enter_context(RemoteBench(path))
+        own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
+        kept.enter_context(running("driver", 0, **own))
+        kept.enter_context(running("controller", 0, rate=rate))
+        outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
+        kept.enter_context(burning(load))
+        late = _lateness(rate)
+        for name in ("driver", "controller"):
+            _clear(outside, name)
+        begun = time.monotonic_ns()
+        errors = sine(outside, AMPLITUDE, rate)
+        largest = max(abs(torque) for _, torque, _ in outside.wrenches)
+        faults = [values for values in outside.health.values() if values.get("fault", "none") != "none"]
+        acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
+    outside.node.destroy_node()
+    name = f"{rate:g} Hz, {'beside ' + str(load) + ' that burn' if load else 'quiet'}"
+    own = outside.health.get("controller", {})
+    share, missed = own.get("feedback_share"), own.get("missed_measurements")
+    told = f"feedback at the end {share}, {own.get('late_commands')} late, {missed} measurements missed"
+    told += f", faults {[v['fault'] for v in faults] or 'none'}, bare loop late in {late:.1%} of its cycles"
+    error = f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
+    return [
+        (f"{name}: error", "≤ 2 %" if not load else "", f"{error}, {acting} writes of torque, {told}"),
+        (f"{name}: largest |ft|", f"≤ {1.3 * AMPLITUDE:g} N m", f"{largest:.2f} N m"),
+    ]
+
+
+def _clear(outside: Outside, node: str) -> None:
+    """End the fault that the start of everything at once has latched."""
+    client = outside.node.create_client(Trigger, f"{node}/clear_fault")
+    client.wait_for_service(20.0)
+    rclpy.spin_until_future_complete(outside.node, client.call_async(Trigger.Request()), timeout_sec=10.0)
+
+
+def _lateness(rate: float) -> float:
+    """Return the share of cycles of a bare loop that begin 0.3 ms late or more, over a second."""
+    begin, late = time.monotonic(), 0
+    for k in range(1, round(rate) + 1):
+        due = begin + k / rate
+        time.sleep(max(0.0, due - time.monotonic()))
+        late += time.monotonic() - due > 3e-4
+    return late / round(rate)

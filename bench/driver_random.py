@@ -1,0 +1,116 @@
+"""Random faults at random instants, several at once, beside a monitor that knows one rule of the torque.
+
+No torque unless active, commanded in the last 100 ms, without fault. The seed of a violation repeats what was
+done; the machine's own stalls are not in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from bench.driver_loop import Loop
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._devices import limits_of
+from rsea_ros.nodes.driver import TABLE
+
+RATE = 280.0
+CALM = {"drop": 0.0, "delay": 0.0, "corrupt": 0.0, "wrong_crc": 0.0, "silent": False, "ft_silent": False}
+LIMITS = limits_of({p.name: p.default for p in TABLE})
+LONGEST, GRACE = 100_000_000, 50_000_000
+"""ns that a command excuses a torque; that a fault may act on: its cycle, the ramp, a lost write."""
+
+
+class Watched:
+    """A loop, what happens to it, and what is wrong with its torque."""
+
+    def __init__(self, bench: RemoteBench, seed: int) -> None:
+        self.bench, self.loop, self.dice = bench, Loop(bench, RATE, limits=LIMITS), random.Random(seed)
+        self.commanded = self.since = 0
+        self.silent = 0
+        self.violations: list[str] = []
+        self.seen = self.faults = 0
+
+    def cycle(self) -> None:
+        """Do a cycle, and look at what the motor has been told since the last look."""
+        guarded = self.loop.guarded
+        if self.dice.random() < 0.01:
+            self._happen()
+        if not self.silent:
+            self.commanded = time.monotonic_ns()
+        self.silent = max(0, self.silent - 1)
+        age = (time.monotonic_ns() - self.commanded) / 1e9
+        before = guarded.fault
+        guarded.cycle(40.0 * self.dice.uniform(-1.0, 1.0), age)
+        if guarded.fault is not before:
+            self.faults += guarded.fault is not None
+            self.since = time.monotonic_ns()
+        time.sleep(1.0 / RATE)
+
+    def look(self) -> None:
+        """Judge the torque that acts now."""
+        active, fault, since, commanded = (
+            self.loop.guarded.enabled, self.loop.guarded.fault, self.since, self.commanded,
+        )  # fmt: skip
+        goal, on = self.bench.torque()
+        now = time.monotonic_ns()
+        if not goal or not on:
+            return
+        self.seen += 1
+        if not active:
+            self.violations.append("torque while not active")
+        elif now - commanded > LONGEST + GRACE:
+            self.violations.append(f"commanded {(now - commanded) / 1e6:.0f} ms ago")
+        elif fault is not None and now - since > LONGEST + GRACE:
+            self.violations.append(f"{fault} for {(now - since) / 1e6:.0f} ms")
+
+    def _happen(self) -> None:
+        events: tuple[Callable[[], object], ...] = (
+            lambda: self._misbehave(silent=True), lambda: self._misbehave(drop=0.5),
+            lambda: self._misbehave(corrupt=0.3), lambda: self._misbehave(delay=0.5, late=0.02),
+            lambda: self._misbehave(ft_silent=True), lambda: self.bench.ask("ft_restart"),
+            lambda: self.bench.ask("set", temperature=self.dice.choice((30, 90))),
+            lambda: self.bench.ask("set", torque_enable=0), lambda: self.bench.ask("alert", bits=32),
+            self.loop.guarded.disable, self._quiet, self._recover, self._recover, self._recover,
+        )  # fmt: skip
+        with suppress(DeviceError):
+            self.dice.choice(events)()
+
+    def _misbehave(self, **how: object) -> None:
+        self.bench.ask("misbehave", **{**CALM, **how})
+
+    def _quiet(self) -> None:
+        self.silent = self.dice.randrange(100)
+
+    def _recover(self) -> None:
+        self.bench.ask("misbehave", **CALM)
+        self.bench.ask("set", temperature=30, voltage=240)
+        guarded = self.loop.guarded
+        if guarded.fault is not None:
+            with suppress(DeviceError):
+                guarded.clear()
+        if guarded.fault is not None:
+            guarded.reboot()
+        if not guarded.enabled:
+            guarded.enable()
+
+
+def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, str]]:
+    """Run for --minutes with --seed."""
+    with RemoteBench(folder / "tty") as bench:
+        watched, end = Watched(bench, args.seed), time.monotonic() + 60.0 * args.minutes
+        while time.monotonic() < end:
+            watched.cycle()
+            watched.look()
+        bench.ask("misbehave", **CALM)
+        with suppress(DeviceError):
+            watched.loop.device.close()
+    what = f"{args.minutes:g} min of random faults, seed {args.seed}: violations"
+    first = f": {watched.violations[0]}" if watched.violations else ""
+    told = f"{len(watched.violations)}{first}; {watched.faults} faults, torque in {watched.seen} cycles"
+    return [(what, "0", told)]

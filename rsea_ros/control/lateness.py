@@ -1,0 +1,68 @@
+"""What to make of commands that act later than they should: how much of the feedback still counts.
+
+Feedback is designed for a delay of one sample and has a delay margin of one more. Beyond that it is taken
+back with the lateness, at once, and comes back slowly: feedback that each command in turn switches on and off
+swings the bench up between the limits of the torque. Without feedback the command is feed-forward alone,
+which no lateness makes unstable.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+FULL, NONE = 0.7, 2.0
+"""Samples more than the one of the design up to which all feedback counts, and from which on none does."""
+MOST = 10
+"""Samples of one pause that count: several pauses are lateness that persists, one is not."""
+RETURN = 0.3
+"""s in which feedback comes back from none to all."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Lateness is a fault when a share of the commands of so many s was later than `late` samples."""
+
+    share: float = 0.5
+    time: float = 1.0
+    late: float = 1.0
+
+
+class Lateness:
+    """Follow how late commands are, in samples beyond that of the design. trust: part of feedback."""
+
+    def __init__(self, rate: float, tolerance: Tolerance | None = None) -> None:
+        """rate: Hz."""
+        self._gain = 1.0 / (RETURN * rate)
+        self.tolerance = tolerance or Tolerance()
+        self._window = max(1, round(self.tolerance.time * rate))
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin anew, with all feedback."""
+        self.trust, self.count = 1.0, 0
+        self._recent: deque[bool] = deque(maxlen=self._window)
+
+    def take(self, late: float, count: int = 1) -> float:
+        """Take in how late a command will act (samples); return the trust.
+
+        count: for how many samples it stands, of which a pause makes many; 0: another one replaces it.
+        """
+        for _ in range(min(count, MOST)):
+            self._count(late > self.tolerance.late)
+        if not count:
+            return self.trust
+        wanted = min(max((NONE - late) / (NONE - FULL), 0.0), 1.0)
+        self.trust = min(wanted, self.trust + self._gain)
+        return self.trust
+
+    def _count(self, late: bool) -> None:
+        if len(self._recent) == self._window:
+            self.count -= self._recent[0]
+        self._recent.append(late)
+        self.count += late
+
+    @property
+    def persists(self) -> bool:
+        """Whether so many commands were late that it is a fault."""
+        return self.count >= self.tolerance.share * self._window

@@ -1,0 +1,48 @@
+"""The even grid that measurements lie on, followed by its phase: how many periods lie between two of them."""
+
+from __future__ import annotations
+
+import math
+
+from rsea_ros.nodes._anchor import SECOND
+
+EARLY = 0.3
+"""Periods by which a measurement may come before its place. A cycle is late or in time, hardly early, so the
+rest of the period is for lateness: one late cycle and one in time are two periods, never three."""
+PULL_EARLY, PULL_LATE = 0.3, 0.02
+"""Part of its error by which the grid follows a measurement that is early, and one that is late."""
+JUMP = SECOND
+"""ns; stamps that jump so far, either way, are of another run or of a clock that was set."""
+
+
+class Grid:
+    """Places on a grid. period: ns."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._at: float | None = None
+
+    def forget(self) -> None:
+        """Let the next measurement be the first."""
+        self._at = None
+
+    def jumps(self, stamp: int) -> bool:
+        """Tell whether a stamp (ns) is of another run than those before."""
+        return self._at is not None and abs(stamp - self._at) > JUMP
+
+    def place(self, stamp: int) -> int:
+        """Return how many periods a stamp (ns) lies behind the one before; 0 for one in the same period.
+
+        The first is one period behind nothing.
+        """
+        if self._at is None:
+            self._at = float(stamp)
+            return 1
+        behind = (stamp - self._at) / self._period
+        periods = math.floor(behind + EARLY)
+        if periods <= 0:
+            return 0
+        error = behind - periods
+        pull = PULL_EARLY if error < 0.0 else PULL_LATE
+        self._at += (periods + pull * error) * self._period
+        return periods

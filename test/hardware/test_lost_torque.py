@@ -1,0 +1,125 @@
+"""A motor that loses its torque, its host or its supervisor, on the wire."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware import supervisor
+from rsea_ros.hardware.supervised import SupervisorLost
+from test.hardware.conftest import Loop, well_behaved
+
+SECOND = 280
+"""Cycles."""
+
+
+@pytest.mark.parametrize(
+    ("loop", "register"),
+    [(54024, "torque_enable"), (54024, "mode"), (54025, "torque_enable"), (54025, "watchdog")],
+    indirect=["loop"],
+)
+def test_registers_that_the_torque_hangs_on_are_read_once_a_second(loop, register):
+    loop.bench.ask("set", **{register: 3 if register == "mode" else 0})
+    loop.until_fault(10.0, most=2 * SECOND)
+    assert loop.guarded.fault.cause == "motor_state"
+    assert loop.bench.torque()[0] == 0
+    if register != "mode":
+        loop.guarded.clear()
+        loop.cycles(3, 10.0)
+        assert loop.guarded.fault is None and loop.bench.torque()[1]
+
+
+def test_a_motor_away_when_its_fault_is_cleared_is_there_the_next_time(loop):
+    """An emergency stop: the port was opened again, the motor not set up, and it was 'not open' for ever."""
+    loop.bench.ask("misbehave", silent=True)
+    loop.until_fault(10.0)
+    loop.bench.ask("vanish")
+    loop.cycles(2, 10.0)
+    loop.bench.ask("appear")
+    for _ in range(2):
+        with pytest.raises(DeviceError):
+            loop.guarded.clear()
+    loop.bench.ask("misbehave", silent=False)
+    loop.guarded.clear()
+    assert loop.cycles(3, 10.0) == [10.0] * 3
+
+
+def test_a_dead_supervisor_is_a_fault_and_clear_fault_starts_another(loop):
+    process = loop.device._motor._supervisor._end._process
+    process.kill()
+    process.wait()
+    loop.until_fault(10.0)
+    assert loop.guarded.fault.cause == "supervisorlost"
+    loop.guarded.clear()
+    loop.cycles(40, 10.0)
+    assert loop.guarded.fault is None and loop.device._motor._supervisor.alive()
+
+
+@pytest.fixture
+def service(tmp_path):
+    """A supervisor that runs apart, as its unit file starts it; its socket."""
+    path = tmp_path / "supervisor"
+    words = [sys.executable, supervisor.__file__, "--listen", path]
+    process = subprocess.Popen(words, start_new_session=True)
+    while not path.exists():
+        time.sleep(0.01)
+    yield path
+    process.kill()
+    process.wait()
+
+
+DRIVER = """
+import sys
+sys.path.insert(0, "test/hardware")
+from conftest import Loop
+class Bench:
+    port, ft_port, page_port = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+loop = Loop(Bench, supervisor=sys.argv[4])
+loop.guarded.enable()
+while True:
+    loop.cycle(10.0)
+"""
+
+
+def test_a_service_zeroes_the_torque_when_a_whole_group_is_killed(benches, service):
+    """Driver, its children and its session at once, as a service manager or a container does it."""
+    bench, root = benches(), Path(__file__).resolve().parents[2]
+    well_behaved(bench)
+    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service]
+    driver = subprocess.Popen(list(map(str, words)), cwd=root, start_new_session=True)
+    try:
+        _until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
+    finally:
+        os.killpg(driver.pid, signal.SIGKILL)
+        driver.wait()
+    _until(lambda: bench.torque() == (0, False))
+
+
+def test_a_service_lets_the_port_go_and_its_death_is_a_fault(benches, service):
+    bench = benches()
+    well_behaved(bench)
+    for _ in range(2):
+        loop = Loop(bench, supervisor=str(service))
+        loop.guarded.enable()
+        loop.cycles(5, 10.0)
+        assert loop.guarded.fault is None
+        loop.close()
+        assert bench.torque() == (0, False)
+
+
+def test_a_service_that_is_not_there_is_refused(benches, tmp_path):
+    well_behaved(benches())
+    with pytest.raises(SupervisorLost, match="expected a supervisor that listens there"):
+        Loop(benches(), supervisor=str(tmp_path / "nobody"))
+
+
+def _until(condition):
+    deadline = time.monotonic() + 40.0
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.02)

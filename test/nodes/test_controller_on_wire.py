@@ -1,0 +1,93 @@
+"""Controller and driver together on the bench on a wire, with the defaults of config/nodes."""
+
+import signal
+import time
+
+import pytest
+
+from msg_adapters.ros import (
+    DiagnosticArray,
+    JointState,
+    Trigger,
+    WrenchStamped,
+    torque_command_message,
+    wrench_of,
+)
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+
+class Wire:
+    """Both nodes, and what they say."""
+
+    def __init__(self, bench, start, listener):
+        self.bench, self.listener = bench, listener
+        spaces = {"__ns": "/wired"}
+        self.driver = start("driver", remaps=spaces, **bench.parameters(), baud=4_000_000, autostart=True)
+        self.controller = start("controller", remaps=spaces)
+        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.wrenches = listener.hear(WrenchStamped, "/wired/ft", MEASUREMENT)
+        self.desired = listener.node.create_publisher(JointState, "/wired/desired_torque", COMMAND)
+
+    def status(self, name):
+        """The newest status of a node: level, message, values."""
+        mine = [m.status[0] for m in self.health if m.status[0].name == f"/wired/{name}"]
+        return mine[-1] if mine else None
+
+    def clear(self, name):
+        """Call clear_fault of a node."""
+        client = self.listener.node.create_client(Trigger, f"/wired/{name}/clear_fault")
+        self.listener.until(client.service_is_ready)
+        future = client.call_async(Trigger.Request())
+        self.listener.until(future.done)
+        return future.result()
+
+    def hold(self, torque, condition):
+        """Ask for a torque until a condition holds; clear what a machine that stands still has latched."""
+        looked = time.monotonic()
+
+        def done():
+            nonlocal looked
+            self.desired.publish(torque_command_message(time.time_ns(), torque))
+            if time.monotonic() - looked > 2.0:
+                looked = time.monotonic()
+                for name in ("driver", "controller"):
+                    status = self.status(name)
+                    if status is not None and status.level == b"\x02":
+                        self.clear(name)
+            return condition()
+
+        self.listener.until(done)
+
+
+@pytest.fixture(scope="module")
+def wire(tmp_path_factory, start, listener):
+    """The bench, the driver and the controller."""
+    with RemoteBench(tmp_path_factory.mktemp("wired") / "tty") as bench:
+        made = Wire(bench, start, listener)
+        listener.until(lambda: made.status("driver") and made.status("controller") and made.wrenches)
+        yield made
+
+
+def test_the_controller_lives_on_the_drivers_measurements_and_reaches_the_torque(wire):
+    """It divided by zero at the first late cycle that one in time followed."""
+    wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
+    heard = len(wire.wrenches)
+    wire.hold(10.0, lambda: len(wire.wrenches) > heard + 1500)
+    assert wire.controller.running() and wire.driver.running()
+    wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
+
+
+def test_it_never_swings_up(wire):
+    assert max(abs(wrench_of(m)[1]) for m in wire.wrenches) < 20.0
+
+
+def test_the_end_of_the_controller_is_the_end_of_the_torque(wire, listener):
+    wire.controller.kill()
+    listener.until(lambda: wire.bench.torque()[0] == 0)
+    assert wire.driver.running()
+
+
+def test_the_hangup_of_a_terminal_ends_the_driver_at_zero(wire):
+    assert wire.driver.stop(signal.SIGHUP) == 0
+    assert wire.bench.torque() == (0, False)

@@ -1,0 +1,52 @@
+"""Parameters to limits: of every rig, and refused where the bench cannot tell."""
+
+import math
+
+import pytest
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._devices import limits_of
+
+DEFAULTS = {parameter.name: parameter.default for parameter in driver.TABLE}
+
+
+def limits(**values):
+    return limits_of(DEFAULTS | values)
+
+
+def test_the_default_slew_limit_limits_within_a_cycle():
+    """40 000 N m/s were 142 N m a cycle at 280 Hz."""
+    assert limits().slew / DEFAULTS["rate"] < DEFAULTS["torque_limit"]
+    assert limits().soft_start / DEFAULTS["rate"] < 2.0
+
+
+def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
+    clamped, free = limits(), limits(rig="paper_moving_output", deflection_limit=0.05)
+    assert (clamped.deflection, clamped.ft) == (0.0873, 110.0)
+    assert math.isinf(free.deflection) and free.ft == pytest.approx(0.05 * 1530.456)
+
+
+def test_velocity_power_and_ft_are_limited_by_default_on_every_rig():
+    for rig in ("paper_high_impedance", "paper_moving_output", "prototype_knee"):
+        found = limits(rig=rig)
+        assert math.isfinite(found.velocity + found.power + found.ft + found.effort)
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"rig": "bare_drive"}, "deflection_limit = 0.0873 cannot be applied to rig bare_drive"),
+        ({"rig": "bare_drive", "deflection_limit": 0.0}, "ft_limit = 110 cannot be applied"),
+        ({"rig": "paper_moving_output", "device": "dynamixel_netft", "ft_host": ""},
+         "deflection_limit = 0.0873 cannot be applied to rig paper_moving_output"),
+    ],
+)  # fmt: skip
+def test_a_limit_that_cannot_be_applied_is_refused(values, told):
+    with pytest.raises(ParameterError, match=told):
+        limits(**values)
+
+
+def test_without_these_limits_a_bare_drive_has_the_others():
+    found = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
+    assert found.position == 0.5 and math.isinf(found.ft) and math.isfinite(found.velocity)

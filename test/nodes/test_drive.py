@@ -1,0 +1,175 @@
+"""The driver's cycle on clocks that the test turns: no torque by accident, whatever happens to it."""
+
+import random
+
+import pytest
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.nodes._anchor import SECOND
+from test.nodes.monitor import World
+
+HOUR = 3600 * SECOND
+
+
+@pytest.fixture
+def world():
+    """An active driver that makes 10 N m."""
+    made = World()
+    made.activate()
+    assert made.cycles(20, 10.0)[-1] == 10.0
+    return made
+
+
+@pytest.mark.parametrize("step", [-HOUR, HOUR, SECOND // 10])
+def test_a_clock_that_is_set_under_torque_is_a_fault_and_nothing_holds(world, step):
+    """The publisher dies with it, as it may: the motor held 10 N m for as long as the step was."""
+    world.off += step
+    assert world.cycles(5) == [0.0] * 5
+    assert str(world.guarded.fault) == f"clock_step: the system clock was set by {step / SECOND:+.3f} s"
+    assert world.anchor.steps == 1 and world.anchor.shift == pytest.approx(step, abs=SECOND // 100)
+    assert not world.monitor.violations
+
+
+@pytest.mark.parametrize("step", [-HOUR, HOUR])
+def test_after_a_step_torque_comes_back_by_clear_fault_alone(world, step):
+    world.off += step
+    world.cycles(5, 10.0)
+    with world.drive.deaf():
+        world.guarded.clear()
+    assert world.cycles(20, 10.0)[-1] == 10.0
+    assert world.guarded.fault is None and not world.monitor.violations
+
+
+@pytest.mark.parametrize("step", [-HOUR, HOUR])
+def test_a_step_without_torque_is_counted_and_no_fault(step):
+    world = World()
+    world.activate()
+    world.cycles(5)
+    world.off += step
+    world.cycles(2)
+    assert world.guarded.fault is None and world.anchor.values()["clock_steps"] == 1
+    assert world.cycles(20, 10.0)[-1] == 10.0
+
+
+def test_a_trimmed_clock_is_followed_without_a_step(world):
+    for _ in range(3000):
+        world.off += 1786  # 500 ppm
+        world.cycle(10.0)
+    assert world.anchor.steps == 0 and world.guarded.fault is None and world.commands.off == 0
+    assert abs(world.anchor.now() - world.wall()) < SECOND // 1000
+
+
+@pytest.mark.parametrize("ahead", [0.0, 0.1])
+def test_a_publisher_that_dies_leaves_no_torque(world, ahead):
+    world.send(10.0, ahead)
+    world.cycles(round(280 * (ahead + 0.08)))
+    assert world.torques[-1] == 0.0 and world.guarded.fault.cause == "command_timeout"
+    assert not world.monitor.violations
+
+
+def test_clear_fault_under_a_stream_lets_nothing_old_act(world):
+    """What arrived while it worked is dropped, and the first command after it begins softly."""
+    world.motor.reading = {"temperature": 90.0}
+    world.cycles(3, 60.0)
+    world.motor.reading = {}
+    world.motor.during = lambda: world.cycles(30, 60.0)
+    with world.drive.deaf():
+        world.guarded.clear()
+    assert world.cycle() == 0.0
+    assert world.commands.dropped == 0 and world.cycle(60.0) == pytest.approx(500.0 / 280.0)
+    assert world.guarded.fault is None and not world.monitor.violations
+
+
+@pytest.mark.parametrize(
+    "still",
+    [
+        {"temperature": 90.0}, {"voltage": -1.0}, {"current": 1e9}, {"position": 1.0},
+        {"ft_trouble": "saturation"},
+    ],
+    ids=lambda value: next(iter(value)),
+)  # fmt: skip
+def test_clear_fault_asks_a_reading_first(still):
+    world = World(current=12.0)
+    world.activate()
+    world.motor.reading = still
+    world.cycles(3, 10.0)
+    cause = world.guarded.fault.cause
+    with pytest.raises(DeviceError, match="is still there"), world.drive.deaf():
+        world.guarded.clear()
+    assert world.guarded.fault.cause == cause and world.cycles(5, 10.0) == [0.0] * 5
+
+
+def test_clear_fault_without_a_fault_does_nothing(world):
+    world.motor.during = lambda: pytest.fail("the device was touched")
+    assert world.guarded.clear() is False
+    assert world.cycle(10.0) == 10.0
+
+
+def test_deactivated_during_a_reboot_the_torque_stays_off(world):
+    def deactivate():
+        world.cycles(3, 10.0)
+        world.guarded.disable()
+        world.monitor.active = False
+
+    world.motor.during = deactivate
+    with world.drive.deaf():
+        world.guarded.reboot()
+    assert not world.motor.on and world.cycles(10, 10.0) == [0.0] * 10
+    assert not world.monitor.violations
+
+
+def test_stop_ends_the_torque_until_it_is_cleared(world):
+    world.send(10.0, ahead=0.05)
+    world.drive.stop()
+    assert world.cycles(30, 10.0) == [0.0] * 30
+    assert world.guarded.fault.cause == "stopped"
+
+
+def test_a_halt_ends_the_torque_in_the_next_cycle(world):
+    world.guarded.guard.halted = True
+    assert world.cycles(3, 10.0) == [0.0] * 3
+
+
+def test_a_motor_that_has_lost_its_torque_is_a_fault(world):
+    world.motor.on = False
+    world.cycles(40, 10.0)
+    assert world.guarded.fault.cause == "effort" and world.motor.goal == 0.0
+
+
+SEEDS = range(6)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_random_faults_at_random_instants_break_no_rule(seed):
+    """Steps of the clock, silence, a motor that is away or hot, services, all at once."""
+    dice, world = random.Random(seed), World()
+    world.activate()
+    events = (
+        lambda: setattr(world, "off", world.off + dice.choice((-HOUR, HOUR, -SECOND // 5, SECOND // 50))),
+        lambda: setattr(world.motor, "away", not world.motor.away),
+        lambda: world.motor.reading.update(temperature=dice.choice((30.0, 30.0, 90.0))),
+        lambda: setattr(world.motor, "on", False),
+        lambda: (world.guarded.disable(), setattr(world.monitor, "active", False)),
+        lambda: world.activate(),
+        world.drive.stop,
+        lambda: _clear(world),
+        lambda: _clear(world),
+        lambda: setattr(world, "steady", world.steady + dice.randrange(SECOND // 2)),
+    )
+    silent = 0
+    for _ in range(4000):
+        if dice.random() < 0.01:
+            try:
+                dice.choice(events)()
+            except DeviceError:
+                world.motor.away = False
+        silent = dice.randrange(60) if dice.random() < 0.005 else max(0, silent - 1)
+        torque = None if silent else 40.0 * dice.uniform(-1.0, 1.0)
+        world.cycle(torque)
+    assert not world.monitor.violations, world.monitor.violations[:3]
+    assert any(world.torques), "it has driven at all"
+
+
+def _clear(world):
+    with world.drive.deaf():
+        world.guarded.clear()

@@ -1,0 +1,190 @@
+"""What the driver tells, whom it obeys, and what a clock that is set does to the real process."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from rclpy.qos import QoSProfile
+
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes._alarm import Alarm
+from rsea_ros.nodes._idle import anything_to_do
+from rsea_ros.nodes._publishers import Obeyed
+from rsea_ros.nodes._qos import COMMAND
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIM = """
+import sys, time
+from pathlib import Path
+true, step = time.time_ns, Path(sys.argv.pop(1))
+time.time_ns = lambda: true() + int(step.read_text())
+from rsea_ros.nodes.driver import main
+sys.exit(main())
+"""
+"""A driver whose system clock is set by a file."""
+
+
+class Shimmed:
+    """A driver process on a bench, and a publisher of commands."""
+
+    def __init__(self, bench, listener, folder):
+        self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
+        self.set_clock(0)
+        values = {**bench.parameters(), "baud": 4_000_000, "autostart": True, "joint": "left_knee"}
+        words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", SHIM, self.step, "--ros-args", *words, "-r", "__ns:=/honest"],
+            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.states = listener.hear(JointState, "/honest/joint_states", QoSProfile(depth=10))
+        self.commands = listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
+        self._clear = listener.node.create_client(Trigger, "/honest/driver/clear_fault")
+        listener.until(self._clear.service_is_ready)
+
+    def set_clock(self, by):
+        """Set the process's system clock by so many seconds against the true one."""
+        self.off = by * 10**9
+        aside = self.step.with_suffix(".new")
+        aside.write_text(str(self.off))
+        aside.replace(self.step)
+
+    def status(self):
+        """The newest status."""
+        mine = [m.status[0] for m in self.health if m.status[0].name == "/honest/driver"]
+        return mine[-1] if mine else None
+
+    def value(self, key):
+        """A value of it."""
+        status = self.status()
+        return {p.key: p.value for p in status.values}.get(key, "") if status else ""
+
+    def told(self, text):
+        """Whether any status has said so in its summary."""
+        return any(text in m.status[0].message for m in self.health if m.status[0].name == "/honest/driver")
+
+    def push(self, torque, condition, joint="left_knee"):
+        """Command a torque until a condition holds."""
+
+        def pushed():
+            stamp = time.time_ns() + self.off
+            self.commands.publish(torque_command_message(stamp, torque, joint))
+            return condition()
+
+        self.listener.until(pushed)
+
+    def drive(self):
+        """Command 10 N m until the motor has a torque; clear what a busy machine has latched."""
+        looked = time.monotonic()
+
+        def driving():
+            nonlocal looked
+            if time.monotonic() - looked > 1.5:
+                looked = time.monotonic()
+                self.clear()
+            return self.bench.torque()[0] != 0
+
+        self.push(10.0, driving)
+
+    def clear(self):
+        """Call clear_fault."""
+        future = self._clear.call_async(Trigger.Request())
+        self.listener.until(future.done)
+        return future.result()
+
+
+@pytest.fixture(scope="module")
+def driver(tmp_path_factory, listener):
+    """One for the tests of this module, in their order."""
+    folder = tmp_path_factory.mktemp("honest")
+    with RemoteBench(folder / "tty") as bench:
+        made = Shimmed(bench, listener, folder)
+        yield made
+        made.process.kill()
+        made.process.wait()
+
+
+@pytest.mark.parametrize("step", [-3600, 0])
+def test_a_system_clock_that_is_set_ends_the_torque_and_is_told(driver, step):
+    """An hour back, and forward again; nobody commands any more."""
+    driver.drive()
+    driver.set_clock(step)
+    driver.listener.until(lambda: driver.bench.torque()[0] == 0)
+    driver.listener.until(lambda: "clock_step" in driver.value("fault") or "timeout" in driver.value("fault"))
+    driver.listener.until(lambda: driver.value("clock_steps") == ("1" if step else "2"))
+    driver.drive()
+
+
+def test_a_default_subscription_hears_measurements(driver):
+    driver.listener.until(lambda: driver.states)
+    assert list(driver.states[-1].name) == ["left_knee"]
+
+
+def test_another_joint_is_refused_and_named(driver):
+    before = int(driver.value("refused_commands"))
+    driver.push(30.0, lambda: int(driver.value("refused_commands")) > before, joint="right_knee")
+    driver.listener.until(lambda: driver.told("commands refused"))
+    assert driver.status().hardware_id.startswith("H54-200-S500-R, ID 1 on ")
+
+
+def test_stamps_that_are_off_are_told(driver):
+    driver.off = 10 * 10**9
+    driver.health.clear()
+    driver.push(30.0, lambda: driver.told("commands with a stamp that is off"))
+    driver.off = 0
+    assert driver.value("furthest_stamp_s").startswith("+10.0")
+
+
+def test_clear_fault_without_a_fault_says_so(driver):
+    driver.clear()
+    answer = driver.clear()
+    assert answer.success and "there is no fault" in answer.message
+
+
+def test_of_two_publishers_the_first_is_obeyed_until_it_is_silent():
+    obeyed, second = Obeyed(), 10**9
+    assert obeyed.admit("a", 0) and not obeyed.admit("b", second // 10) and obeyed.admit("a", second // 5)
+    assert obeyed.ignored == 1
+    assert obeyed.admit("b", second) and not obeyed.admit("a", second + 1)
+
+
+def test_a_second_publisher_is_told(driver):
+    second = driver.listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
+
+    def both():
+        second.publish(torque_command_message(time.time_ns(), -30.0, "left_knee"))
+        return driver.told("commands of a second publisher ignored")
+
+    driver.push(5.0, both)
+    driver.listener.node.destroy_publisher(second)
+
+
+def test_a_signal_is_reacted_to_while_the_main_thread_waits(listener):
+    """95 ms passed until the wait was over and the handler ran."""
+    reacted = threading.Event()
+    before = signal.signal(signal.SIGHUP, lambda number, frame: None)
+    alarm = Alarm(reacted.set)
+    sender = threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGHUP))
+    late = threading.Timer(0.1, lambda: order.append(reacted.wait(20.0)))
+    order = []
+    try:
+        sender.start()
+        late.start()
+        while not order:
+            anything_to_do(listener.node, listener._executor, 0.5)
+        assert order == [True]
+    finally:
+        alarm.close()
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_simulated_time_is_refused(start):
+    process = start("driver", use_sim_time=True)
+    assert process.wait() == 2
+    assert "use_sim_time = true, expected false" in process.output[-1]
