@@ -162,7 +162,7 @@ def still(record):
         (lambda r: r.between(0.0, 3.0), "3 s of commands, expected 4 s or more"),
         (
             lambda r: Record({"command": r["command"]}, "", r.epoch_ns),
-            "every measured channel holds one value",
+            "no measurement beside the command, expected one",
         ),
         (backwards, "ft: 4480 samples, expected rising stamps"),
         (still, "every measured channel holds one value, expected motion"),

@@ -6,8 +6,8 @@ import errno
 import os
 import signal
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -71,6 +71,19 @@ def stop(name: str) -> None:
     signal.raise_signal(signal.SIGTERM)
 
 
+@dataclass(frozen=True)
+class Found:
+    """What the verbs ask of any result."""
+
+    rig: None = None
+    extended_rig: None = None
+    rates: tuple[()] = ()
+    verdict: str = ""
+    feasible: bool = True
+    faults: tuple[()] = ()
+    rig_option: str = ""
+
+
 @pytest.fixture(scope="module")
 def record() -> Record:
     u = excitation("white_noise", Settings(duration=2.0))
@@ -84,7 +97,7 @@ def folder(record, tmp_path, monkeypatch) -> Path:
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / "run.csv").write_text("t,u\n0,1\n1,2\n2,3\n")
     monkeypatch.chdir(tmp_path)
-    found = SimpleNamespace(rig=None, extended_rig=None, rates=(), verdict="", feasible=True)
+    found = Found()
     for module, names, value in (
         (identify, "identify", found), (diagnose, "diagnose", found), (study, "study", found),
         (judge, "judge", found), (judge, "least_stiffness", 1.0), (margins, "robust_stiffness", np.inf),

@@ -37,7 +37,7 @@ def sampled_at(rig: Rig, command: Channel, stamps: FloatArray) -> Record:
 
 
 def truth(rig: Rig, name: str, hz: FloatArray) -> ComplexArray:
-    output = outputs.distal(rig) if name == "ft" else outputs.position()
+    output = outputs.end_torque(rig, rig.ft_end) if name == "ft" else outputs.position()
     response = frequency_response(rig, output, hz)
     return response * 2j * np.pi * hz if name == "velocity" else response
 
