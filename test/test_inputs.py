@@ -161,11 +161,11 @@ def test_a_grid_over_a_pause_is_bounded_by_the_samples():
     check_extent(paused, 0.0, 100.0)
 
 
-def test_nothing_is_warned_of_while_a_still_command_is_identified():
+def test_a_still_command_is_refused_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        result = identify([record(command="constant")], load_rig("paper_high_impedance"))
-    assert result.responses == ()
+        with pytest.raises(IdentificationError, match="throughout, expected an excitation"):
+            identify([record(command="constant")], load_rig("paper_high_impedance"))
 
 
 @pytest.mark.parametrize(

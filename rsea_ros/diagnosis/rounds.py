@@ -23,6 +23,7 @@ from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, power, solve
@@ -78,6 +79,9 @@ class Round:
             finalists += self._hopeful(screened, finalists)
             models += self.at_work.fits.map(self._fit_all, finalists[len(models) :])
             better = [m for m in models if is_progress(m, self.present)]
+        if is_far(self.present) and all(is_far(m) for m in better):
+            models += self._ridden()
+            better = [m for m in models if is_progress(m, self.present)]
         if not better and len(self.present.causes) <= _BESIDE_A_PAIR and is_far(self.present):
             better = [m for m in self._pairs(finalists) if is_progress(m, self.present)]
         chosen, equals = choose(better, self.present.choose)
@@ -103,6 +107,20 @@ class Round:
         scores = [score_on(problem, self.cases, CHOOSE, simulated) for simulated in outputs]
         extra = len(theta) - self.present.parameters
         return any(compare(score, self.present.choose, extra).sure for score in scores)
+
+    def _ridden(self) -> list[Model]:
+        """Return models with an effect of the rotor's angle that rides on the measured angle.
+
+        A free simulation, a gear ratio away from the output, may settle in other detents. But the measured
+        angle knows what every other cause has done to the motion, so such a model counts only where it leaves
+        little: otherwise it bends to whatever else is missing.
+        """
+        present = self.on_pieces
+        riding = replace(present, problem=replace(present.problem, ride=True))
+        effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in self.present.causes]
+        screened = [screen(riding, e, self._starts[e.name]) for e in effects]
+        models = [self._fit_all(self._fit_pieces(h)) for h in screened if h is not None]
+        return [m for m in models if not is_far(m)]
 
     def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
         """Return models with two more effects, for where none helps alone: each of some with every other."""

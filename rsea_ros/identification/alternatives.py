@@ -16,7 +16,6 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
-from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
 from rsea_ros.identification.misfit import misfit_ratios, reweighted
@@ -54,14 +53,9 @@ class Alternative:
 def extended(
     present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
 ) -> tuple[Problem, FloatArray]:
-    """Return the present problem with one more effect whose parameters may move, and where it begins.
-
-    An effect of the rotor's angle rides on the measured angle: far from the truth a simulated one, a gear
-    ratio away from the output, sits in other detents.
-    """
+    """Return the present problem with one more effect whose parameters may move, and where it begins."""
     unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
-    rig, ride = with_effect(present.rig, effect.name, start), present.ride or ROTOR_ANGLE in effect.reads
-    problem = replace(present, rig=rig, unknowns=unknowns, ride=ride)
+    problem = replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
