@@ -23,7 +23,7 @@ FACTORS: Mapping[str, Mapping[str, float]] = {
         "rev/s": 2 * math.pi,
         "rpm": 2 * math.pi / 60,
     },
-    "torque": {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "N cm": 1e-2, "kN m": 1e3},
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3},
     "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},

@@ -13,8 +13,10 @@ _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamp
 """Faults that the diagnosis finds and masks itself."""
 
 
-def with_faults(record: Record, found: Findings) -> Record:
+def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
+
+    masks: what comes next finds and masks faulty samples itself, and tells of them.
 
     Raises IdentificationError where no channel is left that measures anything.
     """
@@ -25,5 +27,6 @@ def with_faults(record: Record, found: Findings) -> Record:
         raise IdentificationError(
             f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does"
         )
-    kept = (*record.faults, *(f for f in found.faults if f.kind not in _AGAIN and f not in record.faults))
+    again = _AGAIN if masks else ()
+    kept = (*record.faults, *(f for f in found.faults if f.kind not in again and f not in record.faults))
     return replace(record, channels=channels, faults=kept)

@@ -13,17 +13,18 @@ from rsea_ros.report.check_text import warnings
 from rsea_ros.signals import Record
 
 
-def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool) -> list[Record]:
+def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, masks: bool) -> list[Record]:
     """Return the records, each with the faults that the checks found; a dead channel is left out.
 
-    Prints a line for each warning unless quiet. Raises IdentificationError where nothing moves.
+    Prints a line for each warning unless quiet. masks: see with_faults.
+    Raises IdentificationError where nothing moves.
     """
     for record in records:
         require_motion(record)
     found = [check_record(record, rig, axis) for record in records]
     if not quiet:
         print_warnings(found, rig)
-    return [with_faults(r, f) for r, f in zip(records, found, strict=True)]
+    return [with_faults(r, f, masks=masks) for r, f in zip(records, found, strict=True)]
 
 
 def print_warnings(found: Sequence[Findings], rig: Rig) -> None:

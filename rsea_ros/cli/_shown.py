@@ -41,7 +41,8 @@ def shown() -> Iterator[None]:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
-    sys.stdout = Shown(before)
+    if before is not None:  # closed by whoever started this process
+        sys.stdout = Shown(before)
     try:
         yield
     finally:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
+from collections.abc import Sequence
 from dataclasses import replace
 
 from msg_adapters.topics import AXES, ROLES, TopicMap
@@ -36,6 +38,15 @@ def topic_map(args: argparse.Namespace) -> TopicMap:
         if not name.isprintable():
             raise ParameterError(f"{name!r}: holds what cannot be printed, expected a name of ROS")
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
+
+
+def each_once(bags: Sequence[str]) -> Sequence[str]:
+    """Return bags. Raises ParameterError for one that is given twice: its samples would count twice."""
+    places = [os.path.realpath(bag) for bag in bags]
+    for bag, place in zip(bags, places, strict=True):
+        if places.count(place) > 1:
+            raise ParameterError(f"{bag}: given twice, expected each bag once")
+    return bags
 
 
 def add_window_options(parser: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+from rsea_ros.cli._numbers import seed
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
     add("--torque-constant", type=float, default=6.826, help="N m at the gear output per A")
     add("--return-delay", type=int, default=0, help="pause before an answer, unit 2 µs, 0 to 254")
-    add("--seed", type=int, default=0, help="of the sensors' noise and of the misbehaviour")
+    add("--seed", type=seed, default=0, help="of the sensors' noise and of the misbehaviour")
     add("--requests", action="store_true", help="take requests to misbehave on stdin, a JSON object a line")
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
+from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError, RseaError
@@ -46,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wire", action="store_true", help="the plant behind real wires, and the driver")
     parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
-        "--seed", type=int, default=1, help="of true values, excitation and noise (default 1)"
+        "--seed", type=seed, default=1, help="of true values, excitation and noise (default 1)"
     )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
 

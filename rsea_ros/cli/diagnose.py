@@ -10,7 +10,7 @@ from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.signals import Record
@@ -58,11 +58,11 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        records = [cut(readable(bag, topics), args) for bag in args.bags]
+        records = [cut(readable(bag, topics), args) for bag in each_once(args.bags)]
         holdout = readable(args.holdout, topics) if args.holdout else None
         from rsea_ros.cli._checks import checked
 
-        raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json)
+        raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis_files import write_diagnosis

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from msg_adapters import read_record
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
+from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
@@ -62,10 +62,10 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
-        records = [cut(read_record([bag], topics=topics), args) for bag in args.bags]
+        records = [cut(read_record([bag], topics=topics), args) for bag in each_once(args.bags)]
         from rsea_ros.cli._checks import checked
 
-        records = checked(records, rig, topics.axis, quiet=args.json)
+        records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 
@@ -92,10 +92,10 @@ def _print(result: Identification, report: Path) -> None:
         console = Console(width=NARROWEST)
     following = next_command(result)
     print(f"{verdict_sentence(result)}{f'; next: {following}' if following else ''}")
+    for damage in result.faults:
+        print(f"data: {fault(damage)}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
     for sentence in (*found, *doubt_sentences(result), *result.statements, *result.notes):
         print(sentence)
-    for damage in result.faults:
-        print(f"data: {fault(damage)}")
     print(f"report: {report}")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
@@ -42,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=float, default=160.0, help="s, of each simulated test (default %(default)s)"
     )
     parser.add_argument(
-        "--seed", type=int, default=5, help="of benches, commands and noise (default %(default)s)"
+        "--seed", type=seed, default=5, help="of benches, commands and noise (default %(default)s)"
     )
     parser.add_argument(
         "--figures",

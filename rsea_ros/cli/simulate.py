@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import write_record
+from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.decimal_number import is_decimal
@@ -67,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--limit", type=float, default=100.0, help="N m, refused above (default %(default)s)")
     parser.add_argument(
-        "--seed", type=int, default=0, help="of command and sensor noise (default %(default)s)"
+        "--seed", type=seed, default=0, help="of command and sensor noise (default %(default)s)"
     )
     parser.add_argument("--no-noise", action="store_true", help="perfect sensors")
     add_topic_options(parser)

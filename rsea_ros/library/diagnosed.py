@@ -101,6 +101,6 @@ def diagnose(
     rig, records = rig_of(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
-    carrying = [checked(record, rig) for record in records]
+    carrying = [checked(record, rig, masks=True) for record in records]
     result = diagnose_records(carrying, rig, holdout, progress, settings=settings)
     return Diagnosed(result, records[0])

@@ -37,10 +37,15 @@ class Fit:
         return {p.name: p for p in self.result.parameters}
 
     def summary(self) -> str:
-        """Return the table of parameters and what the data cannot determine, as plain text."""
+        """Return the verdict, faults of the data, parameters, and what the data cannot determine."""
+        from rsea_ros.report.fault_words import fault
+        from rsea_ros.report.identification_words import doubt_sentences, verdict_sentence
         from rsea_ros.report.terminal import terminal_table
 
-        return "\n".join([plain(terminal_table(self.result)), *self.result.statements])
+        damage = [f"data: {fault(f)}" for f in self.result.faults]
+        beside = [*doubt_sentences(self.result), *self.result.statements]
+        table = plain(terminal_table(self.result))
+        return "\n".join([verdict_sentence(self.result), *damage, table, *beside])
 
     def to_frame(self) -> Any:
         """Return the parameters as a pandas DataFrame, one row each. Raises ParameterError without pandas."""
@@ -88,5 +93,5 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     from rsea_ros.library.inputs import checked, records_of, rig_of
 
     rig = rig_of(rig)
-    records = [checked(record, rig) for record in records_of(data)]
+    records = [checked(record, rig, masks=False) for record in records_of(data)]
     return Fit(identify_records(records, rig, progress))

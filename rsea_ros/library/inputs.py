@@ -17,19 +17,21 @@ def records_of(data: Record | Sequence[Record]) -> list[Record]:
     if len(records) < len(items):
         kind = next(type(item).__name__ for item in items if not isinstance(item, Record))
         raise ParameterError(f"data: {kind}, expected a Record (Record.from_arrays, rsea.read_bag)")
+    if len({id(record) for record in records}) < len(records):
+        raise ParameterError("data: a record is given twice, expected each once")
     if not records:
         raise ParameterError("data: no record, expected one or more")
     return records
 
 
-def checked(record: Record, rig: Rig) -> Record:
+def checked(record: Record, rig: Rig, *, masks: bool) -> Record:
     """Return a record that carries what the checks find wrong with it into the result."""
     from rsea_ros.checks.carried import with_faults
     from rsea_ros.checks.check import check_record
     from rsea_ros.checks.usable import require_motion
 
     require_motion(record)
-    return with_faults(record, check_record(record, rig))
+    return with_faults(record, check_record(record, rig), masks=masks)
 
 
 def rig_of(rig: Rig | str) -> Rig:

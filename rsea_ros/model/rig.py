@@ -15,6 +15,8 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.train import TRAINS, Train
 
+SMALLEST, LARGEST = 1e-12, 1e12
+"""Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
 END_NAMES = ("housing_end", "spring_end")
 
 
@@ -155,11 +157,12 @@ class Rig:
     def with_effect(self, name: str, **parameters: float) -> Rig:
         """Return the rig with one more effect of the catalogue acting, parameters in SI (see its file).
 
-        Parameters that are left out have their typical size. Raises ParameterError for an unknown one.
+        Parameters that are left out have their typical size. Raises ParameterError for an unknown one, and
+        for a value out of its bounds.
         """
         effect = effect_named(name)
         setting = EffectSetting(name, {**effect.typical, **parameters})
-        effect.vector(setting.parameters)
+        effect.check(setting.parameters)
         return self.with_effects(*self.effects, setting)
 
     def free(self) -> tuple[str, ...]:
@@ -200,6 +203,9 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
+    if possible and math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+        sizes = f"a size between {SMALLEST:g} and {LARGEST:g} {unit}"
+        raise RigError(f"{where}: {name} = {value:g} {unit}, expected {sizes}", name)
     if not possible:
         bound = f">= {low:g}" if allowed else f"> {low:g}"
         raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}", name)

@@ -1,0 +1,79 @@
+"""What a stranger found by using the verbs: each a command that misled or broke."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import rsea_ros as rsea
+from msg_adapters import write_record
+from rsea_ros.cli._shown import shown
+from rsea_ros.cli.main import FAULT, main
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig_file import rig_path
+from rsea_ros.signals import Channel
+
+RIG = "paper_high_impedance"
+
+
+@pytest.fixture(scope="module")
+def record():
+    return rsea.simulate(RIG, 15.0 * np.random.default_rng(4).standard_normal(2000), 280.0, seed=4)
+
+
+def frozen(record):
+    y = record["ft"].y.copy()
+    y[600:1200] = y[600]
+    return record.with_channels(ft=Channel(record["ft"].t, y))
+
+
+def test_identify_tells_of_frozen_samples(record, tmp_path, capsys):
+    write_record(frozen(record), tmp_path / "bag.mcap")
+    main(["identify", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out"), "--json"])
+    faults = json.loads(capsys.readouterr().out)["data"]["faults"]
+    assert [f["channel"] for f in faults if f["kind"] == "frozen_samples"] == ["ft"]
+
+
+def test_a_fit_in_python_opens_with_its_verdict_and_the_faults(record):
+    summary = rsea.identify(frozen(record), RIG).summary()
+    assert summary.startswith("The model ")
+    assert "frozen samples in F/T torque" in summary
+
+
+def test_a_bag_counts_once(record, tmp_path, capsys):
+    bag = str(tmp_path / "bag.mcap")
+    write_record(record, bag)
+    for verb in ("identify", "diagnose"):
+        assert main([verb, bag, bag, "--out", str(tmp_path / "out")]) == 2
+        assert f"{bag}: given twice, expected each bag once" in capsys.readouterr().err
+    with pytest.raises(ParameterError, match="given twice"):
+        rsea.identify([record, record], RIG)
+
+
+def test_effects_in_python_keep_their_bounds():
+    with pytest.raises(ParameterError, match=r"gap = -1 rad, expected 0 to 0.1 rad"):
+        rsea.load_rig(RIG).with_effect("backlash", gap=-1.0)
+
+
+@pytest.mark.parametrize("value", ["1e-20", "1e308", "1e-300"])
+def test_values_of_no_machine_are_refused(value, tmp_path, capsys):
+    text = rig_path(RIG).read_text(encoding="utf-8")
+    (tmp_path / "rig.yaml").write_text(text.replace("value: 0.953,", f"value: {value},", 1))
+    assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2
+    said = capsys.readouterr().err
+    assert "rotor.reflected_inertia" in said and FAULT not in said
+
+
+def test_a_seed_below_zero_is_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        raise SystemExit(main(["simulate", RIG, "--seed", "-1", "--out", str(tmp_path / "bag")]))
+    assert ended.value.code == 2
+    assert "expected a whole number >= 0" in capsys.readouterr().err
+
+
+def test_a_closed_stdout_is_no_error(monkeypatch):
+    monkeypatch.setattr("sys.stdout", None)
+    with shown():
+        print("nobody hears this")  # noqa: T201
