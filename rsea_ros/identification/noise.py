@@ -78,8 +78,11 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _is_flat(power: FloatArray) -> bool:
-    """Tell whether the two halves of the top of the band have about the same power."""
-    lower, upper = (float(np.median(half)) for half in np.array_split(power[_top(power)], 2))
+    """Tell whether the two halves of the top of the band have about the same power; one line cannot tell."""
+    top = power[_top(power)]
+    if len(top) < 2:
+        return False
+    lower, upper = (float(np.median(half)) for half in np.array_split(top, 2))
     return max(lower, upper) <= _FLAT * max(min(lower, upper), _TINY)
 
 

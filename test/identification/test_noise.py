@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from benches import bench, recorded
@@ -9,6 +11,7 @@ from scipy.signal import lfilter
 
 from rsea_ros.identification.coloured import is_noise
 from rsea_ros.identification.identify import identify
+from rsea_ros.identification.noise import top_of_band
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.signals import Channel
@@ -93,3 +96,12 @@ def test_noise_that_agrees_with_another_sensor_is_no_noise():
 
     assert seen(other)
     assert not seen(torque + 0.1 * other)
+
+
+@pytest.mark.parametrize("size", [64, 80])
+def test_a_short_channel_does_not_tell_whether_its_noise_is_flat(size):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rms, flat = top_of_band(np.random.default_rng(0).normal(size=size))
+    assert 0.2 < rms < 5.0
+    assert not flat

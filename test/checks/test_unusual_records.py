@@ -1,0 +1,42 @@
+"""Records that are hardly ones: few samples, none, a command of next to nothing."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Record
+
+RIG = load_rig("paper_high_impedance")
+T = np.arange(2000) / 280.0
+
+
+def checked(command, size=len(T)):
+    noise = np.random.default_rng(0).normal(size=(2, len(T)))[:, :size]
+    channels = {"ft": Channel(T[:size], noise[0]), "position": Channel(T[:size], noise[1])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return check_record(Record({"command": Channel(T[: len(command)], command), **channels}), RIG)
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 3, 10, 64, 80])
+def test_few_samples_are_checked_without_a_warning(size):
+    assert {f.kind for f in checked(np.sin(T[:size]), size).findings} >= {"topics", "missing_topic"}
+
+
+def test_a_channel_without_a_sample_is_missing():
+    missing = {f.channel for f in checked(np.sin(T), 0).findings if f.kind == "missing_topic"}
+    assert missing == {"ft", "position", "velocity", "motor_torque"} & set(RIG.sensors)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [1e-300 * np.sin(T), np.where(T == T[-1], 1.0, 0.0), np.where(T == T[-1], 1e308, np.sin(T))],
+    ids=["of 1e-300", "of one sample", "of 1e308"],
+)
+def test_commands_of_next_to_nothing_and_of_too_much_have_a_light(command):
+    assert [f.light for f in checked(command).findings if f.kind == "excitation"] in (["red"], ["amber"])
