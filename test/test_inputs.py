@@ -91,6 +91,7 @@ REFUSALS = {
     "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
+    "nothing to compare": ("predict", {"stamps": "apart"}, "expected one channel"),
     "a still drive": (
         "identify", {"rig": "bare_drive", "dead": "all zero"}, "no sensor answers to the machine"
     ),

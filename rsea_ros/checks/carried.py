@@ -22,6 +22,8 @@ def with_faults(record: Record, found: Findings) -> Record:
     channels = {n: c for n, c in record.channels.items() if n not in dead}
     if not set(channels) - {"command", "reference"}:
         reasons = "; ".join(f"{f.channel}: {f.detail or f.kind}" for f in found.faults if f.channel in dead)
-        raise IdentificationError(f"{record.source}: no sensor answers to the machine ({reasons}), expected one")
+        raise IdentificationError(
+            f"{record.source}: no sensor answers to the machine ({reasons}), expected one"
+        )
     kept = (*record.faults, *(f for f in found.faults if f.kind not in _AGAIN and f not in record.faults))
     return replace(record, channels=channels, faults=kept)
