@@ -74,7 +74,7 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     v = segment_spectra(y, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
-    return np.asarray((power - shared) / (1.0 - 1.8 / max(2.0, len(v))))
+    return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
 def _is_flat(power: FloatArray) -> bool:
