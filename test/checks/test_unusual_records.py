@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rsea_ros.checks.check import check_record
+from rsea_ros.checks.linear import linear_of
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
@@ -45,3 +47,13 @@ COMMANDS = {
 def test_commands_of_next_to_nothing_and_of_too_much_have_a_light(name):
     command, light = COMMANDS[name]
     assert [f.light for f in checked(command).findings if f.kind == "excitation"] == [light]
+
+
+def test_a_sensor_of_too_few_samples_is_left_out_of_the_clocks():
+    t = np.arange(450) / 5.0
+    rng = np.random.default_rng(0)
+    channels = {"command": Channel(t, 5.0 * rng.normal(size=450)), "ft": Channel(t, rng.normal(size=450))}
+    record = Record({**channels, "velocity": Channel(t[:300:5], rng.normal(size=60))})
+    rig = load_rig("cycloidal")
+    shape = SimpleNamespace(values={}, delay={})
+    assert set(linear_of(record, {}, rig, shape).offset) == {"ft"}
