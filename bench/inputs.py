@@ -42,6 +42,7 @@ def main() -> int:
     try:
         if "matrix" in args.part:
             cases, said = matrix.bag_cases(args.seed, args.quick)
+            cases = [case for case in cases if matrix.samples(case) <= args.samples]
             broken += play("bags", matrix.works(cases, matrix.play_bag, "b"), args, folder, said)
             others = matrix.other_cases(args.seed, args.quick)
             broken += play("rigs and numbers", matrix.works(others, matrix.play_other, "r"), args, folder, "")
@@ -62,6 +63,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=2, help="children at a time (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of design and mutations (default %(default)s)")
     parser.add_argument("--count", type=int, default=6000, help="of mutated files (default %(default)s)")
+    parser.add_argument(
+        "--samples", type=float, default=1e9, metavar="N", help="bags of up to N samples a channel"
+    )
     parser.add_argument("--only", nargs="+", default=[], metavar="TEXT", help="lines that hold all of these")
     parser.add_argument("--log", type=Path, help="JSON lines: every case with its outcome")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="copy mutated files that broke a promise")

@@ -6,6 +6,7 @@ import copy
 import json
 import random
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import yaml
@@ -39,9 +40,10 @@ def damaged_yaml(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
         return damaged(rng, data, other)
     kind = rng.random()
     if kind < 0.6:
-        return yaml.safe_dump(
-            changed(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
-        ).encode()
+        with suppress(RecursionError):  # what was damaged before may be nested deeper than it can be written
+            return yaml.safe_dump(
+                changed(rng, document), sort_keys=False, allow_unicode=rng.random() < 0.5
+            ).encode()
     return damaged_text(rng, data, other) if kind < 0.85 else damaged(rng, data, other)
 
 
@@ -53,7 +55,8 @@ def damaged_json(rng: random.Random, data: bytes, other: bytes = b"") -> bytes:
         return damaged(rng, data, other)
     kind = rng.random()
     if kind < 0.6:
-        return json.dumps(changed(rng, document)).encode()
+        with suppress(RecursionError):
+            return json.dumps(changed(rng, document)).encode()
     if kind < 0.7:
         depth = rng.choice((10, 1000, 100_000))
         return b"[" * depth + b"]" * rng.choice((0, depth))

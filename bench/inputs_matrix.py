@@ -68,6 +68,11 @@ def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
     return cases, said
 
 
+def samples(case: Case) -> float:
+    """Return how many samples the longest channel of a case has."""
+    return float(case["rate"] * case["duration"] * max(1.0, case["states"]))
+
+
 def play_bag(case: Case, folder: Path) -> Outcome:
     """Make the bag of a case and run its verb on it."""
     bag, rig = bag_of(case, folder)

@@ -129,11 +129,9 @@ def run(seed: int, count: int, folder: Path, jobs: int, only: list[str]) -> Iter
             (inside / f"fault-{unfinished[-1]}").write_bytes((inside / "last").read_bytes())
             waiting.insert(0, (form, number, unfinished[-1]))
             continue
-        if not done:
-            yield (
-                f"{form.name} {number}",
-                Outcome("gate", f"batch ended with status {status} before its first file"),
-            )
+        if status or len(done) < BATCH:
+            where = f"a batch ended with status {status} after {len(done)} of {BATCH} files"
+            yield f"{form.name} {number}", Outcome("gate", where)
         for k, outcome in done:
             if outcome is not None:
                 yield f"{form.name} {number} {k} ({inside}/fault-{k})", outcome

@@ -11,7 +11,7 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -73,10 +73,11 @@ def call(arguments: list[str]) -> Outcome:
     from rsea_ros.cli.main import main
 
     warned: list[str] = []
+    os.environ["RSEA_TRACEBACK"] = "1"
 
     def note(message, category, filename, lineno, file=None, line=None):  # type: ignore[no-untyped-def]
         if issubclass(category, RuntimeWarning):
-            warned.append(f"{_short(filename)}:{lineno} {message}")
+            warned.append(f"{_at(traceback.extract_stack()) or f'{_short(filename)}:{lineno}'} {message}")
 
     with warnings.catch_warnings(), captured() as (out, err):
         warnings.simplefilter("always")
@@ -159,9 +160,13 @@ def _no_constant(name: str) -> float:
 def place(error: BaseException) -> str:
     """Return type, the innermost line of the project, and the text, for counting equal ones together."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "bench" not in f.filename]
+    return f"{type(error).__name__} at {_at(frames) or '?'}: {_pattern(str(error)[:80])}"
+
+
+def _at(frames: Sequence[traceback.FrameSummary]) -> str:
+    """Return the innermost line of the project, '' where none is in it."""
     inside = [f for f in frames if "rsea_ros" in f.filename or "msg_adapters" in f.filename]
-    at = f"{_short(inside[-1].filename)}:{inside[-1].lineno} {inside[-1].name}" if inside else "?"
-    return f"{type(error).__name__} at {at}: {_pattern(str(error)[:80])}"
+    return f"{_short(inside[-1].filename)}:{inside[-1].lineno} {inside[-1].name}" if inside else ""
 
 
 def _short(filename: str) -> str:
@@ -198,9 +203,10 @@ def collected(status: int, usage: resource.struct_rusage, answer: Path, late: bo
     """Return what a child that ended has left."""
     if late:
         return Outcome("time-out", "neither done nor at work")
-    if not answer.exists():
+    try:
+        outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
+    except (FileNotFoundError, ValueError):  # it ended before or while it answered
         return ended(status, usage)
-    outcome = Outcome(**json.loads(answer.read_text(encoding="utf-8")))
     outcome.seconds = usage.ru_utime + usage.ru_stime
     outcome.megabytes = usage.ru_maxrss / 1024
     return outcome

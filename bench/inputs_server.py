@@ -13,12 +13,16 @@ from pathlib import Path
 
 from inputs_outcome import Outcome, collected, forked
 
+from rsea_ros.effects.catalogue import catalogue
+
 WALL = 600.0
 """s, after which a child that does not even compute is ended."""
 MODULES = (
     "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
     "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
-    "rsea_ros.cli.check", "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
+    "rsea_ros.cli.check", "rsea_ros.cli._checks", "rsea_ros.checks.check", "rsea_ros.report.check_text",
+    "rsea_ros.report.check_json", "rsea_ros.report.control_json", "rsea_ros.report.design_json",
+    "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
     "rsea_ros.report.results", "rsea_ros.report.diagnosis_files", "rsea_ros.report.diagnosis_terminal",
     "rsea_ros.report.terminal", "rsea_ros.report.control_page", "rsea_ros.report.design_page",
     "rsea_ros.control.study", "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records",
@@ -30,13 +34,10 @@ Work = tuple[str, Callable[[Path], Outcome]]
 
 
 def warm() -> None:
-    """Import what the verbs import, so that no child pays for it; a verb that is missing is left out."""
+    """Import what the verbs import, and the effects, so that no child pays for it."""
     for name in MODULES:
-        try:
-            importlib.import_module(name)
-        except ModuleNotFoundError as error:
-            if error.name != name:
-                raise
+        importlib.import_module(name)
+    catalogue()
 
 
 def serve(work: Iterable[Work], folder: Path, jobs: int, wall: float = WALL) -> Iterator[tuple[str, Outcome]]:

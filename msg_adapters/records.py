@@ -11,9 +11,12 @@ import numpy as np
 from msg_adapters import encoding
 from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
+from rsea_ros.errors import BagError
 from rsea_ros.signals import FloatArray, IntArray, Record
 
 JOINT = "joint"
+LATEST = 2.0**31
+"""s since 1970, which the seconds of a header do not reach."""
 BATCH = 100_000
 """Messages of a topic that are held at a time, 10 MB of them."""
 
@@ -34,7 +37,7 @@ def write_records(
 
     Log times are the stamps, or the highest stamp so far where a stamp goes back, so that a reader finds
     the samples in the order in which they stand in the record.
-    Raises BagError where the bag cannot be written.
+    Raises BagError where the bag cannot be written, and for stamps before 1970 or after 2038.
     """
     series = [one for record, topics in records for one in _series(record, topics)]
     notes = [note for record, _ in records for note in record.notes]
@@ -83,12 +86,23 @@ def _series(record: Record, topics: TopicMap) -> Iterator[_Series]:
     for role, fields in FIELDS.items():
         there = [channel for channel in fields if channel in record and len(record[channel])]
         while there:
-            t = record[there[0]].t
+            first = there[0]
+            t = record[first].t
             together = [channel for channel in there if np.array_equal(record[channel].t, t)]
             there = [channel for channel in there if channel not in together]
-            stamps = record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
+            stamps = _stamps(record, first, t)
             values = {fields[channel]: record[channel].y for channel in together}
             yield _Series(topics, role, stamps, np.maximum.accumulate(stamps), values)
+
+
+def _stamps(record: Record, name: str, t: FloatArray) -> IntArray:
+    """Return stamps in ns since 1970. Raises BagError for those that no header can hold."""
+    since = 1e-9 * record.epoch_ns + t
+    for k in np.flatnonzero(~((since >= 0.0) & (since < LATEST)))[:1]:
+        raise BagError(
+            f"{record.source}: {name}: stamp {k} is {since[k]:.6g} s since 1970, expected 0 to {LATEST:.0f}"
+        )
+    return record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
 
 
 def _encoded(stamps: IntArray, values: Mapping[str, FloatArray], topics: TopicMap) -> list[bytes]:

@@ -50,3 +50,6 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Kinds of faults of the data: of the file, of the stamps, of the run (/diagnostics), of the values."""
+
+MASKED = frozenset({"nan", "outliers", "clipping", "frozen_samples"})
+"""Kinds of faults whose samples stay in the record and are masked."""

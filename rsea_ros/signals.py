@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -65,8 +66,9 @@ class Channel:
 
     @property
     def rate(self) -> float:
-        """Median sample rate, Hz."""
-        return float(1.0 / np.median(np.diff(self.t)))
+        """Median sample rate, Hz; NaN for a single sample, infinite where most stamps repeat."""
+        period = float(np.median(np.diff(self.t))) if len(self) > 1 else math.nan
+        return 1.0 / period if period else math.inf
 
     @property
     def is_still(self) -> bool:

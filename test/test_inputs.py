@@ -6,12 +6,13 @@ import json
 import random
 import sys
 import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rsea_ros.cli.main import main
+from rsea_ros.cli.main import main, verbs
 from rsea_ros.diagnosis.hints import Seen, starts_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
@@ -27,7 +28,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
 from inputs_bags import bag_of, record_of
 from inputs_cover import covering, pairs
+from inputs_matrix import BAG_VERBS
 from inputs_outcome import judge
+from inputs_server import MODULES
 
 BENCH = {
     "rig": "paper_high_impedance", "channels": ("ft", "position"), "sensors": "stated", "noise": True,
@@ -91,6 +94,7 @@ REFUSALS = {
     "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
+    "nothing to compare": ("predict", {"stamps": "apart"}, "expected one channel"),
     "a still drive": (
         "identify", {"rig": "bare_drive", "dead": "all zero"}, "no sensor answers to the machine"
     ),
@@ -194,3 +198,15 @@ def test_the_covering_design_holds_every_pair():
     covered = set().union(*(pairs(case, list(factors)) for case in cases))
     assert len(covered) == count == 3 * 2 + 3 * 2 + 3 * 4 + 2 * 2 + 2 * 4 + 2 * 4
     assert len(cases) < 3 * 2 * 2 * 4
+
+
+def test_the_gate_imports_modules_that_exist_and_every_verb_that_it_plays():
+    assert [name for name in MODULES if find_spec(name) is None] == []
+    played = {*BAG_VERBS, "simulate", "control", "design", "export", "import"}
+    stems = {verbs()[verb].stem for verb in played}
+    assert {f"rsea_ros.cli.{stem}" for stem in stems} <= set(MODULES)
+
+
+@pytest.mark.parametrize("command", ["white_noise", "chirp"])
+def test_the_gate_has_bags_of_few_samples(command):
+    assert len(record(rate=1.0, duration=5.0, command=command)["command"]) == 5

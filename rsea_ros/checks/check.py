@@ -20,6 +20,7 @@ from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
+from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
@@ -41,6 +42,7 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
     tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
     """
     with one_blas_thread(), np.errstate(all="ignore"):
+        record = bounded(record)
         checked = check(record, rig)
         found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
         found += [*order(record), *rates(record, rig)]
@@ -83,7 +85,7 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
             )
         ]
     found = noises(record, rig)
-    whole = {n for n, bad in checked.masked.items() if bad.mean() < _WHOLE}
+    whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
     compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
     readings = readings_of(compared, rig)
     silent = set(compared) - set(readings.channels if readings else ())

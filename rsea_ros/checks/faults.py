@@ -38,7 +38,8 @@ class Checked:
 
 
 def check(record: Record, rig: Rig) -> Checked:
-    """Find and mask the faults of a record; a sensor without a good sample is taken as not there."""
+    """Find and mask the faults of a record; a channel without a good sample is taken as not there."""
+    record = _without(record, {n for n, c in record.channels.items() if not len(c)})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
     masked, found = {}, {}
@@ -74,8 +75,9 @@ def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
         found = find(channel, name) & ~bad
         if kind in _WHILE_MOVING:
             found = while_others_moved(record, name, found, kind)
-        if found.mean() > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
-            faults.append(Fault(kind, name, float(found.mean())))
+        share = np.count_nonzero(found) / max(len(found), 1)
+        if share > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
+            faults.append(Fault(kind, name, share))
             bad |= found
     return bad, faults
 

@@ -90,7 +90,8 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
-    timed = tuple(n for n in TIMED if n in record)
+    measured = case_from(record, rig, masked).measured
+    timed = tuple(n for n in TIMED if n in measured)
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = _State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))

@@ -82,7 +82,7 @@ def _band(record: Record) -> tuple[float, float]:
     even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)
     frequency, power = signal.periodogram(even - even.mean(), command.rate)
     share = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    low, high = (float(frequency[int(np.searchsorted(share, q))]) for q in _BAND)
+    low, high = (float(frequency[min(np.searchsorted(share, q), len(share) - 1)]) for q in _BAND)
     return low, high
 
 

@@ -42,10 +42,11 @@ def check_diagnosable(record: Record) -> None:
 
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
-    if "command" not in record or not _constant(record["command"]) or not is_still(record):
+    command = record.channels.get("command")
+    if command is None or not len(command) or not _constant(command) or not is_still(record):
         return
     raise IdentificationError(
-        f"{record.source}: the command stays at {record['command'].y[0]:g} N m and nothing moves, "
+        f"{record.source}: the command stays at {command.y[0]:g} N m and nothing moves, "
         "expected a run in which the command excites the machine"
     )
 

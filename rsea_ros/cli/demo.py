@@ -23,7 +23,7 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.new_files import unused
-from rsea_ros.report.fault_words import fault
+from rsea_ros.report.fault_words import fault_lines
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
 RIG = "paper_high_impedance"
@@ -91,7 +91,7 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
         disturbances = [f for f in read_record(bag, strict=False).faults if f.kind in DISTURBANCES]
         if not disturbances:
             break
-        print(f"this machine was too busy ({'; '.join(map(fault, disturbances))}): {consequence}")
+        print(f"this machine was too busy ({'; '.join(fault_lines(disturbances))}): {consequence}")
     return bag
 
 

@@ -82,7 +82,7 @@ def _print(result: Identification, report: Path) -> None:
     """Print the verdict, the table, and a line for each thing to know beside it."""
     from rich.console import Console
 
-    from rsea_ros.report.fault_words import fault
+    from rsea_ros.report.fault_words import fault_lines
     from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
     from rsea_ros.report.statics_words import statics_sentences
     from rsea_ros.report.terminal import terminal_table
@@ -92,8 +92,8 @@ def _print(result: Identification, report: Path) -> None:
         console = Console(width=NARROWEST)
     following = next_command(result)
     print(f"{verdict_sentence(result)}{f'; next: {following}' if following else ''}")
-    for damage in result.faults:
-        print(f"data: {fault(damage)}")
+    for line in fault_lines(result.faults):
+        print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
     for sentence in (*found, *doubt_sentences(result), *result.statements, *result.notes):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
+from rsea_ros.fault_kinds import MASKED
 from rsea_ros.identification.problem import Problem
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
@@ -91,10 +92,13 @@ def coloured_noise(channels: Sequence[str]) -> tuple[str, ...]:
 
 
 def _data(faults: Sequence[Fault]) -> str:
-    if not faults:
-        return ""
-    return (
-        " The data have faults, wrong samples were masked: "
-        + ", ".join(f"{f.kind.replace('_', ' ')} in {f.channel}" for f in faults)
-        + "."
+    """Return which faults the data have, each kind once, and which samples of them are masked."""
+    channels: dict[str, list[str]] = {}
+    for f in faults:
+        channels.setdefault(f.kind, []).append(f.channel)
+    texts = {kind: f"{kind.replace('_', ' ')} in {listed(names)}" for kind, names in channels.items()}
+    left = "; ".join(text for kind, text in texts.items() if kind not in MASKED)
+    masked = "; ".join(text for kind, text in texts.items() if kind in MASKED)
+    return (f" The data have faults: {left}." if left else "") + (
+        f" Samples were masked: {masked}." if masked else ""
     )

@@ -59,9 +59,10 @@ class Confidence:
 
     @property
     def correlation(self) -> FloatArray:
-        """Return the correlation matrix."""
+        """Return the correlation matrix; a value without doubt is correlated with none."""
         sd = np.sqrt(np.diag(self.covariance))
-        result: FloatArray = self.covariance / np.outer(sd, sd)
+        scale = np.outer(sd, sd)
+        result: FloatArray = np.divide(self.covariance, scale, out=np.eye(len(sd)), where=scale > 0.0)
         return result
 
 

@@ -74,12 +74,15 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
     v = segment_spectra(y, _LONGEST, _SEGMENTS)
     power = np.mean(np.abs(v) ** 2, axis=0)
     shared = np.abs(np.mean(v * u.conj(), axis=0)) ** 2 / (np.mean(np.abs(u) ** 2, axis=0) + _TINY)
-    return np.asarray((power - shared) / (1.0 - 1.8 / max(2.0, len(v))))
+    return np.asarray(np.maximum(power - shared, 0.0) / (1.0 - 1.8 / max(2.0, len(v))))
 
 
 def _is_flat(power: FloatArray) -> bool:
-    """Tell whether the two halves of the top of the band have about the same power."""
-    lower, upper = (float(np.median(half)) for half in np.array_split(power[_top(power)], 2))
+    """Tell whether the two halves of the top of the band have about the same power; one line cannot tell."""
+    top = power[_top(power)]
+    if len(top) < 2:
+        return False
+    lower, upper = (float(np.median(half)) for half in np.array_split(top, 2))
     return max(lower, upper) <= _FLAT * max(min(lower, upper), _TINY)
 
 

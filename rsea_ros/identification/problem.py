@@ -172,8 +172,13 @@ def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
 
 
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
-    """Return (simulated - measured) / noise of the samples that count, channel after channel."""
-    return np.concatenate([((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels])
+    """Return (simulated - measured) / noise of the samples that count, channel after channel.
+
+    A simulation that runs away gives infinities, which a fit turns back from.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        parts = [((outputs[n] - case.measured[n]) / case.noise[n])[case.mask[n]] for n in channels]
+    return np.concatenate(parts)
 
 
 @dataclass(frozen=True)

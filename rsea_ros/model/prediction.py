@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
 from rsea_ros.model.record_phase import in_phase
@@ -50,17 +51,26 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
     """Simulate a rig on the commands of a record and hold it against every channel that was measured.
 
     A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
-    whose zero is unknown by its changes.
+    whose zero is unknown by its changes. Raises IdentificationError for a record with nothing to compare.
     """
     record = bounded(record)
     check_command(record)
+    record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):
         motion = motion_from(record)
         torque = inverse_torque(rig, motion)
         return {"motor_torque": _comparison(motion.t, motion.torque, torque, edges=True)}
     rig = in_phase(rig, record)
     compared = {n: _comparison(record[n].t, record[n].y, y) for n, y in simulate(rig, record).items()}
+    if not compared:
+        raise IdentificationError(f"{record.source}: nothing that {rig.name} measures{_why(record)}")
     return {n: _on_measured_zero(c) if rig.zero_unknown(n) else c for n, c in compared.items()}
+
+
+def _why(record: Record) -> str:
+    """Return which channels the reading left out, and why."""
+    reasons = "; ".join(f"{f.channel}: {f.detail}" for f in record.faults if f.share == 1.0 and f.detail)
+    return f" ({reasons}), expected one channel" if reasons else ", expected one channel"
 
 
 def _on_measured_zero(c: Comparison) -> Comparison:

@@ -14,7 +14,7 @@ from rsea_ros.report.diagnosis_figures import spectrum_figure, time_figure
 from rsea_ros.report.diagnosis_profile import profiles
 from rsea_ros.report.diagnosis_tables import channel_section, experiment_section
 from rsea_ros.report.diagnosis_where import where_figure
-from rsea_ros.report.fault_words import fault, faults
+from rsea_ros.report.fault_words import fault_lines, faults
 from rsea_ros.report.page import Block, bullets, key_numbers, page, paragraph, section
 from rsea_ros.report.palette import AFTER, BEFORE
 from rsea_ros.report.parameters import parameter_table
@@ -76,7 +76,7 @@ def _faults(d: Diagnosis) -> str:
         return section(
             "No fault was found in the data", paragraph("No sample is missing, frozen or clipped.")
         )
-    items = bullets([words.sentence(f"{fault(f)}.") for f in d.faults])
+    items = bullets([words.sentence(f"{line}.") for line in fault_lines(d.faults)])
     caption = "Found before any fit. Faulty samples are masked, never explained by physics."
     return section("Faults of the data", items, caption=caption)
 

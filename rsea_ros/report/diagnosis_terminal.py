@@ -11,7 +11,7 @@ from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import was_fitted
-from rsea_ros.report.fault_words import fault
+from rsea_ros.report.fault_words import fault_lines
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _WIDTH = 12
@@ -43,8 +43,8 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "not told", sentence
     if d.next_experiment is not None:
         yield "next run", _next(d.next_experiment)
-    for found in d.faults:
-        yield "data", fault(found)
+    for line in fault_lines(d.faults):
+        yield "data", line
 
 
 def _next(experiment: Experiment) -> str:

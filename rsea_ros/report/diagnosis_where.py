@@ -11,6 +11,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis_profile import Profile
 from rsea_ros.report.figure import Figure, Json, axis, label, layout, line
 from rsea_ros.report.palette import AFTER, BEFORE, NOISE, QUIET
+from rsea_ros.signals import FloatArray
 from rsea_ros.wording import listed
 
 _DEPENDS = 1.5
@@ -79,7 +80,7 @@ def _traces(profile: Profile, x: str, changed: bool, colour: str) -> list[Json]:
 def _labels(last: Profile, changed: bool, colour: str) -> list[Json]:
     """Return the names at the right end of the last panel."""
     end: Json = {"xref": "paper", "yref": "y"}
-    before, after = (max(_ABOVE, float(np.log10(v[-1]))) for v in (last.before, last.after))
+    before, after = (max(_ABOVE, float(_decades(v[-1:])[0])) for v in (last.before, last.after))
     names = [label("noise", 1.01, 0.0, QUIET, yanchor="top", **end)]
     names.append(label("<b>before</b>" if changed else "<b>residual</b>", 1.01, before, colour, **end))
     return [*names, label("<b>after</b>", 1.01, after, AFTER, yanchor="bottom", **end)] if changed else names
@@ -93,9 +94,15 @@ def _domain(index: int, count: int) -> tuple[float, float]:
 
 def _level_axis(profiles: Sequence[Profile]) -> Json:
     """Return the axis of all panels; 1, 2 and 5 of each decade stand as plain numbers."""
-    values = np.log10(np.concatenate([[0.6, 3.0], *([p.before, p.after] for p in profiles)], axis=None))
+    values = _decades(np.concatenate([[0.6, 3.0], *([p.before, p.after] for p in profiles)], axis=None))
     low, high = float(np.nanmin(values)) - _MARGIN, float(np.nanmax(values)) + _MARGIN
     marks = [m * 10.0**e for e in range(-2, 7) for m in (1, 2, 5) if low <= np.log10(m * 10.0**e) <= high]
     shown = [m for m in marks if f"{m:e}"[0] == "1"] if high - low > _MANY_DECADES else marks
     text = [f"{m:g}" for m in shown]
     return axis("times the noise", type="log", range=[low, high], tickvals=shown, ticktext=text)
+
+
+def _decades(levels: FloatArray) -> FloatArray:
+    """Return log10 of levels, NaN for zero (a sensor at rest), which has no place on a logarithmic axis."""
+    decades: FloatArray = np.log10(np.where(levels > 0.0, levels, np.nan))
+    return decades

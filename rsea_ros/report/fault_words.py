@@ -5,28 +5,52 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from rsea_ros.fault_kinds import MASKED
 from rsea_ros.report import words
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
 
-def fault(f: Fault) -> str:
-    """Return `outliers in F/T torque, 0.04 % of the samples`."""
+def fault(*alike: Fault) -> str:
+    """Return `outliers in F/T torque, 0.04 % of the samples`. alike: the same fault of several channels."""
+    f, names = alike[0], listed([words.channel(f.channel) for f in alike])
     if f.kind == "missing_topic":
-        return f"{words.channel(f.channel)} is missing"
+        return f"{names} {'are' if len(alike) > 1 else 'is'} missing"
     detail = f" ({f.detail})" if f.detail else ""
-    size = "" if f.size is None else f", {words.number(f.size, 3)} {words.unit(f.unit)}"
-    share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
-    return f"{_kind(f)} in {words.channel(f.channel)}{size}{share}{detail}"
+    return f"{_kind(f)} in {names}{_size(f)}{detail}"
+
+
+def fault_lines(items: Sequence[Fault]) -> list[str]:
+    """Return one line for the faults of a kind that are equally large in several channels."""
+    groups: dict[tuple[str, str, str], list[Fault]] = {}
+    for f in items:
+        groups.setdefault((f.kind, _size(f), f.detail), []).append(f)
+    return [fault(*alike) for alike in groups.values()]
 
 
 def faults(items: Sequence[Fault]) -> str:
-    """Return all faults in a short sentence."""
+    """Return all faults in a short sentence, those apart whose samples are masked."""
+    left, masked = (
+        _by_channel([f for f in items if (f.kind in MASKED) == is_masked]) for is_masked in (0, 1)
+    )
+    return " ".join(
+        f"{opening}: {text}."
+        for opening, text in (("Faults in the data", left), ("Faults in the data, masked", masked))
+        if text
+    )
+
+
+def _by_channel(items: Sequence[Fault]) -> str:
     kinds: dict[str, list[str]] = {}
     for f in items:
         kinds.setdefault(f.channel, []).append(_kind(f))
-    parts = [f"{listed(k)} in {words.channel(n)}" for n, k in kinds.items()]
-    return f"Faults in the data, masked: {'; '.join(parts)}."
+    return "; ".join(f"{listed(k)} in {words.channel(n)}" for n, k in kinds.items())
+
+
+def _size(f: Fault) -> str:
+    size = "" if f.size is None else f", {words.number(f.size, 3)} {words.unit(f.unit)}"
+    share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
+    return size + share
 
 
 def _kind(f: Fault) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.report import words
 from rsea_ros.report.bode import bode_figure
-from rsea_ros.report.fault_words import fault
+from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.overlay import Simulated, overlay_figure
@@ -131,5 +131,5 @@ def _untold(identification: Identification) -> str:
 
 def _footer(identification: Identification) -> list[str]:
     sources = f"Data: {', '.join(identification.sources)}"
-    damage = [words.sentence(f"{fault(f)}.") for f in identification.faults]
+    damage = [words.sentence(f"{line}.") for line in fault_lines(identification.faults)]
     return [sources, *damage, *identification.notes, "rsea identify. All values in SI."]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from benches import bench, recorded
@@ -9,9 +11,10 @@ from scipy.signal import lfilter
 
 from rsea_ros.identification.coloured import is_noise
 from rsea_ros.identification.identify import identify
+from rsea_ros.identification.noise import noise_floor, top_of_band
 from rsea_ros.identification.quantum import step_of
-from rsea_ros.model.rig import EffectSetting
-from rsea_ros.signals import Channel
+from rsea_ros.model.rig import EffectSetting, Sensor
+from rsea_ros.signals import Channel, Record
 
 RMS = {"ft": 0.1, "position": 4e-5}
 
@@ -93,3 +96,19 @@ def test_noise_that_agrees_with_another_sensor_is_no_noise():
 
     assert seen(other)
     assert not seen(torque + 0.1 * other)
+
+
+@pytest.mark.parametrize("size", [64, 80])
+def test_a_short_channel_does_not_tell_whether_its_noise_is_flat(size):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rms, flat = top_of_band(np.random.default_rng(0).normal(size=size))
+    assert 0.2 < rms < 5.0
+    assert not flat
+
+
+def test_a_channel_that_repeats_the_command_has_no_less_than_no_noise():
+    t = np.arange(600) / 280.0
+    command = Channel(t, 20.0 * np.sin(0.01 * t))
+    torque = Channel(t + 1.0 / 280.0, 3.0 * command.y)
+    assert noise_floor(Record({"command": command, "motor_torque": torque}), "motor_torque", Sensor()) >= 0.0

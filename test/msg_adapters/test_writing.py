@@ -229,3 +229,13 @@ def test_a_full_disk_is_one_error_and_loses_nothing_recorded(tmp_path, storage, 
 def test_a_directory_without_permission(tmp_path: Path):
     with pytest.raises(BagError, match="/proc/nothing"):
         BagWriter("/proc/nothing/bag").__enter__()
+
+
+@pytest.mark.parametrize(
+    ("first", "value"), [(-3.0, "-3"), (2.0**31, r"2.14748e\+09"), (np.nan, "nan"), (np.inf, "inf")]
+)
+def test_stamps_that_no_header_can_hold_are_refused_in_one_line(tmp_path, first, value):
+    stamped = Record({"ft": Channel(first + np.arange(4.0), np.zeros(4))}, source="run")
+    with pytest.raises(BagError, match=f"run: ft: stamp 0 is {value} s since 1970, expected 0 to 2147483648"):
+        write_record(stamped, tmp_path / "run.mcap")
+    assert list(tmp_path.iterdir()) == []

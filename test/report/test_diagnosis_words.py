@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,9 @@ from rsea_ros.diagnosis.result import Estimate, Misfit, Rejected
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
-from rsea_ros.report.diagnosis_profile import BINS, profiles
+from rsea_ros.report.diagnosis_profile import BINS, Profile, profiles
 from rsea_ros.report.diagnosis_terminal import terminal_lines
-from rsea_ros.report.diagnosis_where import finding
+from rsea_ros.report.diagnosis_where import finding, where_figure
 from rsea_ros.signals import Fault
 
 
@@ -109,3 +110,12 @@ def test_faulty_samples_count_for_nothing(diagnosed):
 def test_a_residual_alike_everywhere_is_said_to_be(diagnosed):
     found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
     assert finding(list(found.values())) == "The residual is alike at every load, speed or rotor angle"
+
+
+def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():
+    resting = np.array([0.0, 2.0, 0.0])
+    profile = Profile("time", "s", np.arange(4.0), resting, resting)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = where_figure([profile], changed=True)
+    assert np.isfinite(figure.layout["yaxis"]["range"]).all()

@@ -1,0 +1,59 @@
+"""Records that are hardly ones: few samples, none, a command of next to nothing."""
+
+from __future__ import annotations
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.checks.linear import linear_of
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Record
+
+RIG = load_rig("paper_high_impedance")
+T = np.arange(2000) / 280.0
+
+
+def checked(command, size=2000):
+    noise = np.random.default_rng(0).normal(size=(2, len(T)))[:, :size]
+    channels = {"ft": Channel(T[:size], noise[0]), "position": Channel(T[:size], noise[1])}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return check_record(Record({"command": Channel(T[: len(command)], command), **channels}), RIG)
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 3, 10, 64, 80])
+def test_few_samples_are_checked_without_a_warning(size):
+    assert {f.kind for f in checked(np.sin(T[:size]), size).findings} >= {"topics", "missing_topic"}
+
+
+def test_a_channel_without_a_sample_is_missing():
+    missing = {f.channel for f in checked(np.sin(T), 0).findings if f.kind == "missing_topic"}
+    assert missing == {"ft", "position", "velocity", "motor_torque"} & set(RIG.sensors)
+
+
+LAST = np.arange(len(T)) == len(T) - 1
+COMMANDS = {
+    "of 1e-300": (1e-300 * np.sin(T), "red"),
+    "of one sample": (np.where(LAST, 1.0, 0.0), "green"),
+    "with 1e308": (np.where(LAST, 1e308, np.sin(T)), "amber"),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_commands_of_next_to_nothing_and_of_too_much_have_a_light(name):
+    command, light = COMMANDS[name]
+    assert [f.light for f in checked(command).findings if f.kind == "excitation"] == [light]
+
+
+def test_a_sensor_of_too_few_samples_is_left_out_of_the_clocks():
+    t = np.arange(450) / 5.0
+    rng = np.random.default_rng(0)
+    channels = {"command": Channel(t, 5.0 * rng.normal(size=450)), "ft": Channel(t, rng.normal(size=450))}
+    record = Record({**channels, "velocity": Channel(t[:300:5], rng.normal(size=60))})
+    rig = load_rig("cycloidal")
+    shape = SimpleNamespace(values={}, delay={})
+    assert set(linear_of(record, {}, rig, shape).offset) == {"ft"}

@@ -1,0 +1,37 @@
+"""Faults of the data in words: what is the same in several channels once, and masked only what is masked."""
+
+from __future__ import annotations
+
+from rsea_ros.diagnosis.sentences import verdict_sentence
+from rsea_ros.report.fault_words import fault_lines, faults
+from rsea_ros.signals import Fault
+
+DISORDER = [
+    Fault("out_of_order", name, 0.05, "first at 0.4 s, sorted", 84, "samples")
+    for name in ("position", "velocity", "motor_torque")
+]
+NAN = Fault("nan", "ft", 0.01)
+
+
+def test_a_fault_of_a_topic_is_one_line_for_all_its_channels():
+    assert fault_lines([*DISORDER, NAN]) == [
+        "out of order in position, velocity and motor torque, 84.0 samples, 5.0 % of the samples "
+        "(first at 0.4 s, sorted)",
+        "NaN in F/T torque, 1.0 % of the samples",
+    ]
+
+
+def test_faults_of_other_size_stay_apart():
+    other = Fault("out_of_order", "ft", 0.05, "first at 0.4 s, sorted", 90, "samples")
+    assert len(fault_lines([*DISORDER, other])) == 2
+    missing = [Fault("missing_topic", name, 1.0) for name in ("velocity", "position")]
+    assert fault_lines(missing) == ["velocity and position are missing"]
+
+
+def test_only_what_is_masked_is_called_masked():
+    assert faults([NAN]) == "Faults in the data, masked: NaN in F/T torque."
+    assert "masked" not in faults(DISORDER)
+    sentence = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, DISORDER)
+    assert sentence.endswith(" The data have faults: out of order in position, velocity and motor_torque.")
+    both = verdict_sentence("unexplained", (), "ft", 3.0, 3.0, [*DISORDER, NAN])
+    assert both.endswith(" Samples were masked: nan in ft.")
