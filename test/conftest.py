@@ -34,8 +34,10 @@ def _take_domain() -> int:
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(_take_domain())
 
-# A background job of a shell ignores SIGINT, and so would every program that a test starts and interrupts.
+# A background job of a shell ignores SIGINT, one under nohup SIGHUP, and so would every program that a test
+# starts and interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 DEAREST = (
     "diagnosis/test_hidden_effects", "cli/test_bad_input", "model/test_pure_torque", "cli/test_demo",

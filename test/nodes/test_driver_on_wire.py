@@ -162,9 +162,11 @@ def test_a_shutdown_of_the_motor_ends_by_reboot(wire):
     wire.drive()
 
 
-def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire):
+def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire, listener):
+    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     wire.drive()
     wire.bench.ask("vanish")
+    wire.push(lambda: _value(health, "main", "fault") not in (None, "", "none"))  # the next cycle sees it
     answer = wire.trigger("clear_fault")
     assert not answer.success and "port" in answer.message
     wire.bench.ask("appear")
