@@ -11,7 +11,13 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
-from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
+from rsea_ros.identification.confidence import (
+    Confidence,
+    confidence_of,
+    interval,
+    torque_scale,
+    what_is_not_told,
+)
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -198,7 +204,7 @@ def _result(
         models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        statements=what_is_not_told(problem.unknowns, confidence),
+        statements=(*torque_scale(problem), *what_is_not_told(problem.unknowns, confidence)),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )
