@@ -18,6 +18,7 @@ from rsea_ros.identification.confidence import (
     torque_scale,
     what_is_not_told,
 )
+from rsea_ros.identification.even_stamps import Evened, evened
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -73,13 +74,25 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         solution, cases = fit(
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
+        steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
+        if misfits:
+            steady = evened(records, rig, solution)
+        if steady.scatter:
+            cases = tuple(case_from(record, rig) for record in steady.records)
+            solution, cases = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
+            misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
-        misfits = max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
-    return result
+    return replace(result, statements=(*steady.sentences, *result.statements))
+
+
+def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
+    """Tell whether a solution leaves more than the noise of its cases."""
+    outputs = solution.problem.outputs(solution.theta)
+    return max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
 
 
 def check_usable(record: Record) -> None:
