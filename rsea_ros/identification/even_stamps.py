@@ -23,6 +23,8 @@ SCATTER = 0.005
 """Of a period, RMS: what scatters less is taken as stamped right."""
 _FARTHEST = 0.45
 """Of a period: a stamp further off an even clock could belong to another sample."""
+_SURE = 4.0
+"""Standard deviations of a period, up to which it may be that of the command: one clock makes both."""
 _FALL = 0.8
 """Of the residual at the stamps: the even clock must leave less."""
 
@@ -60,15 +62,20 @@ def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     return Evened(tuple(result), scatter)
 
 
-def even_clock(t: FloatArray) -> FloatArray:
+def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
+    shared: period of another channel, s: taken where the stamps do not speak against it, for it is surer.
     Returns t itself where no even clock comes near to all of it, or where t is even already.
     """
     period = float(np.median(np.diff(t)))
     place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / period))])
-    even = np.polyval(np.polyfit(place, t, 1), place)
-    off = np.abs(t - even)
+    slope, first = np.polyfit(place, t, 1)
+    off = np.abs(t - (first + slope * place))
+    doubt = np.sqrt(np.mean(off**2)) / (np.std(place) * np.sqrt(len(place)))
+    if abs(slope - shared) < _SURE * doubt:
+        slope, first = shared, float(np.mean(t - shared * place))
+    even = first + slope * place
     if off.max() > _FARTHEST * period or np.sqrt(np.mean(off**2)) < SCATTER * period:
         return t
     return np.asarray(even)
@@ -76,7 +83,11 @@ def even_clock(t: FloatArray) -> FloatArray:
 
 def _on_even_clocks(record: Record) -> tuple[Record, dict[str, float]]:
     """Return a record with its sensors on even clocks, and the RMS scatter of those that changed, s."""
-    clocks = {n: even_clock(c.t) for n, c in record.channels.items() if n not in ("command", "reference")}
+    command = record["command"].t
+    shared = float((command[-1] - command[0]) / np.round((command[-1] - command[0]) * record["command"].rate))
+    clocks = {
+        n: even_clock(c.t, shared) for n, c in record.channels.items() if n not in ("command", "reference")
+    }
     changed = {n: t for n, t in clocks.items() if t is not record[n].t}
     steady = record.with_channels(**{n: Channel(t, record[n].y) for n, t in changed.items()})
     return steady, {n: float(np.std(record[n].t - t)) for n, t in changed.items()}
