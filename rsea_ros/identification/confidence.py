@@ -36,6 +36,10 @@ _INVOLVED = 0.2
 _ALIKE = 0.8
 """Values share a factor when the one that moves least moves so much of the one that moves most."""
 _MEASURE = "Measure it apart, or excite it more."
+_TORQUE_SCALE = (
+    "Without the F/T sensor every torque is known only through the motor constant: "
+    "a constant g times as large scales inertia, damping and stiffness by g."
+)
 _REMEDY = {
     "spring.damping": "Excitation above the resonance, or F/T sensor and encoder together, would tell it.",
     "housing_end.damping": "A free swing of the housing would tell it.",
@@ -144,6 +148,17 @@ def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tup
         involved = [unknowns[index[k]] for k in np.flatnonzero(moved > _INVOLVED * moved.max())]
         sentences.append(_sentence(involved, moved[moved > _INVOLVED * moved.max()]))
     return tuple(sentences)
+
+
+def torque_scale(problem: Problem) -> tuple[str, ...]:
+    """Return that every torque rests on the motor constant, where no F/T sensor measures one and no fit asks.
+
+    The motor's torque is its current times that constant: it says nothing of it.
+    """
+    fitted = any(u.name.startswith("torque_constant_error.") for u in problem.unknowns)
+    if fitted or any("ft" in case.measured for case in problem.cases):
+        return ()
+    return (_TORQUE_SCALE,)
 
 
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:

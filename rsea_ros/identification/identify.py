@@ -11,7 +11,14 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
-from rsea_ros.identification.confidence import Confidence, confidence_of, interval, what_is_not_told
+from rsea_ros.identification.confidence import (
+    Confidence,
+    confidence_of,
+    interval,
+    torque_scale,
+    what_is_not_told,
+)
+from rsea_ros.identification.even_stamps import Evened, evened
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -67,13 +74,25 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         solution, cases = fit(
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
+        steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
+        if misfits:
+            steady = evened(records, rig, solution)
+        if steady.scatter:
+            cases = tuple(case_from(record, rig) for record in steady.records)
+            solution, cases = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
+            misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
-        misfits = max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
-    return result
+    return replace(result, statements=(*steady.sentences, *result.statements))
+
+
+def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
+    """Tell whether a solution leaves more than the noise of its cases."""
+    outputs = solution.problem.outputs(solution.theta)
+    return max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
 
 
 def check_usable(record: Record) -> None:
@@ -198,7 +217,7 @@ def _result(
         models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        statements=what_is_not_told(problem.unknowns, confidence),
+        statements=(*torque_scale(problem), *what_is_not_told(problem.unknowns, confidence)),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )

@@ -1,7 +1,8 @@
 """The noise of every channel after a fit, from what the model leaves of it.
 
 A floor never lies above the residual's white part, which no law of the bench can make; and where all of a
-residual passes for noise of the sensor (coloured.py) it lies as high as that.
+residual passes for noise of the sensor (coloured.py) it lies as high as that. Such noise is called coloured
+only where it lies above its white part by more than the doubt of that part, which is large in short records.
 """
 
 from __future__ import annotations
@@ -19,6 +20,13 @@ from rsea_ros.signals import FloatArray
 
 ABOVE = 1.04
 """RMS of a residual over the noise, above which it is asked whether all of it is noise."""
+SURE = 4.0
+"""Standard deviations of the white part, by which a residual must lie above it to be called coloured."""
+_WHITE_DOUBT = 1.5
+"""Relative standard deviation of the RMS of white noise read off the top of the band, times sqrt(samples).
+
+The median over a share of 0.36 of the lines has 1.25 / sqrt(0.18 n) of its power, half of that of its RMS.
+"""
 _BLOCK = 1.0
 """s. Coloured noise is independent from one such block to the next."""
 
@@ -40,8 +48,16 @@ def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float
     above = [n for n in channels if rms[n] > ABOVE * noise[n]]
     if not above or not all(is_noise(case, outputs, n, ratio) for n in above):
         return replace(case, noise=noise, coloured=frozenset())
-    noise |= {n: rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n)) for n in above}
-    return replace(case, noise=noise, coloured=frozenset(above))
+    coloured = frozenset(n for n in above if rms[n] > _surely_above(case, n) * noise[n])
+    for n in above:
+        noise[n] = rms[n] * (1.0 + 2.0 * _doubt(case, left[n], n) if n in coloured else 1.0)
+    return replace(case, noise=noise, coloured=coloured)
+
+
+def _surely_above(case: Case, channel: str) -> float:
+    """Return the RMS of a residual over its white part that chance does not reach, never below ABOVE."""
+    samples = np.count_nonzero(case.mask[channel])
+    return max(ABOVE, 1.0 + SURE * _WHITE_DOUBT / float(np.sqrt(samples)))
 
 
 def _doubt(case: Case, left: FloatArray, channel: str) -> float:

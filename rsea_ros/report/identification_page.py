@@ -13,7 +13,7 @@ from rsea_ros.report.identification_words import doubt_sentences, next_command, 
 from rsea_ros.report.overlay import Simulated, overlay_figure
 from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragraph, section
 from rsea_ros.report.palette import AFTER, MEASURED
-from rsea_ros.report.parameters import clock_sentence, parameter_table
+from rsea_ros.report.parameters import clock_sentence, parameter_table, told
 from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.statics_words import statics_sentences
 from rsea_ros.signals import UNITS
@@ -89,10 +89,10 @@ def _statics(identification: Identification) -> str:
 
 def _parameter_finding(identification: Identification) -> str:
     physical = [p for p in identification.parameters if not p.name.startswith("clock.")]
-    told = [p for p in physical if p.told_by_data >= 0.9]
-    if len(told) == len(physical):
+    settled = [p for p in physical if told(p) == "yes"]
+    if len(settled) == len(physical):
         return f"The data tell all {len(physical)} parameters"
-    return f"The data tell {len(told)} of {len(physical)} parameters; the others rest on the rig's priors"
+    return f"The data tell {len(settled)} of {len(physical)} parameters, the others not or only in part"
 
 
 def _shown(identification: Identification) -> list[Overlay]:

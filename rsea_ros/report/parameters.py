@@ -14,6 +14,8 @@ _WIDTH, _HEIGHT = 190.0, 26.0
 _TOLD = 0.9
 _UNTOLD = 0.5
 _CLOCK = "clock."
+_LOPSIDED = 1.5
+"""Ratio of the sides of an interval, from which its ends are shown instead of ± its half."""
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
@@ -41,22 +43,49 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     return f"Sensors read later than stamped by: {'; '.join(parts)}."
 
 
-def told(share: float) -> str:
-    """Return in words how much of what is known of a parameter the data brought."""
-    if share >= _TOLD:
-        return "yes"
-    return "in part" if share >= _UNTOLD else "no"
+def told(p: ParameterEstimate) -> str:
+    """Return in words how much of a parameter the data told: against what was known, and against its size.
+
+    None where the interval reaches as far as the value is large, or where the fit ended at a bound.
+    """
+    share, (low, high) = p.told_by_data, p.ci95
+    at_bound = p.value in p.ci95 and low < high
+    size = math.pi if p.name.endswith(".phase") else abs(p.value)
+    if share < _UNTOLD or at_bound or not max(high - p.value, p.value - low) < size:
+        return "no"
+    return "yes" if share >= _TOLD else "in part"
+
+
+def value_text(p: ParameterEstimate) -> tuple[str, str]:
+    """Return a value and its 95 % interval: ("1530.5", " ± 0.1"), or lopsided ("1391", " (1391 … 1531)")."""
+    value, half = words.with_interval(p.value, *p.ci95)
+    if not half:
+        return value, ""
+    low, high = p.ci95
+    sides = sorted((p.value - low, high - p.value))
+    if sides[1] <= _LOPSIDED * sides[0]:
+        return value, f" ± {half}"
+    step = 10.0 ** (math.floor(math.log10(sides[1])) - 2)
+    ends = (step * math.floor(low / step), step * math.ceil(high / step))
+    value, low_text, high_text = (_rounded(v, step) for v in (p.value, *ends))
+    return value, f" ({low_text} … {high_text})"
+
+
+def _rounded(value: float, step: float) -> str:
+    """Return a value to a decimal step, plain where that is short."""
+    decimals = -round(math.log10(step))
+    shown = f"{value:.{max(0, decimals)}f}" if decimals < 9 else f"{value:.2e}"
+    return shown.replace("-", "−")
 
 
 def _row(p: ParameterEstimate) -> str:
-    value, half = words.with_interval(p.value, *p.ci95)
-    doubt = f" ± {half}" if half else ""
+    value, doubt = value_text(p)
     change = f"{100.0 * (p.value / p.start - 1.0):+.1f} %".replace("-", "−") if p.start else "–"
     return (
         f"<tr><td>{escape(words.parameter(p.name))} {_symbol(p.name)}<small>{escape(p.name)}</small></td>"
         f"<td class='number'><b>{value}</b>{doubt}</td><td class='unit'>{escape(words.unit(p.unit))}</td>"
         f"<td>{_interval(p)}</td><td class='number'>{words.number(p.start, 4)}</td>"
-        f"<td class='number'>{change}</td><td>{told(p.told_by_data)}</td></tr>"
+        f"<td class='number'>{change}</td><td>{told(p)}</td></tr>"
     )
 
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report import words
-from rsea_ros.report.parameters import told
+from rsea_ros.report.parameters import told, value_text
 
 
 def terminal_table(identification: Identification, truth: Mapping[str, float] | None = None) -> Table:
@@ -29,12 +29,10 @@ def terminal_table(identification: Identification, truth: Mapping[str, float] | 
 
 
 def _cells(p: ParameterEstimate, truth: Mapping[str, float] | None) -> list[str]:
-    value, half = words.with_interval(p.value, *p.ci95)
-    shown = f"{value} ± {half}" if half else value
-    cells = [p.name, shown, words.unit(p.unit), words.number(p.start, 4)]
+    cells = [p.name, "".join(value_text(p)), words.unit(p.unit), words.number(p.start, 4)]
     if truth is not None:
         cells += _against(p, truth)
-    return [*cells, told(p.told_by_data)]
+    return [*cells, told(p)]
 
 
 def _against(p: ParameterEstimate, truth: Mapping[str, float]) -> list[str]:

@@ -89,8 +89,9 @@ def test_with_the_encoder_all_are_told():
 def test_the_encoder_alone_does_not_tell_the_dampings_apart():
     nominal, true = bench("paper_high_impedance", 3)
     result = identify([only(recorded(true, 3, 10.0), "position")], nominal)
-    (sentence,) = result.statements
+    scale, sentence = result.statements
     assert sentence.startswith("spring.damping")
+    assert scale.startswith("Without the F/T sensor every torque is known only through the motor constant")
     both = [rig["rotor.reflected_damping"] + rig["spring.damping"] for rig in (result.rig, true)]
     assert both[0] == pytest.approx(both[1], rel=0.01)
 

@@ -12,8 +12,11 @@ from scipy.signal import lfilter
 from rsea_ros.identification.coloured import is_noise
 from rsea_ros.identification.identify import identify
 from rsea_ros.identification.noise import noise_floor, top_of_band
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.quantum import step_of
 from rsea_ros.model.rig import EffectSetting, Sensor
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
 RMS = {"ft": 0.1, "position": 4e-5}
@@ -40,6 +43,15 @@ def test_coloured_noise_of_a_clean_bench_is_noise(memory, channels):
         assert 0.8 < result.times_noise[n] < 1.25
         assert result.noise_rms[n] == pytest.approx(RMS[n], rel=0.5)
     assert set(result.coloured) == set(channels)
+
+
+@pytest.mark.parametrize("duration", [8.0, 14.0, 20.0])
+def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
+    rig = load_rig("paper_high_impedance")
+    for seed in range(15):
+        case = case_from(recorded(rig, seed, duration), rig)
+        known = reestimate_noise(case, simulated((case,), rig, {})[0])
+        assert known.coloured == frozenset(), seed
 
 
 def test_a_broadband_misfit_is_not_taken_for_coloured_noise():

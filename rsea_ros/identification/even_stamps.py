@@ -1,0 +1,107 @@
+"""Sensors that measured on an even clock and were stamped with scatter, as a driver's process stamps them.
+
+Scattered stamps read the simulation at wrong instants. That is no mere noise: it makes quick motion look
+dear, and a fit finds too much damping (errors in variables; Fuller, Measurement Error Models, 1987). Whether
+the stamps or the even clock behind them are right the values tell: the simulation agrees with one of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.identification.problem import case_from
+from rsea_ros.identification.solver import Solution
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.wording import listed
+
+SCATTER = 0.005
+"""Of a period, RMS: what scatters less is taken as stamped right."""
+_FARTHEST = 0.45
+"""Of a period: a stamp further off an even clock could belong to another sample."""
+_SURE = 4.0
+"""Standard deviations of a period, up to which it may be that of the command: one clock makes both."""
+_FALL = 0.8
+"""Of the residual at the stamps: the even clock must leave less."""
+
+
+@dataclass(frozen=True)
+class Evened:
+    """Records on the even clock where it is right, and the RMS scatter of stamps there, s by channel."""
+
+    records: tuple[Record, ...]
+    scatter: Mapping[str, float]
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Return what was done, in words."""
+        if not self.scatter:
+            return ()
+        sizes = listed([f"{n} by {1e3 * s:.2g} ms RMS" for n, s in sorted(self.scatter.items())])
+        return (
+            f"Stamps scatter about an even clock: {sizes}. The values agree with the even clock, "
+            "so the fit uses it.",
+        )
+
+
+def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
+    """Return the records with an even clock for each channel whose residual under a solution prefers it."""
+    if is_inverse(rig):
+        return Evened(tuple(records), {})
+    even = [_on_even_clocks(record) for record in records]
+    scatter: dict[str, float] = {}
+    result = []
+    for record, (steady, sizes) in zip(records, even, strict=True):
+        chosen = _preferred(record, steady, rig, solution) & sizes.keys() if sizes else set()
+        scatter |= {n: max(sizes[n], scatter.get(n, 0.0)) for n in chosen}
+        result.append(record.with_channels(**{n: steady[n] for n in chosen}))
+    return Evened(tuple(result), scatter)
+
+
+def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
+    """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
+
+    shared: period of another channel, s: taken where the stamps do not speak against it, for it is surer.
+    Returns t itself where no even clock comes near to all of it, or where t is even already.
+    """
+    period = float(np.median(np.diff(t)))
+    place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / period))])
+    slope, first = np.polyfit(place, t, 1)
+    off = np.abs(t - (first + slope * place))
+    doubt = np.sqrt(np.mean(off**2)) / (np.std(place) * np.sqrt(len(place)))
+    if abs(slope - shared) < _SURE * doubt:
+        slope, first = shared, float(np.mean(t - shared * place))
+    even = first + slope * place
+    if off.max() > _FARTHEST * period or np.sqrt(np.mean(off**2)) < SCATTER * period:
+        return t
+    return np.asarray(even)
+
+
+def _on_even_clocks(record: Record) -> tuple[Record, dict[str, float]]:
+    """Return a record with its sensors on even clocks, and the RMS scatter of those that changed, s."""
+    command = record["command"].t
+    shared = float((command[-1] - command[0]) / np.round((command[-1] - command[0]) * record["command"].rate))
+    clocks = {
+        n: even_clock(c.t, shared) for n, c in record.channels.items() if n not in ("command", "reference")
+    }
+    changed = {n: t for n, t in clocks.items() if t is not record[n].t}
+    steady = record.with_channels(**{n: Channel(t, record[n].y) for n, t in changed.items()})
+    return steady, {n: float(np.std(record[n].t - t)) for n, t in changed.items()}
+
+
+def _preferred(record: Record, steady: Record, rig: Rig, solution: Solution) -> set[str]:
+    """Return the channels whose residual is less on the even clock."""
+    left = [_left(each, rig, solution) for each in (record, steady)]
+    return {n for n in left[0].keys() & left[1].keys() if left[1][n] < _FALL * left[0][n]}
+
+
+def _left(record: Record, rig: Rig, solution: Solution) -> dict[str, float]:
+    """Return by channel the RMS that a solution leaves of a record, means aside."""
+    case = case_from(record, rig)
+    (outputs,) = replace(solution.problem, cases=(case,)).outputs(solution.theta)
+    present = solution.problem.present(case)
+    return {n: float(np.std((outputs[n] - case.measured[n])[case.mask[n]])) for n in present}
