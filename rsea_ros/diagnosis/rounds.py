@@ -37,6 +37,8 @@ _BEHIND = (4.0, 1.1)
 """Of the best cost on pieces: so close the first effects must be to be fitted to everything, and the next."""
 _HOPE = {1: 0.98, 2: 0.9}
 """Of the present cost on pieces, far from the floor: above it, one or two effects cannot be progress."""
+_HALF = 0.5
+"""Of the present cost on pieces: what leaves more there does not come near the floor."""
 _MOVED = 0.02
 """Relative change of what is left of a channel, from which a fit is repeated with that as its weight."""
 _PAIRED = 3
@@ -119,7 +121,8 @@ class Round:
         riding = replace(present, problem=replace(present.problem, ride=True))
         effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in self.present.causes]
         screened = [screen(riding, e, self._starts[e.name]) for e in effects]
-        models = [self._fit_all(self._fit_pieces(h)) for h in screened if h is not None]
+        on_pieces = [self._fit_pieces(h) for h in screened if h is not None]
+        models = [self._fit_all(h) for h in on_pieces if h.cost < _HALF * present.cost]
         return [m for m in models if not is_far(m)]
 
     def _pairs(self, firsts: Sequence[Hypothesis]) -> list[Model]:
