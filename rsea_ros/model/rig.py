@@ -15,7 +15,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.train import TRAINS, Train
 
-SMALLEST, LARGEST = 1e-12, 1e12
+LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
 END_NAMES = ("housing_end", "spring_end")
 
@@ -203,8 +203,8 @@ def check_value(name: str, value: float, where: str = "rig") -> None:
     low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
     infinite_ok = FIELDS[name].default == math.inf
     possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
-    if possible and math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
-        sizes = f"a size between {SMALLEST:g} and {LARGEST:g} {unit}"
+    if possible and math.isfinite(value) and value != 0.0 and not LEAST_SIZE <= abs(value) <= GREATEST_SIZE:
+        sizes = f"a size between {LEAST_SIZE:g} and {GREATEST_SIZE:g} {unit}"
         raise RigError(f"{where}: {name} = {value:g} {unit}, expected {sizes}", name)
     if not possible:
         bound = f">= {low:g}" if allowed else f"> {low:g}"
