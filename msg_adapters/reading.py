@@ -93,7 +93,7 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             )
         if found.raw:
             filled.add(role)
-    needs = [("torque_command",), ("joint_states", "ft")] if strict else [ROLES]
+    needs = [("torque_command",), ("joint_states", "ft", "deflection")] if strict else [ROLES]
     for roles in needs:
         if not filled.intersection(roles):
             wanted = " or ".join(topics.topic(role) for role in roles)

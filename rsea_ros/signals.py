@@ -25,6 +25,7 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "position": "rad",
         "velocity": "rad/s",
         "ft": "N m",
+        "deflection": "rad",
         "reference": "rad",
     }
 )
@@ -36,6 +37,8 @@ position      gear output relative to the housing
 velocity      its rate
 ft            torque of the F/T sensor about the actuator axis, positive when the spring pushes
               the distal side forward
+deflection    angle of the spring by an encoder of its own, positive when the spring pushes the distal side
+              forward
 reference     position asked for by a controller that ran during the record
 """
 

@@ -18,7 +18,6 @@ from rsea_ros.identification.confidence import BLOCK
 from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import (
-    CLOCK_DOUBT,
     Unknown,
     clocks,
     start_vector,
@@ -28,7 +27,7 @@ from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 
-TIMED = ("ft", "position", "velocity")
+TIMED = ("ft", "deflection", "position", "velocity")
 """Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
 _ROUNDS = 6
@@ -211,7 +210,7 @@ def _rows(setting: _Setting, state: _State) -> _Rows:
     """Lay out the rows about a state."""
     record = _on_time(setting.record, setting.start, setting.timed, state)
     case = replace(setting.case, drive=_drive(record, setting.case, setting.rig))
-    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed))
+    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
     problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
     theta = np.concatenate([state.theta, np.zeros(len(wide))])
     residual = problem.residual(theta)
@@ -281,7 +280,8 @@ def _told(setting: _Setting, rows: _Rows) -> tuple[dict[str, float], dict[str, f
         return {}, {}
     keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
     columns = rows.matrix[:, keep]
-    doubt = np.array([*(_doubt(u) for u in values), *[CLOCK_DOUBT] * m, *[np.inf] * m])
+    clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
+    doubt = np.array([*(_doubt(u) for u in values), *clock_doubts, *[np.inf] * m])
     part = columns.T @ columns + np.diag(doubt**-2.0)
     scale = np.sqrt(np.diag(part) + 1e-300)
     after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale

@@ -19,7 +19,8 @@ class Port(IntEnum):
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
     SPRING: likewise, adds to s[SPRING_TORQUE]; and once more at the end of the step with s[COMMIT] = 1:
         then it may change its own states x, and what it adds is what the F/T sensor sees.
-    SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY] or s[CURRENT].
+    SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY], s[SPRING_ANGLE] or
+        s[CURRENT].
     STRUCTURE: not called; the effect changes the rig itself.
     """
 
@@ -76,4 +77,7 @@ MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to 
 J_SC = 35  # kg m^2, spring chassis where it turns with the gear output; 0 behind a gear that gives
 CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is not 0
 
-SIZE = 37
+PLAY = 37  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
+SPRING_ANGLE = 38  # rad, deflection of the spring as its own encoder sees it
+
+SIZE = 39

@@ -48,7 +48,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
-CHANNELS = ("ft", "position", "velocity", "motor_torque")
+CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1
@@ -181,7 +181,7 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),
-        *(clocks(channels) if not is_inverse(rig) else ()),
+        *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
 
 

@@ -95,10 +95,11 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     A sensor that holds one value throughout is dead or unplugged: it has no noise to weigh it by.
     Raises IdentificationError when none of them shows the motion.
     """
-    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
+    channels = [n for n in OUTPUTS if n in record and rig.measures(n)]
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
-            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+            f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
+            "expected one"
         )
     start = float(record["command"].t[0]) + SETTLE
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
@@ -109,8 +110,8 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
         f"{n} {'holds one value' if record[n].is_still else f'has {counts[n]} samples'}" for n in channels
     )
     raise IdentificationError(
-        f"{record.source}: {have}; expected ft, position or velocity with motion in it and {FEWEST} samples "
-        f"or more later than {SETTLE:g} s after the first command"
+        f"{record.source}: {have}; expected ft, deflection, position or velocity with motion in it and "
+        f"{FEWEST} samples or more later than {SETTLE:g} s after the first command"
     )
 
 

@@ -11,10 +11,16 @@ from rsea_ros.model.propagator import read_row, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray, Record
 
+_READ = {
+    "position": st.OUTPUT_ANGLE,
+    "velocity": st.OUTPUT_VELOCITY,
+    "deflection": st.DEFLECTION,
+}
+
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
     """Return the measured responses of a record's sensors to the command, of those that move."""
-    outputs = [n for n in ("ft", "position") if n in record and not (n == "ft" and rig.rigid_spring)]
+    outputs = [n for n in ("ft", "position", "deflection") if n in record and rig.measures(n)]
     if record["command"].is_still:
         return ()
     outputs = [n for n in outputs if not record[n].is_still]
@@ -40,4 +46,4 @@ def _output_row(rig: Rig, output: str) -> FloatArray:
         return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(
             rig, m, st.DEFLECTION_RATE
         )
-    return read_row(rig, m, {"position": st.OUTPUT_ANGLE, "velocity": st.OUTPUT_VELOCITY}[output])
+    return read_row(rig, m, _READ[output])

@@ -24,6 +24,9 @@ _DIFFERENCES = {
 }
 
 
+_SENSED = (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY, st.DEFLECTION, st.DEFLECTION_RATE)
+
+
 @dataclass(frozen=True)
 class StateSpace:
     """x' = A x + B tau with x = (q, q') and tau the torques at equations.PORTS."""
@@ -104,14 +107,15 @@ def start_map(rig: Rig) -> FloatArray:
 
 
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
-    """Return the rows of position, velocity and the linear torque at the F/T sensor."""
-    position, velocity = (read_row(rig, m, s) for s in (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY))
+    """Return the rows of position, velocity, the linear torque at the F/T sensor, and deflection."""
+    position, velocity, deflection, rate = (read_row(rig, m, s) for s in _SENSED)
     if rig.ft_end == "housing_end":
-        return np.array([position, velocity, _proximal_torque(rig, m)])
-    if rig.rigid_spring:
-        return np.array([position, velocity, np.zeros(2 * m.order)])
-    deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
-    return np.array([position, velocity, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate])
+        torque = _proximal_torque(rig, m)
+    elif rig.rigid_spring:
+        torque = np.zeros(2 * m.order)
+    else:
+        torque = rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
+    return np.array([position, velocity, torque, deflection])
 
 
 def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:

@@ -17,6 +17,8 @@ from rsea_ros.model.train import TRAINS, Train
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
+CLOCK_DOUBT = 1e-4
+"""s, one sigma. How far the stamps of a sensor may lie from its instants where the rig does not say."""
 END_NAMES = ("housing_end", "spring_end")
 
 
@@ -69,13 +71,15 @@ class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
 
     zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
-    so only changes of its values tell something. clock: s, how much later than its stamps it reads.
+    so only changes of its values tell something. clock: s, how much later than its stamps it reads;
+    clock_doubt: s, one sigma of that: a fit looks for the rest.
     """
 
     noise: float = 0.0
     quantum: float = 0.0
     zero_unknown: bool = False
     clock: float = 0.0
+    clock_doubt: float = CLOCK_DOUBT
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,10 @@ class Rig:
         """Return the unit of a value."""
         return unit_of(name)
 
+    def measures(self, channel: str) -> bool:
+        """Tell whether a bench of this rig can have a channel: without a spring nothing shows its torque."""
+        return not (self.rigid_spring and channel in ("ft", "deflection"))
+
     def zero_unknown(self, channel: str) -> bool:
         """Tell whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
@@ -184,6 +192,10 @@ class Rig:
     def clock(self, channel: str) -> float:
         """Return how much later than its stamps a channel is read, s."""
         return self.sensors[channel].clock if channel in self.sensors else 0.0
+
+    def clock_doubt(self, channel: str) -> float:
+        """Return one sigma of what a channel's clock may be off beside `clock`, s."""
+        return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
 
     def end_is_free(self, end: str) -> bool:
         """Tell whether an end can move (it has an inertia of its own)."""

@@ -15,6 +15,7 @@ from rsea_ros.errors import FieldError, RigError
 from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
+    CLOCK_DOUBT,
     END_NAMES,
     FIELDS,
     Controller,
@@ -105,7 +106,11 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
     body |= {"zero_unknown": True} if sensor.zero_unknown else {}
-    return body | ({"clock": {"value": sensor.clock, "unit": "s"}} if sensor.clock else {})
+    if sensor.clock or sensor.clock_doubt != CLOCK_DOUBT:
+        body["clock"] = {"value": sensor.clock, "unit": "s"}
+    if sensor.clock_doubt != CLOCK_DOUBT:
+        body["clock"]["doubt"] = sensor.clock_doubt
+    return body
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -153,8 +158,8 @@ def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     return low, high
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
+def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
+    """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
     only_keys(item, names(CLOCK), field)
@@ -162,7 +167,10 @@ def _clock(fields: Mapping[str, Any], name: str) -> float:
     value = number(item.get("value"), f"{field}.value", "s")
     if not abs(value) < _LATEST:
         raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
-    return value
+    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    if not 0.0 < doubt < _LATEST:
+        raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
+    return value, doubt
 
 
 def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
@@ -181,7 +189,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, clock)
+        sensors[name] = Sensor(noise, quantum, floating, *clock)
     return sensors
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.keys import NEEDED, Key, table
-from rsea_ros.model.rig import END_NAMES, FIELDS, Field
+from rsea_ros.model.rig import CLOCK_DOUBT, END_NAMES, FIELDS, Field
 from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
 
@@ -70,7 +70,11 @@ SENSOR = (
     Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
 )
-CLOCK = (Key("value", "number", NEEDED), Key("unit", "s", NEEDED))
+CLOCK = (
+    Key("value", "number", NEEDED),
+    Key("unit", "s", NEEDED),
+    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma: a fit looks for the rest"),
+)
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N m s/rad, >= 0", NEEDED),
@@ -92,6 +96,7 @@ def tables() -> str:
         parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
     parts.append(table("sensors.CHANNEL", SENSOR))
     parts.append("Channels and their units: " + ", ".join(f"`{n}` {u}" for n, u in UNITS.items()) + ".\n")
+    parts += [table("sensors.CHANNEL.clock", CLOCK)]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
     return "\n".join(parts)
 

@@ -47,6 +47,7 @@ class Machine:
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
         self.table[[st.POSITION, st.OUTPUT_ANGLE]], self.table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
         self.table[st.FT] = self.linear.outputs[2] @ self.x
+        self.table[st.PLAY], self.table[st.SPRING_ANGLE] = 0.0, self.linear.outputs[3] @ self.x
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
@@ -82,10 +83,10 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     machine.begin(drive.initial)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT]]
+    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
     run(machine, drive.command, out[1:], start=drive.origin, reference=drive.reference, ridden=ridden)
     out[0, 2] = out[1, 2]
-    channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
+    channels = [n for n in drive.at if rig.measures(n)]
     at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.command) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
@@ -95,7 +96,8 @@ def _kick(machine: Machine, channel: str) -> float:
     """Return what an impulse of the command does to a channel at once, its unit per N m s."""
     if channel == "motor_torque":
         return 0.0
-    at_once = machine.linear.outputs[("position", "velocity", "ft").index(channel)] @ machine.linear.g[:, 0]
+    row = ("position", "velocity", "ft", "deflection").index(channel)
+    at_once = machine.linear.outputs[row] @ machine.linear.g[:, 0]
     return float(at_once / machine.table[st.STEP])
 
 
@@ -176,7 +178,7 @@ def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True)
     """Return the record that a bench would have logged: measurements stamped at the end of each hold."""
     period = float(command.t[-1] - command.t[0]) / (len(command) - 1)
     stamps, blank = command.t + period, np.zeros(len(command))
-    names = [n for n in OUTPUTS if not (n == "ft" and rig.rigid_spring)]
+    names = [n for n in OUTPUTS if rig.measures(n) and (n != "deflection" or n in rig.sensors)]
     asked = Record({"command": command, **{n: Channel(stamps, blank) for n in names}}, source=rig.name)
     rng = np.random.default_rng([seed, _SENSORS])
     true = simulate(rig, asked)

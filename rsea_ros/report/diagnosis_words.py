@@ -13,7 +13,7 @@ from rsea_ros.report import words
 from rsea_ros.wording import listed
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
-_ORDER = ("ft", "position", "velocity", "motor_torque")
+_ORDER = ("ft", "deflection", "position", "velocity", "motor_torque")
 _RESPECTS = {
     "frequency_band": "frequency",
     "amplitude": "load",
