@@ -22,6 +22,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 
@@ -42,7 +43,7 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
     tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
     """
     with one_blas_thread(), np.errstate(all="ignore"):
-        record = bounded(record)
+        record = bounded(commanded(record, rig))
         checked = check(record, rig)
         found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
         found += [*order(record), *rates(record, rig)]

@@ -23,8 +23,8 @@ from rsea_ros.identification.unknowns import (
     start_vector,
     unknowns_of_rig,
 )
-from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import drive_of
 from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 
 TIMED = ("ft", "deflection", "position", "velocity")
@@ -172,12 +172,6 @@ class _Setting(NamedTuple):
     values: tuple[Unknown, ...]
 
 
-def _drive(record: Record, case: Case, rig: Rig) -> Drive:
-    """Return what drives the record, as case_from makes it."""
-    in_loop = rig.controller is not None and "reference" in record
-    return drive_from(record, closed_loop=in_loop, from_rest="position" in case.floating)
-
-
 def _on_time(record: Record, start: float, timed: Sequence[str], state: _State) -> Record:
     """Return the record with the stamps that its sensors would have had without offset and drift."""
     moved = {}
@@ -209,7 +203,7 @@ class _Rows:
 def _rows(setting: _Setting, state: _State) -> _Rows:
     """Lay out the rows about a state."""
     record = _on_time(setting.record, setting.start, setting.timed, state)
-    case = replace(setting.case, drive=_drive(record, setting.case, setting.rig))
+    case = replace(setting.case, drive=drive_of(record, setting.rig))
     wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
     problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
     theta = np.concatenate([state.theta, np.zeros(len(wide))])

@@ -16,6 +16,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.extent import bounded
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
@@ -38,8 +39,8 @@ def diagnose(
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
     rig = nominal_rig(rig)
-    records = [bounded(r) for r in records]
-    holdout = bounded(holdout) if holdout is not None else None
+    records = [bounded(commanded(r, rig)) for r in records]
+    holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
     checked = [check(r, rig) for r in records]
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None

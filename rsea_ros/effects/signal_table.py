@@ -38,7 +38,7 @@ DURATION = 2  # s, length of the record; a plant that runs on takes its `duratio
 COMMIT = 3  # 1 when the step is done: only then may a SPRING effect change its own states x
 COMMAND = 4  # N m, held over the step
 CURRENT = 5  # N m, motor torque that the measured current shows at the end of the step
-REFERENCE = 6  # rad, of a controller in the loop
+REFERENCE = 6  # rad, target of a controller in the loop
 K_S = 7  # N m/rad
 B_S = 8  # N m s/rad
 B_M = 9  # N m s/rad
@@ -79,5 +79,6 @@ CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is
 
 PLAY = 37  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
 SPRING_ANGLE = 38  # rad, deflection of the spring as its own encoder sees it
+TARGETED = 39  # 1 where positions command the bench: then REFERENCE is what its commands say
 
-SIZE = 39
+SIZE = 40

@@ -44,6 +44,7 @@ from rsea_ros.identification.unknowns import (
 )
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
@@ -62,6 +63,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
+    records = [commanded(record, rig) for record in records]
     for record in records:
         check_usable(record)
     records = [bounded(record) for record in records]

@@ -7,15 +7,10 @@ import numpy as np
 from rsea_ros.effects import signal_table as st
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.propagator import read_row, state_space
+from rsea_ros.model.position_loop import closed
+from rsea_ros.model.propagator import encoder_row, read_row, state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray, Record
-
-_READ = {
-    "position": st.OUTPUT_ANGLE,
-    "velocity": st.OUTPUT_VELOCITY,
-    "deflection": st.DEFLECTION,
-}
 
 
 def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
@@ -28,16 +23,21 @@ def responses_of(record: Record, rig: Rig) -> tuple[FrequencyResponse, ...]:
 
 
 def model_response(rig: Rig, output: str, frequency: FloatArray) -> ComplexArray:
-    """Return output / command of the rig's linear part, at frequencies in Hz, shape (n,)."""
+    """Return output / command of the rig's linear part, at frequencies in Hz, shape (n,).
+
+    The command is the motor torque, or the target of a position loop.
+    """
     system = state_space(rig)
     row = _output_row(rig, output)
-    s = 2j * np.pi * np.asarray(frequency)
+    s = np.asarray(2j * np.pi * np.asarray(frequency), np.complex128)
     eye = np.eye(len(system.a))
     solved = np.linalg.solve(
         s[:, None, None] * eye - system.a, np.broadcast_to(system.b[:, :1], (len(s), len(eye), 1))
     )
     response: ComplexArray = np.einsum("j,kj->k", row, solved[:, :, 0])
-    return response
+    if rig.loop is None:
+        return response
+    return closed(rig, np.einsum("j,kj->k", encoder_row(rig, system.mechanics), solved[:, :, 0]), response, s)
 
 
 def _output_row(rig: Rig, output: str) -> FloatArray:
@@ -46,4 +46,6 @@ def _output_row(rig: Rig, output: str) -> FloatArray:
         return rig["spring.stiffness"] * read_row(rig, m, st.DEFLECTION) + rig["spring.damping"] * read_row(
             rig, m, st.DEFLECTION_RATE
         )
-    return read_row(rig, m, _READ[output])
+    if output == "deflection":
+        return read_row(rig, m, st.DEFLECTION)
+    return encoder_row(rig, m, is_rate=output == "velocity")

@@ -33,8 +33,9 @@ class Drive:
     """The command on the step grid and the instants at which channels are wanted.
 
     step: s. start: record time of the first step, s. command: mean over each step of the held command,
-    N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
-    each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
+    N m, or of the held target of a position loop, rad, shape (steps,). reference: rad, shape (steps,) or
+    empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
+    sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
@@ -70,13 +71,19 @@ def steps_per_sample(period: float, longest: float = LONGEST_STEP) -> int:
 
 
 def drive_from(
-    record: Record, *, refine: int = 1, closed_loop: bool = False, from_rest: bool = False
+    record: Record,
+    *,
+    refine: int = 1,
+    closed_loop: bool = False,
+    from_rest: bool = False,
+    targeted: bool = False,
 ) -> Drive:
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
     the bag's command has beside the measured motor torque, where there is one, is an outside disturbance.
-    from_rest: the bench began at zero, whatever the first samples say.
+    from_rest: the bench began at zero, whatever the first samples say. targeted: the commands are targets
+    of a position loop, rad: it began where the first sample is.
     """
     command = record["command"]
     if len(command) < 10:
@@ -105,7 +112,7 @@ def drive_from(
         impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=_angle(record, ends),
-        initial=(0.0, 0.0) if from_rest else _initial(record),
+        initial=(0.0, 0.0) if from_rest else _first(record) if targeted else _initial(record),
         hold=hold,
     )
 
@@ -153,6 +160,12 @@ def _period(t: FloatArray) -> float:
 
 def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
     return channel.t, channel.y
+
+
+def _first(record: Record) -> tuple[float, float]:
+    """Return the first position and velocity, zero where there is none."""
+    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
+    return float(position[0]), float(velocity[0])
 
 
 def _initial(record: Record) -> tuple[float, float]:

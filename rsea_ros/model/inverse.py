@@ -53,8 +53,8 @@ class Motion:
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Tell whether a rig is judged by torque: no spring holds it, so it drifts."""
-    return rig.rigid_spring
+    """Tell whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
+    return rig.rigid_spring and rig.loop is None
 
 
 def motion_from(record: Record) -> Motion:
@@ -124,7 +124,7 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     period = float(motion.t[1] - motion.t[0])
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
     torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
-    torque = torque + rig["spring_end.gravity"] * np.sin(motion.q)
+    torque = torque + rig["spring_end.gravity"] * np.sin(motion.q + rig["spring_end.gravity_angle"])
     gains = motor_gain(machine.calls, machine.table, machine.own)
     added = _effect_torques(machine.calls, machine.table, machine.own, motion.q, motion.v, train_ratio(rig))
     result: FloatArray = (torque - smoothed(added, period)) / gains

@@ -37,7 +37,29 @@ _END_FIELDS = {
     "damping": Field("N m s/rad", default=0.0),
     "stiffness": Field("N m/rad", default=0.0),
     "gravity": Field("N m", default=0.0),
+    "gravity_angle": Field("rad", low=-math.inf, default=0.0),
 }
+
+LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "pd": {
+        "k_p": Field("N m/rad"),
+        "k_i": Field("N m/rad/s", default=0.0),
+        "k_d": Field("N m s/rad", default=0.0),
+        "k_f": Field("N m s/rad", default=0.0),
+    },
+    "cascade": {
+        "k_pos": Field("1/s"),
+        "k_v": Field("N m s/rad"),
+        "k_vi": Field("N m/rad", default=0.0),
+    },
+}
+"""Gains of the kinds of position loop (model/loop.py)."""
+_LIMIT_FIELDS = {
+    "torque_limit": Field("N m", low_allowed=False, default=math.inf),
+    "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
+    "sample_time": Field("s", default=0.0),
+}
+LOOP_LIMITS = tuple(_LIMIT_FIELDS)
 
 FIELDS: Mapping[str, Field] = MappingProxyType(
     {
@@ -52,6 +74,8 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "proximal_spring.damping": Field("N m s/rad", default=0.0),
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+        **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
+        **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
     }
 )
 
@@ -112,6 +136,9 @@ class Rig:
     other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
     may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
+    encoder_end: what the encoder reads against the housing: the gear output, or the spring end behind play
+    and spring. loop: kind of the position loop whose targets command the bench, a key of LOOP_FIELDS, its
+    gains among the quantities. controller: a loop that added its torque to the record's command.
     """
 
     name: str
@@ -124,6 +151,8 @@ class Rig:
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
     ft_end: str = "spring_end"
+    encoder_end: str = "gear_output"
+    loop: str | None = None
     controller: Controller | None = None
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""
@@ -253,6 +282,38 @@ def _check_structure(rig: Rig) -> None:
         )
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
+    _check_loop(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
             rig[f"{end}.inertia"]
+
+
+def _check_loop(rig: Rig) -> None:
+    if rig.encoder_end not in ("gear_output", "spring_end"):
+        raise RigError(
+            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
+            "encoder_end",
+        )
+    stated = [n.split(".")[1] for n in rig.quantities if n.startswith("controller.")]
+    if rig.loop is None:
+        if stated:
+            raise RigError(
+                f"rig {rig.name}: controller.{stated[0]} without controller.kind, expected one of "
+                f"{', '.join(LOOP_FIELDS)}",
+                "controller",
+            )
+        return
+    if rig.loop not in LOOP_FIELDS:
+        raise RigError(
+            f"rig {rig.name}: controller.kind = {rig.loop!r}, expected one of {', '.join(LOOP_FIELDS)}",
+            "controller.kind",
+        )
+    allowed = (*LOOP_FIELDS[rig.loop], *LOOP_LIMITS)
+    for name in stated:
+        if name not in allowed:
+            raise RigError(
+                f"rig {rig.name}: controller.{name} in a {rig.loop} loop, expected {', '.join(allowed)}",
+                f"controller.{name}",
+            )
+    for name in LOOP_FIELDS[rig.loop]:
+        rig[f"controller.{name}"]

@@ -18,6 +18,8 @@ from rsea_ros.model.rig import (
     CLOCK_DOUBT,
     END_NAMES,
     FIELDS,
+    LOOP_FIELDS,
+    LOOP_LIMITS,
     Controller,
     EffectSetting,
     Field,
@@ -46,6 +48,8 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
     only_keys(document, names(TOP), "rig")
     groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
+    loop, gains = _loop(document.get("controller"))
+    quantities |= gains
     clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
     return Rig(
@@ -64,7 +68,9 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         ),
         proximal=text(document.get("proximal", "housing_end"), "proximal"),
         ft_end=text(document.get("ft_end", "spring_end"), "ft_end"),
-        controller=_controller(document.get("controller")),
+        encoder_end=text(document.get("encoder_end", "gear_output"), "encoder_end"),
+        loop=loop,
+        controller=None if loop else _controller(document.get("controller")),
         effects=effects,
     )
 
@@ -79,6 +85,10 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     }
     if rig.ft_end != "spring_end":
         document["ft_end"] = rig.ft_end
+    if rig.encoder_end != "gear_output":
+        document["encoder_end"] = rig.encoder_end
+    if rig.loop:
+        document["controller"] = {"kind": rig.loop}
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -209,6 +219,20 @@ def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
                 f"known[{i}]",
             )
     return frozenset(items)
+
+
+def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
+    """Return the kind of a position loop whose targets command the bench, and its gains and limits."""
+    if not isinstance(item, Mapping) or "kind" not in item:
+        return None, {}
+    kind = text(item["kind"], "controller.kind")
+    if kind not in LOOP_FIELDS:
+        raise RigError(
+            f"controller.kind = {shown(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
+        )
+    only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
+    names_of = (key for key in item if key != "kind")
+    return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
 
 
 def _controller(item: Any) -> Controller | None:

@@ -32,7 +32,7 @@ class Linear(NamedTuple):
 
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
     velocity and deflection; outputs (4, n): position, velocity, the linear spring torque and deflection;
-    gravity: m g l of the two ends, N m.
+    gravity (4,): m g l of the two ends, N m, then how far from hanging each is at angle zero, rad.
     """
 
     phi: FloatArray
@@ -84,9 +84,9 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
     for i in range(_FORCES):
         s[st.FIRST_FORCE + i] = 0.0
     if linear.gravity[0] != 0.0:
-        s[st.HOUSING_TORQUE] = -linear.gravity[0] * np.sin(s[st.HOUSING_ANGLE])
+        s[st.HOUSING_TORQUE] = -linear.gravity[0] * np.sin(s[st.HOUSING_ANGLE] + linear.gravity[2])
     if linear.gravity[1] != 0.0:
-        s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE])
+        s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE] + linear.gravity[3])
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
