@@ -169,6 +169,11 @@ class Record:
             raise ChannelError(f"{self.source}: no channel {name!r}, expected it beside: {have}") from None
 
     @property
+    def driving(self) -> Channel | None:
+        """What drove the run: its torques, else its target positions; None where neither was recorded."""
+        return self.channels.get("command", self.channels.get("reference"))
+
+    @property
     def start(self) -> float:
         """First stamp of any channel, s."""
         return min(float(c.t[0]) for c in self.channels.values())

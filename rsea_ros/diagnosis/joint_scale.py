@@ -36,7 +36,7 @@ def torque_scale(case: Case, rig: Rig) -> float:
 
 
 def joint_starts(effect: Effect, scale: float) -> list[dict[str, float]]:
-    """Return where fits of an effect whose main parameter is a torque begin, for torques up to `scale`, N m."""
+    """Return where fits of an effect begin whose main parameter is a torque. scale: largest torque, N m."""
     main = effect.main
     shares = _LIMITS if main.name == "limit" else SHARES
     sizes = {min(max(share * scale, main.low), main.high) for share in shares}

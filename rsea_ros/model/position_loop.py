@@ -27,9 +27,14 @@ def commanded(record: Record, rig: Rig) -> Record:
     """Return the record with what commands the rig as `command`: of a position loop its targets, rad.
 
     So whatever follows the command (noise, blocks, responses) follows the targets. Raises ChannelError for a
-    record without them.
+    record without them, and for one that only positions commanded with another rig.
     """
     if rig.loop is None:
+        if "command" not in record and "reference" in record:
+            raise ChannelError(
+                f"{record.source}: positions commanded this run, expected a rig with controller.kind; "
+                f"{rig.name} is commanded with torques"
+            )
         return record
     if "reference" not in record:
         have = ", ".join(record.channels) or "nothing"
