@@ -19,6 +19,7 @@ from rsea_ros.identification.confidence import (
     what_is_not_told,
 )
 from rsea_ros.identification.even_stamps import Evened, evened
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -73,9 +74,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        solution, cases = fit(
-            cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
-        )
+        solution, cases = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         if misfits:
             steady = evened(records, rig, solution)
@@ -89,6 +88,13 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
     return replace(result, statements=(*steady.sentences, *result.statements))
+
+
+def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
+    """Return where a fit may begin beside the rig's own values."""
+    if is_inverse(rig):
+        return None
+    return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:

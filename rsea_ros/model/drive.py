@@ -20,6 +20,9 @@ from rsea_ros.signals import Channel, FloatArray, Record
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
 
+LONGEST_OF_JOINTS = 1e-3
+"""s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
+
 ON_GRID = 1e-3
 """Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
 
@@ -91,7 +94,7 @@ def drive_from(
             f"{record.source}: command has {len(command)} samples, expected at least 10"
         )
     period = _period(command.t)
-    hold = steps_per_sample(period) * refine
+    hold = steps_per_sample(period, LONGEST_OF_JOINTS if targeted else LONGEST_STEP) * refine
     step = period / hold
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
