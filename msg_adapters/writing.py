@@ -16,6 +16,7 @@ from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
+from msg_adapters.topics import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.interrupts import undisturbed
@@ -78,12 +79,14 @@ class BagWriter:
         return self
 
     def write(self, topic: str, msgtype: str, log_time: int, raw: bytes) -> None:
-        """Append a serialised message; log_time in ns since the epoch."""
+        """Append a serialised message; log_time in ns since the epoch.
+
+        Raises BagError for a topic that ROS could not have, and for a topic of another type than before.
+        """
         try:
-            if topic not in self._topics:
-                known = Topic(topic, msgtype, definition(msgtype).digest)
-                self._topics[topic] = (self._storage.add(topic, msgtype), known)
-            key, known = self._topics[topic]
+            key, known = self._topics.get(topic) or self._declared(topic, msgtype)
+            if known.msgtype != msgtype:
+                raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
             self._storage.write(key, log_time, raw)
             known.count += 1
             first, last = self._span if self._span[1] else (log_time, log_time)
@@ -91,6 +94,13 @@ class BagWriter:
         except OSError as error:
             raise self._error(error) from None
         self.keep_up()
+
+    def _declared(self, topic: str, msgtype: str) -> tuple[int, Topic]:
+        """Return key and topic of a new one."""
+        check_topic(topic)
+        known = Topic(topic, msgtype, definition(msgtype).digest)
+        self._topics[topic] = (self._storage.add(topic, msgtype), known)
+        return self._topics[topic]
 
     def keep_up(self) -> None:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
