@@ -17,6 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader, StoragePlugin
 
 from msg_adapters import BagWriter, TopicMap, iterate, read_record, write_record, write_records
+from msg_adapters.overlay import write_overlay
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.signals import Channel, Record
 
@@ -174,6 +175,14 @@ def test_stamps_that_no_header_can_hold_are_refused(tmp_path, record, by):
     says = r"^record: command: stamp 0 is .* s since 1970, expected 0 to 2147483648"
     with pytest.raises(BagError, match=says):
         write_record(Record(moved), tmp_path / "bag")
+
+
+def test_an_overlay_of_stamps_before_1970_begins_there(tmp_path, record):
+    early = replace(record, epoch_ns=-(10**18))
+    write_overlay({"/rsea": early, "/simulated": early}, tmp_path / "overlay.mcap")
+    for namespace in ("/rsea", "/simulated"):
+        got = read_record(tmp_path / "overlay.mcap", topics=TopicMap(namespace=namespace))
+        assert_same(got, replace(record, epoch_ns=0))
 
 
 def test_an_empty_recording_is_a_bag(tmp_path):
