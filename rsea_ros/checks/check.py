@@ -12,6 +12,7 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
+from rsea_ros.checks.impedance import impedance_findings
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
 from rsea_ros.checks.motion import is_commanded
@@ -86,13 +87,16 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
         ]
     found = noises(record, rig)
     whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
-    compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
+    compared_sides = {n: s for n, s in sides(record, rig).items() if n in whole}
+    compared = quotients(compared_sides)
     readings = readings_of(compared, rig)
     silent = set(compared) - set(readings.channels if readings else ())
     found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
     if readings is None:
         return found
-    found += gain_findings(readings, rig, axis)
+    another = impedance_findings(compared_sides.get("motor_torque"), rig) if is_inverse(rig) else []
+    gains = gain_findings(readings, rig, axis)
+    found += [*another, *(f for f in gains if not (another and f.kind == "wrong_rig"))]
     return found if _is_elsewhere(found) else [*found, *_linearised(checked, rig, readings)]
 
 
