@@ -16,6 +16,7 @@ from rsea_ros.checks.impedance import impedance_findings
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
@@ -94,10 +95,17 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
     found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
     if readings is None:
         return found
-    another = impedance_findings(compared_sides.get("motor_torque"), rig) if is_inverse(rig) else []
+    another = _another(record, compared_sides, rig)
     gains = gain_findings(readings, rig, axis)
     found += [*another, *(f for f in gains if not (another and f.kind == "wrong_rig"))]
     return found if _is_elsewhere(found) else [*found, *_linearised(checked, rig, readings)]
+
+
+def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
+    """Return what makes the machine of a record another one than a rig without a spring."""
+    if not is_inverse(rig):
+        return []
+    return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
 
 
 def _is_elsewhere(found: list[Finding]) -> bool:
