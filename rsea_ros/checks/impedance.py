@@ -18,12 +18,13 @@ from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.model.equations import mechanics
+from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-_COHERENT = 0.8
-_FEWEST = 6
-"""Lines that a fit of three values needs."""
+_COHERENT = 0.5
+_FEWEST, _MOST = 6, 0.4
+"""Coherent lines that a fit needs: so many, and that share of those below the filter's edge."""
 _MODEL_ERROR = 0.1
 """Of Z: what friction leaves of a linear fit."""
 _SURE = 4.0
@@ -40,11 +41,12 @@ _SHAPED = 0.35
 
 @dataclass(frozen=True)
 class Impedance:
-    """K (N m/rad) with its one sigma, J (kg m^2), and what the fit leaves of Z: its median over Z."""
+    """K (N m/rad) and J (kg m^2) with one sigma each, and what the fit leaves of Z: its median over Z."""
 
     stiffness: float
     stiffness_sd: float
     inertia: float
+    inertia_sd: float
     left: float
     lowest: float
 
@@ -69,7 +71,8 @@ def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
         swing = f"a spring or pendulum holds the output: it swings at {measured.natural_frequency:.2g} Hz"
         return [_another("stiffness", measured.stiffness, "N m/rad", stiffness, swing)]
     factor = measured.inertia / inertia
-    if abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * _spread(rig)):
+    sure = measured.inertia > 2.0 * _SURE * measured.inertia_sd
+    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * _spread(rig)):
         return [_another("inertia", measured.inertia, "kg m^2", inertia, f"{factor:.2g} times the rig's")]
     return []
 
@@ -96,8 +99,11 @@ def impedance_of(side: Side, rig: Rig) -> Impedance | None:
     """Return the impedance that a record shows; None where too few lines are coherent."""
     q = quotient("motor_torque", side.t, side.p, side.y)
     m = mechanics(rig, linear_gravity=True)
-    keep = np.zeros(0, bool) if q is None else q.coherence > _COHERENT
-    if q is None or np.count_nonzero(keep) < _FEWEST or m.order != 1:
+    if q is None or m.order != 1:
+        return None
+    band = q.frequency < CUT_OFF
+    keep = band & (q.coherence > _COHERENT)
+    if np.count_nonzero(keep) < max(_FEWEST, _MOST * np.count_nonzero(band)):
         return None
     w = 2.0 * np.pi * q.frequency[keep]
     nominal = m.stiffness[0, 0] - m.mass[0, 0] * w**2 + 1j * w * m.damping[0, 0]
@@ -111,11 +117,13 @@ def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impeda
     size = np.linalg.norm(rows / doubt[:, None], axis=0)
     inverse = np.linalg.pinv(rows / doubt[:, None] / size)
     stiffness, inertia = (inverse @ (z.real / doubt)) / size
+    stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
     left = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
     return Impedance(
         stiffness=float(stiffness),
-        stiffness_sd=float(np.linalg.norm(inverse[0]) / size[0]),
+        stiffness_sd=float(stiffness_sd),
         inertia=float(inertia),
+        inertia_sd=float(inertia_sd),
         left=float(np.median(left)),
         lowest=float(w[0]) / (2.0 * math.pi),
     )

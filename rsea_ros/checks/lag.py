@@ -13,12 +13,13 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from rsea_ros.checks.expected import Side
+from rsea_ros.checks.finding import Finding
 from rsea_ros.signals import Channel, FloatArray, Record
 
 REACH = 2.0
 """s, either way."""
-NEAR = 0.03
-"""s. Smaller lags are found by their phases (shape.py, linear.py)."""
+NEAR = 0.05
+"""s. Smaller lags are found by their phases (shape.py, linear.py), and another rig's response looks so."""
 _PEAK = 0.5
 """Correlation that the best lag must reach."""
 _BESIDE = 0.7
@@ -44,7 +45,8 @@ def lag_of(side: Side) -> float:
     if len(even) < 64:
         return 0.0
     reach = min(REACH, period * len(even) / _SHORTEST)
-    lag, alike = _correlation(*(np.interp(even, side.t, v) for v in (side.y, side.p)), period, reach)
+    y, p = (np.interp(even, side.t, v) for v in (side.y, side.p))
+    lag, alike = _correlation(y, p, period, reach)
     best = int(np.argmax(alike))
     aside = alike[np.abs(lag - lag[best]) > _AROUND]
     unclear = abs(lag[best]) <= NEAR or alike[best] < _PEAK or len(aside) == 0
@@ -59,14 +61,38 @@ def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> t
     both = irfft(rfft(y, size) * rfft(p, size).conj(), size)
     alike = np.abs(np.concatenate([both[-most:], both[: most + 1]]))
     scale = float(np.linalg.norm(y) * np.linalg.norm(p))
-    return period * np.arange(-most, most + 1), alike / max(scale, 1e-300)
+    lag = period * np.arange(-most, most + 1, dtype=np.float64)
+    return lag, np.asarray(alike / max(scale, 1e-300))
+
+
+def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
+    """Return a finding for each lag, one for the command where all of so many channels share it."""
+    all_of_them = shared(found, channels)
+    off = {"command": -all_of_them} if all_of_them else found
+    against = "all that was measured" if all_of_them else "the command"
+    return [
+        Finding(
+            "red",
+            "clock_offset",
+            name,
+            late,
+            "s",
+            expected="0",
+            detail=f"stamped {abs(late):.3g} s {'late' if late > 0.0 else 'early'} against {against}",
+            remedy=f"stamp all by one clock, or move these stamps with --shift {name}={-late:.4g}",
+        )
+        for name, late in off.items()
+    ]
 
 
 def shared(found: Mapping[str, float], channels: int) -> float:
-    """Return the lag that all of so many channels share, s: the command's stamps are off; 0 for none."""
+    """Return the lag that all of so many channels share, s: the command's stamps are off; 0 for none.
+
+    The motor torque, where it is measured, repeats the command and tells it best.
+    """
     values = list(found.values())
     together = len(values) == channels and len(values) > 0 and max(values) - min(values) <= _TOGETHER
-    return float(np.median(values)) if together else 0.0
+    return found.get("motor_torque", float(np.median(values))) if together else 0.0
 
 
 def in_step(record: Record, found: Mapping[str, float]) -> Record:
