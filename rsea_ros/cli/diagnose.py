@@ -16,6 +16,7 @@ from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.signals import Record
 
 HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
+EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
 RIG = "paper_high_impedance"
 FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
 FOUND = 1

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "frequency response and parameters with confidence from recorded runs"
+EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
