@@ -10,6 +10,7 @@ from independent.faults import FAULTS
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose, nominal_rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.diagnosis_words import headline
 from rsea_ros.signals import Channel
 
 
@@ -44,4 +45,6 @@ def test_a_dead_sensor_is_told_and_the_others_carry_on(good, name, value):
     dead = good.with_channels(**{name: Channel(good[name].t, np.full(len(good[name]), value))})
     diagnosis = diagnose([dead], load_rig("paper_high_impedance"))
     assert {f.channel for f in diagnosis.faults} == {name}
-    assert diagnosis.verdict == "nothing_wrong"
+    assert (diagnosis.verdict, diagnosis.causes, diagnosis.next_experiment) == ("unexplained", (), None)
+    assert "measures nothing and is left out" in diagnosis.sentence
+    assert headline(diagnosis).endswith("measures nothing; in the other channels only noise is left")
