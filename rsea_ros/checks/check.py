@@ -177,5 +177,6 @@ def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
 
 
 def _fault(f: Finding) -> Fault:
-    detail = "; ".join(filter(None, (f.detail, f.remedy)))
+    """Return the fault of a finding; whether the rig is right is asked once, before the results."""
+    detail = "; ".join(filter(None, (f.detail, "" if f.kind == "wrong_rig" else f.remedy)))
     return Fault(f.kind, f.channel, float("nan"), detail, f.value, f.unit)

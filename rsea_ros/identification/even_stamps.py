@@ -67,6 +67,11 @@ def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     return Evened(tuple(result), scatter)
 
 
+def may_be_even(record: Record) -> bool:
+    """Tell whether the stamps of any channel scatter about an even clock."""
+    return bool(_on_even_clocks(record)[1])
+
+
 def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
