@@ -57,7 +57,8 @@ def conclusion(
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
-    verdict = verdict_of(found, stages)
+    faults = tuple(f for c in checked for f in c.faults)
+    verdict = verdict_of(found, stages, faults)
     if verdict == "unexplained":
         stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
     first, last = stages[0], stages[-1]
@@ -66,7 +67,6 @@ def conclusion(
     others = [t for t in _latest(found.trials) if t.name not in named]
     rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel), others)
     case = found.cases[0]
-    faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)
     baseline = parameters_of(first.solution, first.confidence)
     return Diagnosis(
@@ -166,7 +166,7 @@ def _next_experiment(
         rivals = found.rivals_of(stage.solution.problem.rig.effects[-1].name)
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
-    if verdict in ("unexplained", "partly_explained"):
+    if verdict in ("unexplained", "partly_explained") and not reached(stages[-1].judged):
         return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
     return None
 

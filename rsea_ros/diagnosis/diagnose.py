@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from rsea_ros.checks.faults import check
+from rsea_ros.checks.faults import Checked, check
 from rsea_ros.diagnosis.backward_elimination import pruned
 from rsea_ros.diagnosis.conclusion import conclusion
 from rsea_ros.diagnosis.evaluation import judged
@@ -13,8 +14,10 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import search
 from rsea_ros.diagnosis.workers import workers
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.steady import steadied
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -40,9 +43,9 @@ def diagnose(
     rig = nominal_rig(rig)
     records = [bounded(r) for r in records]
     holdout = bounded(holdout) if holdout is not None else None
-    checked = [check(r, rig) for r in records]
+    checked, sentences = _steady([check(r, rig) for r in records], rig)
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
-    judging = check(holdout, rig) if holdout is not None else None
+    judging = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
     with workers() as at_work:
@@ -51,7 +54,16 @@ def diagnose(
         found = pruned(found, effects, at_work)
         tell("judging", 0.95)
         stages = [judged(found, m, judging, rig, at_work.run) for m in found.models]
-        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, at_work)
+        every = [*checked, *([judging] if judging else [])]
+        result = conclusion(found, stages, every, records, rig, at_work)
+    return replace(result, statements=(*sentences, *torque_scale(nominal), *result.statements))
+
+
+def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[str, ...]]:
+    """Return records on the even clocks that their values agree with, and what was done, in words."""
+    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    records = zip(checked, steady.records, strict=True)
+    return [replace(c, record=record) for c, record in records], steady.sentences
 
 
 def nominal_rig(rig: Rig) -> Rig:

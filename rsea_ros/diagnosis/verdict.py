@@ -8,6 +8,8 @@ from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.evaluation import Stage
 from rsea_ros.diagnosis.result import Verdict
 from rsea_ros.diagnosis.stepwise import Search
+from rsea_ros.identification.silent import silent_channels
+from rsea_ros.signals import Fault
 
 FLOOR = 1.1
 """RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""
@@ -19,11 +21,15 @@ HALF = 0.5
 """What may be left of a misfitting channel's residual for causes to be named without reaching the floor."""
 
 
-def verdict_of(found: Search, stages: Sequence[Stage]) -> Verdict:
-    """Return the verdict: see contract.md, diagnosis.json."""
+def verdict_of(found: Search, stages: Sequence[Stage], faults: Sequence[Fault] = ()) -> Verdict:
+    """Return the verdict: see contract.md, diagnosis.json.
+
+    faults: of the data. Where a sensor measures nothing, something is wrong that no effect explains
+    (docs/decisions/0063-a-sensor-that-measures-nothing.md).
+    """
     first, last = stages[0].judged, stages[-1].judged
     if len(stages) == 1:
-        return "nothing_wrong" if reached(first) else "unexplained"
+        return "nothing_wrong" if reached(first) and not silent_channels(faults) else "unexplained"
     if reached(last):
         return "explained"
     return "partly_explained" if is_trusted(found, first, last) else "unexplained"

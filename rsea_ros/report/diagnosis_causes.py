@@ -36,8 +36,8 @@ def _gain(cause: Cause) -> str:
 def _sizes(cause: Cause) -> str:
     cells = []
     for name, p in cause.parameters.items():
-        value, half, unit = num.estimate(p)
-        doubt = f" <small>± {half}</small>" if half else ""
+        value, doubt, unit = num.estimate(p)
+        doubt = f" <small>{doubt.strip()}</small>" if doubt else ""
         what = f"{escape(name.replace('_', ' '))}, 95 % interval"
         cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
     return f'<div class="keys">{"".join(cells)}</div>'

@@ -53,8 +53,8 @@ def _next(experiment: Experiment) -> str:
 
 
 def _size(name: str, parameter: Estimate) -> str:
-    value, half, unit = num.estimate(parameter)
-    return f"{name.replace('_', ' ')} {value}{f' ± {half}' if half else ''} {unit}".rstrip()
+    value, doubt, unit = num.estimate(parameter)
+    return f"{name.replace('_', ' ')} {value}{doubt} {unit}".rstrip()
 
 
 def _worst(d: Diagnosis) -> list[Misfit]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit
 from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
 from rsea_ros.wording import listed
@@ -64,9 +65,9 @@ def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as one short sentence."""
     d, n = diagnosis, main_channel(diagnosis)
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
-    dead = [words.channel(f.channel) for f in d.faults if f.kind == "dead_channel"]
-    if d.verdict == "nothing_wrong" and dead:
-        return f"{words.sentence(listed(dead))} measures nothing; in the other channels only noise is left"
+    silent = [words.channel(name) for name in silent_channels(d.faults)]
+    if d.verdict == "unexplained" and silent and before <= AT_NOISE:
+        return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
     if d.verdict == "unexplained":

@@ -55,10 +55,11 @@ def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
 @pytest.mark.parametrize(
     ("estimate", "text"),
     [
-        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", "0.0030", "mrad")),
-        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", "20", "µs")),
-        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", "0.50", "N·m")),
-        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", "0.010", "")),
+        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", " ± 0.0030", "mrad")),
+        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", " ± 20", "µs")),
+        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", " ± 0.50", "N·m")),
+        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", " ± 0.010", "")),
+        (Estimate(3.0, "N m", (2.9, 4.4)), ("3.00", " −0.10/+1.4", "N·m")),
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
