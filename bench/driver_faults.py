@@ -171,7 +171,7 @@ def _once(loop: Loop, bench: RemoteBench, trial: Trial) -> tuple[float, str, str
 
 
 def _kill_supervisor(loop: Loop) -> None:
-    supervisor = loop.device._motor._supervisor
+    supervisor = loop.device.protection._supervisor  # type: ignore[attr-defined]
     assert supervisor is not None
     supervisor._end._process.kill()  # type: ignore[attr-defined]
 

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--model", type=int, default=54024, choices=sorted(MODELS), help="number of the motor")
     add("--rig", default="paper_high_impedance", help="the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
-    add("--torque-constant", type=float, default=6.826, help="N m at the gear output per A")
+    add("--torque-constant", type=float, default=0.0, help="N m at the gear output per A; 0: its model's")
     add("--return-delay", type=int, default=0, help="pause before an answer, unit 2 µs, 0 to 254")
     add("--seed", type=seed, default=0, help="of the sensors' noise and of the misbehaviour")
     add("--requests", action="store_true", help="take requests to misbehave on stdin, a JSON object a line")

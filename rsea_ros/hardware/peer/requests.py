@@ -21,8 +21,8 @@ class LineRequests:
     """`{"do": NAME, …}`; the answer has `t`, the clock (ns) at which it was done, or `error`.
 
     misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
-    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model (number), watch (keep F/T records),
-    torque (goal, whether it is on), log, quit.
+    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model, firmware (number),
+    watch (keep F/T records), torque (goal, whether it is on), log, quit.
     """
 
     def __init__(
@@ -35,7 +35,8 @@ class LineRequests:
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
-            "ft_status": self._ft_status, "model": self._model, "watch": self._watch, "log": self._log,
+            "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
+            "watch": self._watch, "log": self._log,
             "torque": lambda now, r: [motor.get("goal"), bool(motor.get("torque_enable"))],
         }  # fmt: skip
 
@@ -91,6 +92,9 @@ class LineRequests:
     def _model(self, now: int, request: Request) -> None:
         """Answer pings with another model number; the table stays."""
         self._motor.memory[0:2] = int(request["number"]).to_bytes(2, "little")
+
+    def _firmware(self, now: int, request: Request) -> None:
+        self._motor.memory[6] = int(request["number"])
 
     def _watch(self, now: int, request: Request) -> None:
         self._sensor.keep = bool(request.get("on", True))
