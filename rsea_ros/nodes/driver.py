@@ -8,6 +8,7 @@ node stays active.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -18,7 +19,7 @@ from msg_adapters.ros import Trigger
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
-from rsea_ros.hardware.outside import options_of
+from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._alarm import Alarm
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench import NAMES, SPRING_FRAME, Bench
@@ -31,6 +32,7 @@ from rsea_ros.nodes._jobs import Jobs
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
 from rsea_ros.nodes._run import run_node
+from rsea_ros.wording import printable
 
 TABLE = (
     Parameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
@@ -60,6 +62,9 @@ class Driver(ManagedEntity):
         self._node, self._values = node, values
         if node.get_parameter("use_sim_time").value:
             raise ParameterError("parameter use_sim_time = true, expected false: the device keeps real time")
+        if values["device"] not in DEVICES and (files := os.environ.get(EXTRA_PATH)):
+            text = f"{EXTRA_PATH}={printable(files)}: code from there runs in this node"
+            node.get_logger().warning(text)
         given = values | {"device_options": options_of(values["device_options"])}
         device = device_of(given, DEVICES)
         self._guarded = Guarded(device, limits_of(values), values["rate"], spring_of(values))

@@ -70,6 +70,11 @@ class RemoteBench:
         goal, on = self.ask("torque")["result"]
         return int(goal), bool(on)
 
+    def stood_still(self, since: int) -> float:
+        """Return for how long the bench itself was held up at most since an instant, ms."""
+        pauses = self.ask("pauses", since=since)["result"]
+        return max((length for _, length in pauses), default=0) / 1e6
+
     def close(self) -> None:
         """End the process."""
         assert self._process.stdin is not None and self._process.stdout is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import SATURATED, ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import Motor
+from rsea_ros.hardware.peer.motor import KEPT, Motor
 
 Request = Mapping[str, Any]
 LOWEST_VOLTAGE, VOLTAGE_ERROR = 18.0, 1
@@ -22,7 +23,9 @@ class LineRequests:
 
     misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
     vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model, firmware (number),
-    watch (keep F/T records), torque (goal, whether it is on), log, quit.
+    watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
+
+    pauses: when the bench itself was held up until, and for how long, ns.
     """
 
     def __init__(
@@ -30,6 +33,7 @@ class LineRequests:
     ) -> None:
         self._motor, self._bus, self._sensor, self._wrong = motor, bus, sensor, wrong
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
+        self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
             "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(),
@@ -37,6 +41,7 @@ class LineRequests:
             "ft_restart": lambda now, r: sensor.restart(),
             "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
             "watch": self._watch, "log": self._log,
+            "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
             "torque": lambda now, r: [motor.get("goal"), bool(motor.get("torque_enable"))],
         }  # fmt: skip
 

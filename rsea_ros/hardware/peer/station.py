@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -11,6 +12,8 @@ from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.motor import Motor, Plant
 
+STILL = 10_000_000
+"""ns between two turns from which on the bench itself was held up: it turns at least every TICK."""
 TICK = 5_000_000
 """ns; the plant's steps until now are worked off whenever somebody looks, and at least so often."""
 
@@ -19,13 +22,18 @@ class Requests(Protocol):
     """Where requests come from."""
 
     descriptor: int
+    pauses: deque[tuple[int, int]]
 
     def serve(self, now: int) -> bool:
         """Do what is asked; return False when the bench shall end."""
 
 
 class Station:
-    """Runs until its requests say so. Clocks are monotonic, ns."""
+    """Runs until its requests say so. Clocks are monotonic, ns.
+
+    Where the machine holds it up, it notes in the requests' `pauses` when that ended and how long it was: a
+    motor does not stand still, and what came late then is not the driver's.
+    """
 
     def __init__(self, plant: Plant, motor: Motor, bus: Bus, sensor: ForceSensor, requests: Requests) -> None:
         self._plant, self._motor, self._bus, self._sensor = plant, motor, bus, sensor
@@ -34,9 +42,13 @@ class Station:
 
     def run(self, clock: Callable[[], int] = time.monotonic_ns) -> None:
         """Serve everybody."""
+        turned = clock()
         while True:
             ready = self._wait(clock)
             now = clock()
+            if now - turned > STILL:
+                self._requests.pauses.append((now, now - turned))
+            turned = now
             if self._bus.descriptor in ready:
                 self._bus.serve(now)
             if self._sensor.descriptor in ready:
