@@ -59,5 +59,6 @@ LIMITS = (
     Parameter("command_timeout", 0.05, "time without a command that ends the torque", "s", 0.001, 10.0),
     Parameter("ramp", 0.02, "from there to zero torque", "s", 0.0, 10.0),
     Parameter("lost_cycles", 3, "cycles in a row without an answer that are a fault", "", 1, 100),
+    Parameter("lost_time", 0.01, "which they last at least, at any rate", "s", 0.0, 0.1),
     AXIS,
 )

@@ -43,7 +43,7 @@ def limits_of(values: Values) -> Limits:
         voltage=values["voltage_limit"],
         command_timeout=values["command_timeout"],
         ramp=values["ramp"],
-        lost_cycles=values["lost_cycles"],
+        lost_cycles=max(values["lost_cycles"], math.ceil(values["lost_time"] * values["rate"])),
         velocity=values["velocity_limit"] or math.inf,
         position=values["position_limit"] or math.inf,
         ft=ft,
