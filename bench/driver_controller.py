@@ -23,15 +23,12 @@ import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
-from bench.bare_loop import permitted
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 AMPLITUDE = 10.0
 BURN = "while True: pass"
-BENCH = 50
-"""Priority of the bench, SCHED_FIFO."""
 
 
 @contextmanager
@@ -64,8 +61,7 @@ def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
     outside = Outside()
     with ExitStack() as kept:
         bench = kept.enter_context(RemoteBench(path))
-        if permitted(BENCH):
-            bench.hurry(BENCH)
+        bench.hurry()
         own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
         kept.enter_context(running("driver", 0, **own))
         kept.enter_context(running("controller", 0, rate=rate))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -25,13 +25,21 @@ class LineRequests:
     vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model, firmware (number),
     watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
 
-    pauses: when the bench itself was held up until, and for how long, ns.
+    pauses: when the bench itself was held up until, and for how long, ns. `motor` in any request: its place
+    on the line, 0 where it is not said.
     """
 
     def __init__(
-        self, motor: Motor, bus: Bus, sensor: ForceSensor, wrong: Misbehaviour, inlet: int, outlet: int
+        self,
+        motors: Sequence[Motor],
+        bus: Bus,
+        sensor: ForceSensor,
+        wrong: Misbehaviour,
+        inlet: int,
+        outlet: int,
     ) -> None:
-        self._motor, self._bus, self._sensor, self._wrong = motor, bus, sensor, wrong
+        self._motors, self._motor = motors, motors[0]
+        self._bus, self._sensor, self._wrong = bus, sensor, wrong
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
         self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
@@ -42,7 +50,7 @@ class LineRequests:
             "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
             "watch": self._watch, "log": self._log,
             "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
-            "torque": lambda now, r: [motor.get("goal"), bool(motor.get("torque_enable"))],
+            "torque": lambda now, r: [self._motor.get("goal"), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
 
     def serve(self, now: int) -> bool:
@@ -67,8 +75,9 @@ class LineRequests:
             request = json.loads(line)
             if request["do"] == "quit":
                 return None
+            self._motor = self._motors[int(request.pop("motor", 0))]
             return {"t": now, "result": self._does[request["do"]](now, request)}
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
             known = ", ".join(self._does)
             return {"error": f"{line.decode(errors='replace')}: {error!r}, expected one of {known}, quit"}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import select
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rsea_ros.hardware.peer.bus import Bus
@@ -35,8 +35,15 @@ class Station:
     motor does not stand still, and what came late then is not the driver's.
     """
 
-    def __init__(self, plant: Plant, motor: Motor, bus: Bus, sensor: ForceSensor, requests: Requests) -> None:
-        self._plant, self._motor, self._bus, self._sensor = plant, motor, bus, sensor
+    def __init__(
+        self,
+        plants: Sequence[Plant],
+        motors: Sequence[Motor],
+        bus: Bus,
+        sensor: ForceSensor,
+        requests: Requests,
+    ) -> None:
+        self._plants, self._motors, self._bus, self._sensor = plants, motors, bus, sensor
         self._requests = requests
         self._tick = 0
 
@@ -55,9 +62,11 @@ class Station:
                 self._sensor.serve(now)
             advanced = self._sensor.tick(now)
             self._bus.flush(now)
-            self._motor.serve(now)
-            if now >= self._tick and not advanced:
-                self._plant.read()
+            for motor in self._motors:
+                motor.serve(now)
+            if now >= self._tick and not (advanced and len(self._plants) == 1):
+                for plant in self._plants:
+                    plant.read()
                 advanced = True
             if advanced:
                 self._tick = now + TICK
