@@ -14,7 +14,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "files", "new_files"}
-BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "version", "wording"} | FILES | YAML
+BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "version", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
@@ -24,6 +24,7 @@ OWN = {
     "progress": set(),
     "wording": set(),
     "version": set(),
+    "plugins": {"errors"},
     "interrupts": set(),
     "files": {"errors", "interrupts"},
     "new_files": {"errors", "files", "interrupts"},
