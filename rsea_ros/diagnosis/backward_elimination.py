@@ -54,7 +54,7 @@ class Smaller:
             (name, rival)
             for name in model.causes
             for rival in look_alikes(name, self.effects)
-            if rival.name not in model.causes and effect_size(rival.name) < effect_size(name) + as_simple
+            if rival.name not in model.solution.problem.acting and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
         found = self.at_work.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
@@ -129,7 +129,9 @@ def _in_order(models: list[Model]) -> list[Model]:
 
 def _sorted(model: Model, order: Sequence[str]) -> Model:
     problem = model.solution.problem
-    rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: order.index(e.name)))
+    stated = [name for name in problem.acting if name in problem.stated]
+    place = {name: k for k, name in enumerate([*stated, *order])}
+    rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: place[e.name]))
     return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig)))
 
 

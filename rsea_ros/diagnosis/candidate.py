@@ -36,8 +36,8 @@ class Model:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Names of the effects that act, in the order in which they came in."""
-        return tuple(e.name for e in self.solution.problem.rig.effects)
+        """Names of the effects beside the nominal model, in the order in which they came in."""
+        return self.solution.problem.added
 
     @property
     def size(self) -> int:

@@ -113,8 +113,7 @@ def spoken_of(judged: Score, channel: str) -> str:
 
 def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
-    setting = with_it.solution.problem.rig.effects[-1]
-    effect = effect_named(setting.name)
+    effect = effect_named(with_it.solution.problem.added[-1])
     speaks = (
         channel
         if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel)
@@ -163,7 +162,7 @@ def _next_experiment(
 ) -> Experiment | None:
     """Return the run that would tell what these data cannot; None when nothing is left to tell."""
     for stage in stages[1:]:
-        rivals = found.rivals_of(stage.solution.problem.rig.effects[-1].name)
+        rivals = found.rivals_of(stage.solution.problem.added[-1])
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained"):

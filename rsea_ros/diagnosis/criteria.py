@@ -96,7 +96,7 @@ def worst(model: Model) -> float:
 
 def at_bound(solution: Solution) -> bool:
     """Tell whether the newest effect's main parameter has run to its bound: then it is no such effect."""
-    effect = effect_named(solution.problem.rig.effects[-1].name)
+    effect = effect_named(solution.problem.added[-1])
     value = solution.values[f"{effect.name}.{effect.main.name}"]
     span = effect.main.high - effect.main.low
     return not effect.main.low + _NEAR * span < value < effect.main.high - _NEAR * span

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.checks.faults import check
+from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import pruned
 from rsea_ros.diagnosis.conclusion import conclusion
 from rsea_ros.diagnosis.evaluation import judged
@@ -30,20 +31,23 @@ def diagnose(
 ) -> Diagnosis:
     """Say where a rig's simulation and the records part, why, and what extending the model gains.
 
+    rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
     holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
     settings: what is tried, DiagnosisSettings() by default.
-    Raises IdentificationError when the records do not hold what the rig needs.
+    Raises IdentificationError when the records are too short or do not hold what the rig needs.
     """
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
-    rig = nominal_rig(rig)
     records = [bounded(r) for r in records]
     holdout = bounded(holdout) if holdout is not None else None
+    for record in [*records, *([holdout] if holdout is not None else [])]:
+        check_diagnosable(record)
     checked = [check(r, rig) for r in records]
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     judging = check(holdout, rig) if holdout is not None else None
-    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
+    stated = frozenset(e.name for e in rig.effects)
+    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
     with workers() as at_work:
         found = search(cases, nominal, effects, at_work, tell, settings.max_causes)
@@ -52,9 +56,3 @@ def diagnose(
         tell("judging", 0.95)
         stages = [judged(found, m, judging, rig, at_work.run) for m in found.models]
         return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, at_work)
-
-
-def nominal_rig(rig: Rig) -> Rig:
-    """Return the rig with only those of its effects whose parameters are all known."""
-    known = (e for e in rig.effects if all(f"{e.name}.{p}" in rig.known for p in e.parameters))
-    return rig.with_effects(*known)

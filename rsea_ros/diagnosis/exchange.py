@@ -29,7 +29,7 @@ def exchanged(
 ) -> Played:
     """Return a model with another effect in the place of one cause that is progress, as a round does."""
     for name in present.causes if is_far(present) else ():
-        alike = [e for e in look_alikes(name, effects) if e.name not in present.causes]
+        alike = [e for e in look_alikes(name, effects) if e.name not in present.solution.problem.acting]
         rivals = [e for e in alike if effect_size(e.name) > effect_size(name)]
         if rivals:
             there = present.solution

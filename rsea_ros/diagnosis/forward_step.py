@@ -119,7 +119,8 @@ class Round:
         """
         present = self.on_pieces
         riding = replace(present, problem=replace(present.problem, ride=True))
-        effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in self.present.causes]
+        acting = self.present.solution.problem.acting
+        effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in acting]
         screened = [screen(riding, e, self._starts[e.name]) for e in effects]
         on_pieces = [self._fit_pieces(h) for h in screened if h is not None]
         models = [self._fit_all(h) for h in on_pieces if h.cost < _HALF * present.cost]
@@ -151,8 +152,7 @@ class Round:
 
     def _screened(self, there: Solution) -> list[Hypothesis]:
         """Return what two cheap steps of every other effect reach beside a solution, best first."""
-        acting = {e.name for e in there.problem.rig.effects}
-        effects = [e for e in self.effects if e.name not in acting]
+        effects = [e for e in self.effects if e.name not in there.problem.acting]
         starts = self._starts
 
         def screen_one(i: int) -> Hypothesis | None:
@@ -167,7 +167,7 @@ class Round:
         """Where fits of every effect that does not act yet begin."""
         there = self.present.solution
         rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
-        effects = [e for e in self.effects if e.name not in self.present.causes]
+        effects = [e for e in self.effects if e.name not in there.problem.acting]
         seen = Seen(self.cases[0], rig, self.present.outputs[0])
         found = self.at_work.fits.map(lambda e: starts_of(e, seen), effects)
         return {e.name: starts for e, starts in zip(effects, found, strict=True)}

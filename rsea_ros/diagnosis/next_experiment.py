@@ -59,8 +59,8 @@ CANDIDATES = tuple(
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
     """Return the cheapest run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
-    names = listed([r.problem.rig.effects[-1].name for r in rivals])
-    cause = accepted.problem.rig.effects[-1].name
+    names = listed([r.problem.added[-1] for r in rivals])
+    cause = accepted.problem.added[-1]
     if not isinstance(case.drive, Drive):
         return Experiment(
             f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {}
