@@ -54,7 +54,8 @@ class Smaller:
             (name, rival)
             for name in model.causes
             for rival in look_alikes(name, self.effects)
-            if rival.name not in model.solution.problem.acting and effect_size(rival.name) < effect_size(name) + as_simple
+            if rival.name not in model.solution.problem.acting
+            and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
         found = self.at_work.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
@@ -85,7 +86,7 @@ def without_needless(found: Search, smaller: Smaller) -> Search:
     last = found.last
     for name, rest in smaller.without(last).items() if len(last.causes) > 1 else ():
         if not compare(last.choose, rest.choose, last.parameters - rest.parameters).better:
-            trial = trial_of(last, name, rest, "not needed beside the other causes")
+            trial = trial_of(last, name, rest, "redundant")
             return without_needless(_replaced(found, rest, trial), smaller)
     return found
 
@@ -98,11 +99,11 @@ def with_better(found: Search, smaller: Smaller) -> Search:
             continue
         without = smaller.without(last)[name]
         if other.size < last.size:
-            why = f"no better than {rival}, which is simpler"
-            return with_better(_replaced(found, other, trial_of(last, name, without, why)), smaller)
+            trial = trial_of(last, name, without, "no_better_than_simpler", rival)
+            return with_better(_replaced(found, other, trial), smaller)
         if is_likelier(other, last):
-            why = f"no better than {rival}, which needs less of what is known beforehand"
-            swapped = _replaced(found, other, trial_of(last, name, without, why))
+            trial = trial_of(last, name, without, "no_better_than_likelier", rival)
+            swapped = _replaced(found, other, trial)
             equal = _sorted(last, [*(c for c in last.causes if c != name), name])
             return with_better(replace(swapped, rivals={**found.rivals, rival: (equal,)}), smaller)
     return found

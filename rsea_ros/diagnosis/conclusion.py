@@ -58,21 +58,26 @@ def conclusion(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
     verdict = verdict_of(found, stages)
+    dropped: list[Rejected] = []
     if verdict == "unexplained":
-        stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
+        channel = spoken_of(stages[0].judged, channel)
+        dropped = [_dropped(a, b, channel) for a, b in itertools.pairwise(stages)]
+        stages = stages[:1]
     first, last = stages[0], stages[-1]
     causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
-    named = {c.name for c in causes}
+    main = causes[0].channel if causes else channel
+    named = {c.name for c in causes} | {r.name for r in dropped}
     others = [t for t in _latest(found.trials) if t.name not in named]
-    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel), others)
+    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, main), others)
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
-    where = misfits(case, first.outputs[0], channel, rig)
+    where = misfits(case, first.outputs[0], main, rig)
     baseline = parameters_of(first.solution, first.confidence)
     return Diagnosis(
         verdict=verdict,
+        channel=main,
         sentence=verdict_sentence(
-            verdict, causes, channel, first.judged.ratio(channel), last.judged.ratio(channel), faults
+            verdict, causes, main, first.judged.ratio(main), last.judged.ratio(main), faults
         ),
         rig_name=rig.name,
         sources=tuple(r.source for r in records),
@@ -90,16 +95,16 @@ def conclusion(
         at_noise_floor=reached(last.judged),
         misfit=where,
         causes=causes,
-        rejected=tuple(rejected),
+        rejected=(*dropped, *rejected),
         next_experiment=_next_experiment(found, stages, verdict, records[0]),
-        remaining=misfits(case, last.outputs[0], channel, rig),
+        remaining=misfits(case, last.outputs[0], main, rig),
         masked=checked[0].masked,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
         statements=(
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
-            *coherence_lost(lost_above(case, channel), channel),
+            *coherence_lost(lost_above(case, main), main),
             *on_measured_angle(last.solution.problem),
             *coloured_noise(sorted(case.coloured)),
         ),
@@ -184,7 +189,14 @@ def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
     problem = replace(trial.problem, cases=cases)
     with_it = score_on(problem, cases, JUDGE, problem.outputs(trial.theta))
     without = score_on(problem, cases, JUDGE, trial.beside.outputs)
-    return Rejected(trial.name, gain(with_it, without, channel)[0], trial.why)
+    size = gain(with_it, without, channel)[0]
+    return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
+
+
+def _dropped(without: Stage, with_it: Stage, channel: str) -> Rejected:
+    """Return an effect that was accepted and is no cause, for the verdict is `unexplained`."""
+    name = with_it.solution.problem.added[-1]
+    return Rejected(name, gain(with_it.judged, without.judged, channel)[0], "leaves_too_much")
 
 
 def _rms(judged: Score, case: Case) -> dict[str, float]:

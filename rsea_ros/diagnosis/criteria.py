@@ -9,6 +9,7 @@ import numpy as np
 from rsea_ros.diagnosis.candidate import AT_FLOOR, Model
 from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.judge import compare
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
@@ -30,20 +31,26 @@ _CLEARLY = 1.0
 
 
 def is_progress(model: Model, present: Model) -> bool:
-    """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it.
+    """Tell whether a model is surely better, and by enough: a share of a channel's residual, or all of it."""
+    return refusal(model, present) is None
+
+
+def refusal(model: Model, present: Model) -> Reason | None:
+    """Return why a model is no progress over the present one; None where it is.
 
     One whose newest effect has run to its bound is none: that bends to something else.
     """
     if at_bound(model.solution):
-        return False
-    if not compare(model.choose, present.choose, model.parameters - present.parameters).better:
-        return False
+        return "at_bound"
+    preference = compare(model.choose, present.choose, model.parameters - present.parameters)
+    if not preference.better:
+        return "too_small" if preference.sure else "not_sure"
     if worst(model) < AT_FLOOR:
-        return True
+        return None
     if len(model.causes) != len(present.causes) + 1 or (len(present.causes) >= _FEW and is_far(model)):
-        return worst(model) < (1.0 - _MUCH) * worst(present)
+        return None if worst(model) < (1.0 - _MUCH) * worst(present) else "too_small"
     fall = max(1.0 - model.choose.ratio(n) / max(present.choose.ratio(n), 1e-12) for n in model.choose.sums)
-    return fall > _ENOUGH
+    return None if fall > _ENOUGH else "too_small"
 
 
 def choose(models: Sequence[Model], present: Score) -> tuple[Model | None, tuple[Model, ...]]:

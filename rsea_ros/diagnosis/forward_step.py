@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rsea_ros.diagnosis.candidate import Model, fitted, heavier, on_places, quicker, refitted
-from rsea_ros.diagnosis.criteria import as_well, at_bound, choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.criteria import as_well, choose, is_far, is_progress, loss_excess, refusal
 from rsea_ros.diagnosis.data_split import CHOOSE, FIT, score_on
 from rsea_ros.diagnosis.initial_guess import Seen, Start, starts_of
 from rsea_ros.diagnosis.judge import compare
@@ -89,7 +89,7 @@ class Round:
         chosen, equals = choose(better, self.present.choose)
         final = {h.name for h in finalists}
         trials = [self._far_behind(h) for h in screened if h.name not in final]
-        trials += [self._trial(m, better, chosen) for m in models if m is not chosen]
+        trials += [self._trial(m, chosen) for m in models if m is not chosen]
         return Played(chosen, trials, equals)
 
     def _hopeful(self, screened: Sequence[Hypothesis], tried: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -238,22 +238,16 @@ class Round:
         self.tell(f"round {self.number + 1}: {what}", share)
 
     def _far_behind(self, h: Hypothesis) -> Trial:
-        why = "far behind the best on the data that it was fitted to"
-        return Trial(h.name, self.present, *self._with_clocks(h), is_full=False, why=why)
+        return Trial(h.name, self.present, *self._with_clocks(h), is_full=False, reason="far_behind")
 
-    def _trial(self, model: Model, better: Sequence[Model], chosen: Model | None) -> Trial:
-        return trial_of(model, model.causes[-1], self.present, _why_not(model, better, chosen))
-
-
-def _why_not(model: Model, better: Sequence[Model], chosen: Model | None) -> str:
-    if at_bound(model.solution):
-        return "its size ran to the bound of what such an effect has"
-    if chosen is None or not any(model is m for m in better):
-        return "does not lower the residual of data that it was not fitted to"
-    near = loss_excess(model, chosen) < 0.02 * chosen.choose.loss(chosen.choose).sum()
-    if model.parameters > chosen.parameters and near:
-        return f"no better than {chosen.causes[-1]}, which is simpler"
-    return f"{chosen.causes[-1]} explains more"
+    def _trial(self, model: Model, chosen: Model | None) -> Trial:
+        reason = refusal(model, self.present)
+        if reason is not None or chosen is None:
+            return trial_of(model, model.causes[-1], self.present, reason or "not_sure")
+        near = loss_excess(model, chosen) < 0.02 * chosen.choose.loss(chosen.choose).sum()
+        is_larger = model.parameters > chosen.parameters and near
+        reason = "no_better_than_simpler" if is_larger else "explains_less"
+        return trial_of(model, model.causes[-1], self.present, reason, chosen.causes[-1])
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:

@@ -14,6 +14,23 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
+Reason = Literal[
+    "far_behind",
+    "at_bound",
+    "not_sure",
+    "too_small",
+    "explains_less",
+    "no_better_than_simpler",
+    "no_better_than_likelier",
+    "redundant",
+    "leaves_too_much",
+]
+"""Why an effect is no cause.
+
+far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound. not_sure,
+too_small: the gain on the validation blocks. explains_less, no_better_than_…: than the accepted rival.
+redundant: beside the other causes. leaves_too_much: it was accepted, but the verdict is `unexplained`.
+"""
 
 
 @dataclass(frozen=True)
@@ -54,11 +71,17 @@ class Cause:
 
 @dataclass(frozen=True)
 class Rejected:
-    """A cause that was tried and not accepted, with its gain on data that it was not fitted to."""
+    """An effect that was tried and is no cause, with its gain on data that it was not fitted to.
+
+    rival: the effect that was preferred, empty for none. is_fitted: fitted to all training blocks; otherwise
+    only to short pieces of them, and its gain says little.
+    """
 
     name: str
     gain_holdout: float
-    why: str
+    reason: Reason
+    rival: str = ""
+    is_fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -84,11 +107,13 @@ class Spectrum:
 class Diagnosis:
     """The verdict and all that it rests on. Dicts are by channel, in the channel's unit.
 
+    channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
     before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
     """
 
     verdict: Verdict
+    channel: str
     sentence: str
     rig_name: str
     sources: tuple[str, ...]

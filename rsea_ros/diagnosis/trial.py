@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsea_ros.diagnosis.candidate import Model
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.identification.problem import Problem
 from rsea_ros.signals import FloatArray
 
@@ -21,9 +22,10 @@ class Trial:
     problem: Problem
     theta: FloatArray
     is_full: bool
-    why: str
+    reason: Reason
+    rival: str = ""
 
 
-def trial_of(model: Model, name: str, beside: Model, why: str) -> Trial:
+def trial_of(model: Model, name: str, beside: Model, reason: Reason, rival: str = "") -> Trial:
     """Return the trial of an effect that was fitted to everything."""
-    return Trial(name, beside, model.solution.problem, model.solution.theta, True, why)
+    return Trial(name, beside, model.solution.problem, model.solution.theta, True, reason, rival)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Misfit, Rejected
+from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
 
 SCHEMA = 1
@@ -18,6 +19,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "schema": SCHEMA,
         "rig": d.rig_name,
         "verdict": d.verdict,
+        "channel": d.channel,
         "sentence": d.sentence,
         "data": {
             "bags": list(d.sources),
@@ -80,7 +82,14 @@ def _pair(interval: tuple[float, float]) -> list[float | None]:
 
 
 def _rejected(rejected: Rejected) -> dict[str, Any]:
-    return {"name": rejected.name, "gain_holdout": finite(rejected.gain_holdout), "why": rejected.why}
+    return {
+        "name": rejected.name,
+        "gain_holdout": finite(rejected.gain_holdout),
+        "why": say.rejection(rejected),
+        "reason": rejected.reason,
+        "rival": rejected.rival or None,
+        "fitted": rejected.is_fitted,
+    }
 
 
 def _experiment(experiment: Experiment | None) -> dict[str, Any] | None:

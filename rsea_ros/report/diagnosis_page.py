@@ -29,7 +29,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> str:
 
 def _blocks(d: Diagnosis) -> Iterator[Block]:
     """Yield the page from top to bottom: the verdict first, then what it rests on."""
-    main = say.main_channel(d)
+    main = d.channel
     yield key_numbers(_keys(d, main))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'

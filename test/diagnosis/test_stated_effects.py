@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_ros.diagnosis import conclusion
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
@@ -55,3 +56,12 @@ def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
 def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
     with pytest.raises(IdentificationError, match="4 s or more"):
         diagnose([recorded().between(0.0, 3.0)], RIG, settings=FEW)
+
+
+def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
+    """With the verdict `unexplained` it was in neither list."""
+    monkeypatch.setattr(conclusion, "verdict_of", lambda *_: "unexplained")
+    diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
+    assert diagnosis.causes == ()
+    dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
+    assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
