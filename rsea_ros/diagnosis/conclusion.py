@@ -135,7 +135,7 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     }
     return Cause(
         name=effect.name,
-        parameters={k: honest(e) for k, e in estimates.items()},
+        parameters={k: with_model_uncertainty(e) for k, e in estimates.items()},
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
@@ -148,18 +148,18 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     )
 
 
-def honest(estimate: ParameterEstimate) -> Estimate:
+def with_model_uncertainty(estimate: ParameterEstimate) -> Estimate:
     """Return an estimate whose interval also holds what no residual shows.
 
     The fit's interval speaks of noise alone. Two right simulations of one bench differ by about MODEL_DOUBT
     in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
-    the sensors' clocks.
+    the sensors' clocks. The interval of the noise alone stands beside the whole one.
     """
-    doubt = MODEL_DOUBT * abs(estimate.value)
+    value, sd = estimate.value, MODEL_DOUBT * abs(estimate.value)
     if estimate.unit == "s":
-        doubt = float(np.hypot(doubt, CLOCK_DOUBT))
-    low, high = (float(np.hypot(end - estimate.value, 1.96 * doubt)) for end in estimate.ci95)
-    return Estimate(estimate.value, estimate.unit, (estimate.value - low, estimate.value + high))
+        sd = float(np.hypot(sd, CLOCK_DOUBT))
+    low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
+    return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
 
 
 def _next_experiment(

@@ -47,11 +47,17 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter of a cause with its 95 % interval."""
+    """A parameter of a cause with its 95 % interval.
+
+    ci95: of all that is unknown, the simulation's own error included. statistical_ci95: of the data's noise
+    alone; None where it was not separated. model_sd: one sigma of the simulation's own error, in `unit`.
+    """
 
     value: float
     unit: str
     ci95: tuple[float, float]
+    statistical_ci95: tuple[float, float] | None = None
+    model_sd: float = 0.0
 
 
 @dataclass(frozen=True)

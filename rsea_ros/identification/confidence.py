@@ -90,7 +90,7 @@ def confidence_of(solution: Solution) -> Confidence:
 def _inverse(matrix: FloatArray) -> FloatArray:
     """Return the inverse of a positive definite matrix whose unknowns may be scaled very differently.
 
-    Each unknown is brought to the scale of its own diagonal first: otherwise a value that only its wide bounds
+    Each unknown is brought to the scale of its own diagonal first: otherwise a value that only wide bounds
     hold is taken for a singular direction beside one that is known well. What rounding hides of an eigenvalue
     counts as the smallest that rounding shows, which leaves a wide variance and never none.
     """

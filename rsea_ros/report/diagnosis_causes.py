@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Rejected
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
@@ -38,9 +38,17 @@ def _sizes(cause: Cause) -> str:
     for name, p in cause.parameters.items():
         value, half, unit = num.estimate(p)
         doubt = f" <small>± {half}</small>" if half else ""
-        what = f"{escape(name.replace('_', ' '))}, 95 % interval"
+        what = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
         cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
     return f'<div class="keys">{"".join(cells)}</div>'
+
+
+def _model_share(estimate: Estimate) -> str:
+    """Return how much of an interval the simulation itself adds, `, of which the simulation ± 0.0147 N·m`."""
+    if not estimate.model_sd > 0.0:
+        return ""
+    half, unit = num.model_half_width(estimate)
+    return f", of which the simulation ± {half} {unit}".rstrip()
 
 
 def _rivals(cause: Cause) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
 
@@ -63,8 +63,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "name": cause.name,
         "channel": cause.channel,
         "parameters": {
-            name: {"value": finite(p.value), "unit": p.unit, "ci95": _pair(p.ci95)}
-            for name, p in cause.parameters.items()
+            name: _estimate(p) for name, p in cause.parameters.items()
         },
         "gain": {
             "train": finite(cause.gain_train),
@@ -74,6 +73,17 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "evidence": cause.evidence,
         "equation": cause.equation,
         "confusable_with": list(cause.confusable_with),
+    }
+
+
+def _estimate(p: Estimate) -> dict[str, Any]:
+    statistical = None if p.statistical_ci95 is None else _pair(p.statistical_ci95)
+    return {
+        "value": finite(p.value),
+        "unit": p.unit,
+        "ci95": _pair(p.ci95),
+        "statistical_ci95": statistical,
+        "model_sd": finite(p.model_sd),
     }
 
 

@@ -18,8 +18,8 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 
-def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_to_be_unidentifiable(monkeypatch):
-    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as zero."""
+def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_so(monkeypatch):
+    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
     rig = load_rig("paper_high_impedance")
     command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
