@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.diagnosis.data_split import CHOOSE, FIT, Score, part, score_on
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import ABOVE, reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
@@ -27,12 +27,12 @@ _FARTHEST = 20.0
 
 
 @dataclass(frozen=True)
-class Model:
+class Candidate:
     """A fitted model, its simulated channels on every case, and how it does on the blocks that choose."""
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
-    choose: Score
+    validation: Score
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -55,32 +55,32 @@ def effect_size(name: str) -> int:
     return sum(not p.optional for p in effect_named(name).parameters)
 
 
-def fitted(
+def fit_candidate(
     cases: Sequence[Case],
     problem: Problem,
     theta: FloatArray | None,
-    places: tuple[int, ...] = FIT,
+    places: tuple[int, ...] = TRAIN,
     iterations: int = _ITERATIONS,
     weights: Score | None = None,
     gain: float = _SEARCH_GAIN,
     near: Solution | None = None,
     run: Map = serial,
     quick: bool = False,
-) -> Model:
+) -> Candidate:
     """Fit a problem's unknowns on some blocks of the cases. weights: a score whose misfit counts as noise.
 
     gain: relative fall of the cost below which the fit is done, at the noise; farther off it grows.
     near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
     run: how derivatives are made, one after another or in a pool. quick: on coarser steps.
     """
-    masked = on_places(problem, cases, places, weights)
-    masked = quicker(masked) if quick else masked
+    masked = on_blocks(problem, cases, places, weights)
+    masked = with_doubled_step(masked) if quick else masked
     fit = partial(solve, masked, iterations=iterations, gain=gain * _distance(weights), run=run)
     solution = fit(theta, matrix=None if near is None else _reweighted(near, masked))
     moved = with_common_clock_in_delay(solution)
     if moved is not None:
         solution = min(solution, fit(moved), key=lambda s: s.cost)
-    return as_model(cases, solution)
+    return candidate_of(cases, solution)
 
 
 def _distance(weights: Score | None) -> float:
@@ -89,14 +89,14 @@ def _distance(weights: Score | None) -> float:
     return min(max([1.0, *ratios]), _FARTHEST)
 
 
-def on_places(
+def on_blocks(
     problem: Problem, cases: Sequence[Case], places: tuple[int, ...], weights: Score | None
 ) -> Problem:
     """Return a problem on some blocks of the cases. weights: a score whose misfit counts as noise."""
-    return replace(problem, cases=tuple(heavier(part(c, places), weights) for c in cases))
+    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, places), weights) for c in cases))
 
 
-def quicker(problem: Problem) -> Problem:
+def with_doubled_step(problem: Problem) -> Problem:
     """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
     return replace(
         problem,
@@ -130,7 +130,7 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     return np.asarray(theta)
 
 
-def heavier(case: Case, weights: Score | None) -> Case:
+def with_misfit_as_noise(case: Case, weights: Score | None) -> Case:
     """Return a case in which what a model leaves of a channel counts as its noise, where that is more."""
     if weights is None:
         return case
@@ -138,36 +138,36 @@ def heavier(case: Case, weights: Score | None) -> Case:
     return replace(case, noise=noise)
 
 
-def as_model(cases: Sequence[Case], solution: Solution) -> Model:
+def candidate_of(cases: Sequence[Case], solution: Solution) -> Candidate:
     """Return a solution with its outputs and its score on the blocks that choose."""
     outputs = solution.problem.outputs(solution.theta)
-    return Model(solution, outputs, score_on(solution.problem, cases, CHOOSE, outputs))
+    return Candidate(solution, outputs, score_on(solution.problem, cases, VALIDATION, outputs))
 
 
-def refitted(cases: Sequence[Case], model: Model, run: Map, quick: bool = False) -> Model:
+def refit(cases: Sequence[Case], model: Candidate, run: Map, quick: bool = False) -> Candidate:
     """Fit a model again with each channel in units of what the model leaves of it."""
     there = model.solution
-    weights = rescored(cases, model).choose
-    return fitted(cases, there.problem, there.theta, weights=weights, near=there, run=run, quick=quick)
+    weights = score_again(cases, model).validation
+    return fit_candidate(cases, there.problem, there.theta, weights=weights, near=there, run=run, quick=quick)
 
 
-def rescored(cases: Sequence[Case], model: Model) -> Model:
+def score_again(cases: Sequence[Case], model: Candidate) -> Candidate:
     """Return the model with its score against the cases' present noise."""
-    problem = replace(model.solution.problem, cases=tuple(part(c, FIT) for c in cases))
-    return Model(
+    problem = replace(model.solution.problem, cases=tuple(part(c, TRAIN) for c in cases))
+    return Candidate(
         replace(model.solution, problem=problem, jacobian=_reweighted(model.solution, problem)),
         model.outputs,
-        score_on(problem, cases, CHOOSE, model.outputs),
+        score_on(problem, cases, VALIDATION, model.outputs),
     )
 
 
-def reestimated(cases: Sequence[Case], model: Model) -> tuple[Case, ...]:
+def cases_with_noise_of(cases: Sequence[Case], model: Candidate) -> tuple[Case, ...]:
     """Return the cases with the noise that a model's residual shows."""
     ratio = model.solution.problem.rig["gear.ratio"]
     return tuple(reestimate_noise(c, out, ratio) for c, out in zip(cases, model.outputs, strict=True))
 
 
-def at_floor(model: Model, cases: Sequence[Case]) -> bool:
+def leaves_only_noise(model: Candidate, cases: Sequence[Case]) -> bool:
     """Tell whether the residual of every channel is noise, on all blocks but those that judge."""
-    standing = score_on(model.solution.problem, cases, (*FIT, *CHOOSE), model.outputs)
+    standing = score_on(model.solution.problem, cases, (*TRAIN, *VALIDATION), model.outputs)
     return standing.missed == 0.0 and all(standing.ratio(n) < AT_FLOOR for n in standing.sums)

@@ -19,7 +19,7 @@ from rsea_ros.signals import BoolArray, FloatArray, IntArray
 _LONGEST, _SHORTEST = 1.0, 0.25
 """s. Longer than the bench remembers, short enough that every part of a sweep is in every set."""
 _ENOUGH = 120
-FIT, CHOOSE, JUDGE = (0, 1), (2,), (3,)
+TRAIN, VALIDATION, TEST = (0, 1), (2,), (3,)
 _ORDERS = np.array(
     [[0, 1, 2, 3], [0, 1, 3, 2], [2, 0, 1, 3], [3, 0, 1, 2], [2, 3, 0, 1], [3, 2, 0, 1]], dtype=np.int64
 )
@@ -33,12 +33,12 @@ def block_length(case: Case) -> float:
 
 
 def set_of(block: IntArray) -> IntArray:
-    """Return to which set blocks belong: one of FIT, CHOOSE, JUDGE."""
+    """Return to which set blocks belong: one of TRAIN, VALIDATION, TEST."""
     return np.asarray(_PATTERN[(block // 4) % len(_PATTERN), block % 4])
 
 
-def fit_starts(case: Case) -> FloatArray:
-    """Return where the pairs of FIT blocks begin, s since the case's start."""
+def train_starts(case: Case) -> FloatArray:
+    """Return where the pairs of TRAIN blocks begin, s since the case's start."""
     groups = int(case.duration / block_length(case)) // 4
     firsts = np.argmin(_PATTERN[np.arange(groups) % len(_PATTERN)], axis=1)
     return np.asarray((4 * np.arange(groups) + firsts) * block_length(case))

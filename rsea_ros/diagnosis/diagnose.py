@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 from rsea_ros.checks.faults import check
 from rsea_ros.checks.usable import check_diagnosable
-from rsea_ros.diagnosis.backward_elimination import pruned
-from rsea_ros.diagnosis.conclusion import conclusion
-from rsea_ros.diagnosis.evaluation import judged
+from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
+from rsea_ros.diagnosis.conclusion import diagnosis_of
+from rsea_ros.diagnosis.evaluation import evaluate
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import search
-from rsea_ros.diagnosis.workers import workers
+from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -49,10 +49,10 @@ def diagnose(
     stated = frozenset(e.name for e in rig.effects)
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
-    with workers() as at_work:
-        found = search(cases, nominal, effects, at_work, tell, settings.max_causes)
+    with worker_pools() as pools:
+        found = select_stepwise(cases, nominal, effects, pools, tell, settings.max_causes)
         tell("looking for a simpler model", 0.9)
-        found = pruned(found, effects, at_work)
+        found = eliminate_backwards(found, effects, pools)
         tell("judging", 0.95)
-        stages = [judged(found, m, judging, rig, at_work.run) for m in found.models]
-        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, at_work)
+        stages = [evaluate(found, m, judging, rig, pools.run) for m in found.models]
+        return diagnosis_of(found, stages, [*checked, *([judging] if judging else [])], records, rig, pools)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from rsea_ros.checks.faults import Checked
-from rsea_ros.diagnosis.candidate import Model, fitted, rescored
-from rsea_ros.diagnosis.data_split import CHOOSE, FIT, JUDGE, Score, score, score_on
-from rsea_ros.diagnosis.stepwise import Search
+from rsea_ros.diagnosis.candidate import Candidate, fit_candidate, score_again
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, Score, score, score_on
+from rsea_ros.diagnosis.stepwise import Selection
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.solver import Map, Solution
@@ -22,13 +22,13 @@ _GAIN = 1e-6
 
 
 @dataclass(frozen=True)
-class Stage:
+class Evaluated:
     """A model of the accepted sequence, re-fitted on all blocks but those that judge, and judged there."""
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
     train: Score
-    judged: Score
+    test: Score
 
     @cached_property
     def confidence(self) -> Confidence:
@@ -36,18 +36,22 @@ class Stage:
         return confidence_of(self.solution)
 
 
-def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig, run: Map) -> Stage:
+def evaluate(
+    selection: Selection, chosen: Candidate, judging: Checked | None, rig: Rig, run: Map
+) -> Evaluated:
     """Re-fit a model on all that does not judge, and judge it."""
-    start, weights = chosen.solution, rescored(found.cases, chosen).choose
-    places = (*FIT, *CHOOSE)
-    model = fitted(found.cases, start.problem, start.theta, places, weights=weights, gain=_GAIN, run=run)
+    start, weights = chosen.solution, score_again(selection.cases, chosen).validation
+    places = (*TRAIN, *VALIDATION)
+    model = fit_candidate(
+        selection.cases, start.problem, start.theta, places, weights=weights, gain=_GAIN, run=run
+    )
     problem = model.solution.problem
-    train = score_on(problem, found.cases, places, model.outputs)
+    train = score_on(problem, selection.cases, places, model.outputs)
     if judging is None:
-        on_judge = score_on(problem, found.cases, JUDGE, model.outputs)
-        return Stage(model.solution, model.outputs, train, on_judge)
-    case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
+        test = score_on(problem, selection.cases, TEST, model.outputs)
+        return Evaluated(model.solution, model.outputs, train, test)
+    case = replace(case_from(judging.record, rig, judging.masked), noise=selection.cases[0].noise)
     moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
     moved = in_phase(moved, judging.record)
     outputs = simulated((case,), moved, offsets, ride=problem.ride)
-    return Stage(model.solution, model.outputs, train, score(problem, (case,), outputs))
+    return Evaluated(model.solution, model.outputs, train, score(problem, (case,), outputs))

@@ -21,7 +21,7 @@ MATTERS = 0.02
 
 
 @dataclass(frozen=True)
-class Standing:
+class Preference:
     """How a model stands against another: whether it is surely better, and whether that matters."""
 
     sure: bool
@@ -33,14 +33,14 @@ class Standing:
         return self.sure and self.matters
 
 
-def compare(model: Score, other: Score, extra_parameters: int = 0) -> Standing:
+def preference(model: Score, other: Score, extra_parameters: int = 0) -> Preference:
     """Hold a model against another. extra_parameters: how many more the model has."""
     difference = other.loss(other) - model.loss(other)
     price = 2.0 * extra_parameters / len(difference)
     means = bootstrap_means(difference - price)
     falls = [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
     sees_more = model.missed < 0.5 * other.missed
-    return Standing(
+    return Preference(
         sure=bool(np.quantile(means, 0.025) > 0.0), matters=max(falls, default=0.0) > MATTERS or sees_more
     )
 

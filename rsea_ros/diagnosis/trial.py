@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsea_ros.diagnosis.candidate import Model
+from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.result import Reason
 from rsea_ros.identification.problem import Problem
 from rsea_ros.signals import FloatArray
@@ -18,7 +18,7 @@ class Trial:
     """
 
     name: str
-    beside: Model
+    beside: Candidate
     problem: Problem
     theta: FloatArray
     is_full: bool
@@ -26,6 +26,6 @@ class Trial:
     rival: str = ""
 
 
-def trial_of(model: Model, name: str, beside: Model, reason: Reason, rival: str = "") -> Trial:
+def trial_of(model: Candidate, name: str, beside: Candidate, reason: Reason, rival: str = "") -> Trial:
     """Return the trial of an effect that was fitted to everything."""
     return Trial(name, beside, model.solution.problem, model.solution.theta, True, reason, rival)

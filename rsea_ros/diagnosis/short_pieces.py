@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.data_split import FIT, block_length, fit_starts, part
+from rsea_ros.diagnosis.data_split import TRAIN, block_length, part, train_starts
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
@@ -19,18 +19,18 @@ _ENOUGH = 14.0
 """s of data in all pieces together."""
 
 
-def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...]:
-    """Return pieces of a case, each a run-up and the FIT blocks after it, about 14 s of data in all.
+def short_pieces_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...]:
+    """Return pieces of a case, each a run-up and the TRAIN blocks after it, about 14 s of data in all.
 
     Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
-    fit = part(case, FIT)
+    fit = part(case, TRAIN)
     drive = case.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
         return (fit,)
     length = 2.0 * block_length(case)
-    starts = fit_starts(case)[1:]
+    starts = train_starts(case)[1:]
     half = round(0.5 * _ENOUGH / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
     misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])

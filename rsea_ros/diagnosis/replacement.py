@@ -8,39 +8,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.candidate import Model, effect_size, fitted
-from rsea_ros.diagnosis.criteria import is_far, is_progress
-from rsea_ros.diagnosis.forward_step import NOTHING, Played, Round
-from rsea_ros.diagnosis.screening import reduced
-from rsea_ros.diagnosis.workers import Workers
+from rsea_ros.diagnosis.candidate import Candidate, effect_size, fit_candidate
+from rsea_ros.diagnosis.criteria import is_acceptable, is_far_from_floor
+from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep, StepResult
+from rsea_ros.diagnosis.screening import without_effect
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
 
 
-def exchanged(
+def replacement_step(
     cases: tuple[Case, ...],
     effects: Sequence[Effect],
-    present: Model,
+    present: Candidate,
     number: int,
-    at_work: Workers,
+    pools: Pools,
     tell: Progress,
-) -> Played:
+) -> StepResult:
     """Return a model with another effect in the place of one cause that is progress, as a round does."""
-    for name in present.causes if is_far(present) else ():
+    for name in present.causes if is_far_from_floor(present) else ():
         alike = [e for e in look_alikes(name, effects) if e.name not in present.solution.problem.acting]
         rivals = [e for e in alike if effect_size(e.name) > effect_size(name)]
         if rivals:
             there = present.solution
-            rest = fitted(
+            rest = fit_candidate(
                 cases,
-                *reduced(there.problem, there.theta, name),
-                weights=present.choose,
-                run=at_work.run,
+                *without_effect(there.problem, there.theta, name),
+                weights=present.validation,
+                run=pools.run,
                 quick=True,
             )
-            played = Round(cases, rivals, rest, number, at_work, tell).play()
-            if played.accepted is not None and is_progress(played.accepted, present):
+            played = ForwardStep(cases, rivals, rest, number, pools, tell).run()
+            if played.accepted is not None and is_acceptable(played.accepted, present):
                 return played
-    return NOTHING
+    return NO_STEP
