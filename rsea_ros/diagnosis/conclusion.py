@@ -10,12 +10,12 @@ import numpy as np
 
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
-from rsea_ros.diagnosis.data_split import TEST, Score, score_on
+from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.judge import gain
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
+from rsea_ros.diagnosis.score import Score, gain, score_on
 from rsea_ros.diagnosis.sentences import (
     coherence_lost,
     coloured_noise,
@@ -23,9 +23,10 @@ from rsea_ros.diagnosis.sentences import (
     on_measured_angle,
     verdict_sentence,
 )
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import Selection
 from rsea_ros.diagnosis.trial import Trial
-from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
+from rsea_ros.diagnosis.verdict import is_at_floor, verdict_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import what_is_not_told
@@ -50,6 +51,7 @@ def diagnosis_of(
     records: Sequence[Record],
     rig: Rig,
     pools: Pools,
+    settings: DiagnosisSettings,
 ) -> Diagnosis:
     """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
     channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
@@ -57,10 +59,12 @@ def diagnosis_of(
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
-    verdict = verdict_of(selection, stages)
+    levels, causes_named = settings.floor, selection.last.causes
+    has_rivals = bool(causes_named) and bool(selection.rivals_of(causes_named[0]))
+    verdict = verdict_of([s.test for s in stages], has_rivals, levels)
     dropped: list[Rejected] = []
     if verdict == "unexplained":
-        channel = main_channel(stages[0].test, channel)
+        channel = main_channel(stages[0].test, channel, levels.reached)
         dropped = [_dropped(a, b, channel) for a, b in itertools.pairwise(stages)]
         stages = stages[:1]
     first, last = stages[0], stages[-1]
@@ -92,7 +96,7 @@ def diagnosis_of(
         fit_percent=_fit(first, selection.cases),
         extended_residual_rms=_rms(last.test, case),
         extended_fit_percent=_fit(last, selection.cases),
-        at_noise_floor=reached(last.test),
+        at_noise_floor=is_at_floor(last.test, levels),
         misfit=where,
         causes=causes,
         rejected=(*dropped, *rejected),
@@ -111,9 +115,9 @@ def diagnosis_of(
     )
 
 
-def main_channel(test: Score, channel: str) -> str:
-    """Return the channel that tells an unexplained residual: the worst, unless `channel` is above noise."""
-    return channel if test.ratio(channel) > FLOOR else test.worst
+def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reached) -> str:
+    """Return the channel that shows an unexplained residual: `channel` if above noise, else the worst."""
+    return channel if test.ratio(channel) > reached else test.worst
 
 
 def _cause(
@@ -144,7 +148,7 @@ def _cause(
         ),
         equation=effect.equation,
         channel=speaks,
-        confusable_with=tuple(m.causes[-1] for m in selection.rivals_of(effect.name)),
+        confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
     )
 
 

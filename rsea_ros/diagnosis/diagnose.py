@@ -1,4 +1,9 @@
-"""Diagnosis: simulate, compare, hypothesise, fit, judge, until nothing is left or nothing helps."""
+"""Diagnosis: what a rig's simulation gets wrong, by stepwise selection among the effects of the catalogue.
+
+The nominal model is fitted; effects are added one after another, each fitted to the training blocks and
+accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is reported
+with its gain on the test blocks.
+"""
 
 from __future__ import annotations
 
@@ -29,11 +34,11 @@ def diagnose(
     progress: Progress | None = None,
     settings: DiagnosisSettings | None = None,
 ) -> Diagnosis:
-    """Say where a rig's simulation and the records part, why, and what extending the model gains.
+    """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
 
     rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
-    holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
-    settings: what is tried, DiagnosisSettings() by default.
+    holdout: a record on which the models are tested; without it, the test blocks of the records.
+    settings: what is tried and by which numbers, DiagnosisSettings() by default.
     Raises IdentificationError when the records are too short or do not hold what the rig needs.
     """
     settings = settings or DiagnosisSettings()
@@ -45,14 +50,15 @@ def diagnose(
         check_diagnosable(record)
     checked = [check(r, rig) for r in records]
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
-    judging = check(holdout, rig) if holdout is not None else None
+    tested = check(holdout, rig) if holdout is not None else None
     stated = frozenset(e.name for e in rig.effects)
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
     with worker_pools() as pools:
-        found = select_stepwise(cases, nominal, effects, pools, tell, settings.max_causes)
+        selection = select_stepwise(nominal, effects, pools, tell, settings)
         tell("looking for a simpler model", 0.9)
-        found = eliminate_backwards(found, effects, pools)
-        tell("judging", 0.95)
-        stages = [evaluate(found, m, judging, rig, pools.run) for m in found.models]
-        return diagnosis_of(found, stages, [*checked, *([judging] if judging else [])], records, rig, pools)
+        selection = eliminate_backwards(selection, effects, pools, settings)
+        tell("evaluating on the test blocks", 0.95)
+        stages = [evaluate(selection, m, tested, pools, settings) for m in selection.models]
+        every = [*checked, *([tested] if tested else [])]
+        return diagnosis_of(selection, stages, every, records, rig, pools, settings)

@@ -1,6 +1,7 @@
-"""The search: from the re-fitted nominal model, cause after cause, to the noise floor or until nothing helps.
+"""Stepwise selection: from the re-fitted nominal model, cause after cause, until only noise is left or no
+effect helps.
 
-A model is fitted on TRAIN blocks and chosen on VALIDATION blocks; TEST blocks are not looked at here.
+Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 """
 
 from __future__ import annotations
@@ -10,75 +11,78 @@ from dataclasses import dataclass, field
 
 from rsea_ros.diagnosis.candidate import (
     Candidate,
-    cases_with_noise_of,
+    FitSetup,
     fit_candidate,
     leaves_only_noise,
     refit,
-    score_again,
+    scored_against,
+    with_noise_reestimated,
 )
 from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep
 from rsea_ros.diagnosis.replacement import replacement_step
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
 
-_FIRST_ITERATIONS = 25
-_MOST_EXCHANGES = 2
-
 
 @dataclass(frozen=True)
 class Selection:
-    """All cases (every sample), the accepted models from the nominal one on, and what else was tried.
+    """The accepted models, from the nominal one on, and what else was tried.
 
-    rivals: by accepted cause, the models that do as well with another in its place.
+    rivals: by accepted cause, the models that do as well with another effect in its place.
     """
 
-    cases: tuple[Case, ...]
     models: tuple[Candidate, ...]
     trials: tuple[Trial, ...] = ()
     rivals: Mapping[str, tuple[Candidate, ...]] = field(default_factory=dict)
 
-    def rivals_of(self, cause: str) -> tuple[Candidate, ...]:
-        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
-        return tuple(m for m in self.rivals.get(cause, ()) if m.causes[-1] not in self.last.causes)
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """Every sample of the records, with the noise that the last model shows."""
+        return self.last.cases
 
     @property
     def last(self) -> Candidate:
         """The model with all accepted causes."""
         return self.models[-1]
 
+    def rivals_of(self, cause: str) -> tuple[Candidate, ...]:
+        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
+        return tuple(m for m in self.rivals.get(cause, ()) if m.newest not in self.last.causes)
+
 
 def select_stepwise(
-    cases: tuple[Case, ...],
-    nominal: Problem,
-    effects: Sequence[Effect],
-    pools: Pools,
-    tell: Progress,
-    max_causes: int,
+    nominal: Problem, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings
 ) -> Selection:
-    """Find up to max_causes causes among some effects, most telling first."""
-    models = [fit_candidate(cases, nominal, None, iterations=_FIRST_ITERATIONS, run=pools.run)]
-    cases = cases_with_noise_of(cases, models[0])
-    models = [refit(cases, models[0], pools.run)]
+    """Select up to max_causes causes among some effects, the one that explains most first."""
+    setup = FitSetup(nominal.cases, settings.fits, pools.run)
+    first = fit_candidate(FitSetup(nominal.cases, settings.fits, pools.run,
+                                   iterations=settings.fits.first_iterations), nominal)  # fmt: skip
+    models = [refit(with_noise_reestimated(first), setup)]
     trials: list[Trial] = []
-    equals: dict[str, tuple[Candidate, ...]] = {}
-    for number in range(max_causes + _MOST_EXCHANGES):
-        present, played = models[-1], NO_STEP
-        if leaves_only_noise(present, cases) and not any(c.coloured for c in cases):
-            break  # coloured noise may hide a cause that a fit still finds
-        if len(present.causes) < max_causes:
-            played = ForwardStep(cases, effects, present, number, pools, tell).run()
-            trials += played.trials
-        if played.accepted is None:
-            played = replacement_step(cases, effects, present, number, pools, tell)
-        accepted = played.accepted
-        if accepted is None:
+    rivals: dict[str, tuple[Candidate, ...]] = {}
+    for number in range(settings.max_causes + settings.forward.replacements):
+        present, step = models[-1], NO_STEP
+        if _is_finished(present, settings):
             break
-        equals[accepted.causes[-1]] = played.equals
-        quieter = cases_with_noise_of(cases, accepted)
-        accepted = refit(quieter, accepted, pools.run)
-        models = [*(score_again(quieter, m) for m in models), accepted]
-        cases = quieter
-    return Selection(cases, tuple(models), tuple(trials), equals)
+        forward = ForwardStep(present, effects, number, pools, tell, settings)
+        if len(present.causes) < settings.max_causes:
+            step = forward.run()
+            trials += step.trials
+        if step.accepted is None:
+            step = replacement_step(forward)
+        if step.accepted is None:
+            break
+        rivals[step.accepted.newest] = step.equals
+        models.append(refit(with_noise_reestimated(step.accepted), setup))
+    cases = models[-1].cases
+    return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+
+
+def _is_finished(model: Candidate, settings: DiagnosisSettings) -> bool:
+    """Tell whether only noise is left; coloured noise may hide a cause that a fit still finds."""
+    is_coloured = any(case.coloured for case in model.cases)
+    return leaves_only_noise(model, settings.floor.only_noise) and not is_coloured

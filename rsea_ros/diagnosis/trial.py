@@ -1,4 +1,4 @@
-"""A trial: one effect beside a model in one round, and what became of it."""
+"""A trial: one effect tried beside a model, and why it is no cause."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rsea_ros.signals import FloatArray
 class Trial:
     """An effect tried beside a model. problem, theta: with it, as far as its fit went.
 
-    is_full: fitted to everything that may be fitted to, not only to short pieces.
+    is_full: fitted to all training blocks, not only to short pieces. rival: the effect that was preferred.
     """
 
     name: str
@@ -27,5 +27,5 @@ class Trial:
 
 
 def trial_of(model: Candidate, name: str, beside: Candidate, reason: Reason, rival: str = "") -> Trial:
-    """Return the trial of an effect that was fitted to everything."""
-    return Trial(name, beside, model.solution.problem, model.solution.theta, True, reason, rival)
+    """Return the trial of an effect that was fitted to all training blocks."""
+    return Trial(name, beside, model.problem, model.solution.theta, True, reason, rival)
