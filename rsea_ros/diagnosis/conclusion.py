@@ -103,6 +103,7 @@ def diagnosis_of(
         next_experiment=_next_experiment(selection, stages, verdict, records[0]),
         remaining=misfits(case, last.outputs[0], main, rig),
         masked=checked[0].masked,
+        settings=settings,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Fault, FloatArray
@@ -145,3 +146,4 @@ class Diagnosis:
     spectra: tuple[Spectrum, ...] = ()
     statements: tuple[str, ...] = field(default=())
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
+    settings: DiagnosisSettings = DEFAULT

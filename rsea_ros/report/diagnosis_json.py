@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
 
@@ -44,7 +45,14 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(d.statements),
+        "settings": _settings(d.settings),
     }
+
+
+def _settings(settings: DiagnosisSettings) -> dict[str, Any]:
+    """Return every number that steered the verdict, `group.name`: value."""
+    numbers = {s.name: s.value for s in settings.listed()}
+    return {"max_causes": settings.max_causes, "without": list(settings.without), **numbers}
 
 
 def _misfit(m: Misfit) -> dict[str, Any]:

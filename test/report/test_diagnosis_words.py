@@ -12,12 +12,14 @@ import pytest
 from rich.console import Console
 
 from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_json import diagnosis_json
 from rsea_ros.report.diagnosis_profile import BINS, Profile, profiles
+from rsea_ros.report.diagnosis_settings import settings_section
 from rsea_ros.report.diagnosis_terminal import terminal_lines
 from rsea_ros.report.diagnosis_where import finding, where_figure
 from rsea_ros.signals import Fault
@@ -151,3 +153,14 @@ def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():
         warnings.simplefilter("error")
         figure = where_figure([profile], changed=True)
     assert np.isfinite(figure.layout["yaxis"]["range"]).all()
+
+
+def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnosed):
+    changed = DiagnosisSettings(without=("ft_bias",), acceptance=AcceptanceSettings(fall=0.25))
+    diagnosis = replace(diagnosed.diagnosis, settings=changed)
+    written = diagnosis_json(diagnosis)["settings"]
+    assert (written["acceptance.fall"], written["max_causes"]) == (0.25, 4)
+    assert written["without"] == ["ft_bias"]
+    section = settings_section(changed)
+    assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
+    assert section.count("<b>") == 1
