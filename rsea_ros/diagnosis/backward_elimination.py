@@ -10,9 +10,8 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_c
 from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
 from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
 from rsea_ros.diagnosis.screening import screen, without_effect
+from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import Selection
-from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Problem

@@ -16,6 +16,7 @@ from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
 from rsea_ros.diagnosis.score import Score, gain, score_on
+from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.sentences import (
     coherence_lost,
     coloured_noise,
@@ -24,8 +25,6 @@ from rsea_ros.diagnosis.sentences import (
     verdict_sentence,
 )
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import Selection
-from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.verdict import is_at_floor, verdict_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError

@@ -9,8 +9,8 @@ from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score, score, score_on
+from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stepwise import Selection
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.solver import Solution

@@ -6,8 +6,7 @@ Models are fitted to the training blocks and chosen on the validation blocks; th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 from rsea_ros.diagnosis.candidate import (
     Candidate,
@@ -20,38 +19,12 @@ from rsea_ros.diagnosis.candidate import (
 )
 from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep
 from rsea_ros.diagnosis.replacement import replacement_step
+from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
-
-
-@dataclass(frozen=True)
-class Selection:
-    """The accepted models, from the nominal one on, and what else was tried.
-
-    rivals: by accepted cause, the models that do as well with another effect in its place.
-    """
-
-    models: tuple[Candidate, ...]
-    trials: tuple[Trial, ...] = ()
-    rivals: Mapping[str, tuple[Candidate, ...]] = field(default_factory=dict)
-
-    @property
-    def cases(self) -> tuple[Case, ...]:
-        """Every sample of the records, with the noise that the last model shows."""
-        return self.last.cases
-
-    @property
-    def last(self) -> Candidate:
-        """The model with all accepted causes."""
-        return self.models[-1]
-
-    def rivals_of(self, cause: str) -> tuple[Candidate, ...]:
-        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
-        return tuple(m for m in self.rivals.get(cause, ()) if m.newest not in self.last.causes)
 
 
 def select_stepwise(
