@@ -19,8 +19,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 VERSIONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 FAST = (
-    "test_units.py", "test_strict_yaml.py", "test_stamps.py", "test_imports.py", "effects", "model", "library",
-    "checks", "msg_adapters",
+    "test_units.py", "test_strict_yaml.py", "test_stamps.py", "test_imports.py",
+    "effects", "model", "library", "checks", "msg_adapters",
 )  # fmt: skip
 NODES = re.compile(r"rclpy|msg_adapters\.ros|rsea_ros\.nodes")
 USE = "import rsea_ros as rsea; rsea.simulate('paper_high_impedance', [0.0, 1.0] * 300, rate=280.0)"
