@@ -50,6 +50,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "proximal_spring.damping": Field("N m s/rad", default=0.0),
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+        "spring_end.above_sensor": Field("1", default=0.0),
     }
 )
 

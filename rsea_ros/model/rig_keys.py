@@ -32,6 +32,7 @@ _MEANINGS = {
         for end in END_NAMES
         for key, meaning in zip(("inertia", "damping", "stiffness", "gravity"), _END, strict=True)
     },
+    "spring_end.above_sensor": "share of its inertia between spring and F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS})

@@ -17,12 +17,14 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.loop import control
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
 _SENSORS = 1
@@ -117,10 +119,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
-    for effect, parameters in settings:
-        effect.vector(parameters)
-        if effect.structure is not None:
-            rig = effect.structure(rig, parameters)
+    rig = structured(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
@@ -128,7 +127,8 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
-    table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
+    table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
+    table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 
 
