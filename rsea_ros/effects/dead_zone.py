@@ -3,7 +3,7 @@
     T_m = sign(u) (|u| - (1 - jump) width)   for |u| > width, else 0
 
 jump 0: the torque begins at zero (a dead zone); jump 1: it begins with all that is commanded (a dead band,
-as firmware has it). A jump is a ramp over a twentieth of the width. Source: Tao, Kokotovic, Adaptive Control
+as firmware has it). A jump is a ramp over 1/1000 of the width. Source: Tao, Kokotovic, Adaptive Control
 of Systems with Actuator and Sensor Nonlinearities, 1996, section 2.1.
 """
 
@@ -12,7 +12,7 @@ import math
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
-_RAMP = 0.05
+RAMP = 0.001
 """Of the width. A fit needs a slope where samples cross the edge."""
 
 
@@ -23,7 +23,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         return
     for signal in (COMMAND, CURRENT):
         beyond = abs(s[signal]) - p[0]
-        begun = p[1] * p[0] * min(max(beyond / (_RAMP * p[0]), 0.0), 1.0)
+        begun = p[1] * p[0] * min(max(beyond / (RAMP * p[0]) + 0.5, 0.0), 1.0)
         s[signal] = math.copysign(max(beyond, 0.0) + begun, s[signal])
 
 

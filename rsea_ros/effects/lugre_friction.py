@@ -1,6 +1,6 @@
 """LuGre friction of the gear train: bristles that bend before they slip.
 
-    T = -(stiffness z + damping z'),   z' = w - stiffness |w| z / g(w)
+    T = -(bristle_stiffness z + bristle_damping z'),   z' = w - bristle_stiffness |w| z / g(w)
     g(w) = coulomb_torque + stribeck_torque exp(-(w / stribeck_velocity)^2)
 
 w is the speed of the gear output against the housing. With w of the middle of a step z is an exponential of
@@ -37,14 +37,14 @@ EFFECT = Effect(
     parameters=(
         Parameter("coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),
         Parameter(
-            "stiffness", "N m/rad", null=0.0, low=50.0, high=1e5, typical=2500.0, starts=(500.0, 1e4),
+            "bristle_stiffness", "N m/rad", null=0.0, low=50.0, high=1e5, typical=2500.0, starts=(500.0, 1e4),
             logarithmic=True,
         ),
         Parameter("stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0),
         Parameter(
             "stribeck_velocity", "rad/s", null=0.03, low=0.003, high=1.0, typical=0.03, logarithmic=True
         ),
-        Parameter("damping", "N m s/rad", null=0.0, low=0.0, high=100.0, typical=5.0, optional=True),
+        Parameter("bristle_damping", "N m s/rad", null=0.0, low=0.0, high=100.0, typical=5.0, optional=True),
     ),
     claims=Claims(
         "velocity",
@@ -57,6 +57,7 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="friction of bristles that bend before they slip",
-    equation="T = -(stiffness · z + damping · ż), ż = ω - stiffness · |ω| · z / g(ω), "
+    equation="T = -(bristle_stiffness · z + bristle_damping · ż), "
+    "ż = ω - bristle_stiffness · |ω| · z / g(ω), "
     "g = coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)",
 )  # fmt: skip

@@ -119,8 +119,8 @@ def backlash(t, x, u, p):
 
 def lugre(t, x, u, p):
     level = p["coulomb_torque"] + p["stribeck_torque"] * math.exp(-((x[1] / p["stribeck_velocity"]) ** 2))
-    slip = x[1] - p["stiffness"] * abs(x[1]) * x[2] / level
-    w, a, torque = motion(x[:2], u, p["stiffness"] * x[2] + p["damping"] * slip)
+    slip = x[1] - p["bristle_stiffness"] * abs(x[1]) * x[2] / level
+    w, a, torque = motion(x[:2], u, p["bristle_stiffness"] * x[2] + p["bristle_damping"] * slip)
     return [w, a, slip], torque
 
 

@@ -43,7 +43,7 @@ def sensor_under_the_base(t, x, u, p):
 
 
 def dead_band(t, x, u, p):
-    ramp = min(max((abs(u) - p["width"]) / (0.05 * p["width"]), 0.0), 1.0)
+    ramp = min(max((abs(u) - p["width"]) / (0.001 * p["width"]) + 0.5, 0.0), 1.0)
     begun = max(abs(u) - p["width"], 0.0) + p["jump"] * p["width"] * ramp
     w, a, torque = motion(x, math.copysign(begun, u))
     return [w, a], torque
