@@ -53,6 +53,12 @@ TOP = (
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
     Key("controller", "mapping", "none", "position loop that ran during the record"),
+    Key(
+        "hold",
+        "`zero`, `first` or `band`",
+        "`zero`",
+        "between commands: the last, a line, a band-limited curve",
+    ),
     Key("effects", "list", "none", "effects of the catalogue that act"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )

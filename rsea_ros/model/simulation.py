@@ -59,7 +59,8 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
     """
     in_loop = rig.controller is not None and "reference" in record
     from_rest = rig.zero_unknown("position")
-    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest))
+    drive = drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest, hold=rig.hold)
+    return simulate_drive(rig, drive)
 
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
@@ -89,7 +90,8 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
     at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.command) for n in channels}
+    kinks = drive.kinks
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
 
 
