@@ -176,7 +176,7 @@ class _Setting(NamedTuple):
 def _drive(record: Record, case: Case, rig: Rig) -> Drive:
     """Return what drives the record, as case_from makes it."""
     in_loop = rig.controller is not None and "reference" in record
-    return drive_from(record, closed_loop=in_loop, from_rest="position" in case.floating)
+    return drive_from(record, closed_loop=in_loop, from_rest="position" in case.floating, hold=rig.hold)
 
 
 def _on_time(record: Record, start: float, timed: Sequence[str], state: _State) -> Record:

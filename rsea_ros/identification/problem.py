@@ -76,7 +76,7 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SETTLE
     return Case(
-        drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating),
+        drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating, hold=rig.hold),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
         noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
