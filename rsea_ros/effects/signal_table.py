@@ -76,9 +76,11 @@ DEFLECTION_SPAN = 33  # rad, change of DEFLECTION over the step; 0 when COMMIT i
 MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to GEAR_VELOCITY at its end
 J_SC = 35  # kg m^2, spring chassis where it turns with the gear output; 0 behind a gear that gives
 CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is not 0
+TURNS = 37  # 1, turns of the rotor for one of the gear output
+SENSED = 38  # 1, share of the spring's torque that the F/T sensor sees at once
 
-PLAY = 37  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
-SPRING_ANGLE = 38  # rad, deflection of the spring as its own encoder sees it
-TARGETED = 39  # 1 where positions command the bench: then REFERENCE is what its commands say
+PLAY = 39  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
+SPRING_ANGLE = 40  # rad, deflection of the spring as its own encoder sees it
+TARGETED = 41  # 1 where positions command the bench: then REFERENCE is what its commands say
 
-SIZE = 40
+SIZE = 42

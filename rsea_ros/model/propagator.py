@@ -124,8 +124,21 @@ def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
     elif rig.rigid_spring:
         torque = np.zeros(2 * m.order)
     else:
-        torque = rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
+        torque = _below(rig, m, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate)
     return np.array([position, velocity, torque, deflection])
+
+
+def _below(rig: Rig, m: Mechanics, spring: FloatArray) -> FloatArray:
+    """Return the row of T_s less the torque that the load above the sensor takes: part of its J q''.
+
+    J q'' is T_s less what holds the load to ground.
+    """
+    share = rig["spring_end.above_sensor"]
+    if share == 0.0:
+        return spring
+    angle, rate = (read_row(rig, m, s) for s in (st.DISTAL_ANGLE, st.DISTAL_VELOCITY))
+    held = rig["spring_end.stiffness"] * angle + rig["spring_end.damping"] * rate
+    return np.asarray((1.0 - share) * spring + share * held)
 
 
 def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:

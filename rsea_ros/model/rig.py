@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Literal
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
@@ -20,6 +21,8 @@ LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 CLOCK_DOUBT = 1e-4
 """s, one sigma. How far the stamps of a sensor may lie from its instants where the rig does not say."""
 END_NAMES = ("housing_end", "spring_end")
+Hold = Literal["zero", "first", "band"]
+HOLDS: tuple[Hold, ...] = ("zero", "first", "band")
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
         **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
         **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
+        "spring_end.above_sensor": Field("1", default=0.0),
     }
 )
 
@@ -138,7 +142,9 @@ class Rig:
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
     encoder_end: what the encoder reads against the housing: the gear output, or the spring end behind play
     and spring. loop: kind of the position loop whose targets command the bench, a key of LOOP_FIELDS, its
-    gains among the quantities. controller: a loop that added its torque to the record's command.
+    gains among the quantities. controller: a loop that added its torque to the record's command. hold: what
+    acts between two commands: the first of them, a line to the other, or the curve without a frequency above
+    half the rate, as where an analogue command was sampled behind a filter.
     """
 
     name: str
@@ -154,6 +160,7 @@ class Rig:
     encoder_end: str = "gear_output"
     loop: str | None = None
     controller: Controller | None = None
+    hold: Hold = "zero"
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""
     source: str = ""
@@ -277,8 +284,10 @@ def _check_structure(rig: Rig) -> None:
             f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
         )
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
         raise RigError(
-            f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
+            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
+            "spring.stiffness",
         )
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]

@@ -18,11 +18,13 @@ from rsea_ros.model.rig import (
     CLOCK_DOUBT,
     END_NAMES,
     FIELDS,
+    HOLDS,
     LOOP_FIELDS,
     LOOP_LIMITS,
     Controller,
     EffectSetting,
     Field,
+    Hold,
     Quantity,
     Rig,
     Sensor,
@@ -71,6 +73,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         encoder_end=text(document.get("encoder_end", "gear_output"), "encoder_end"),
         loop=loop,
         controller=None if loop else _controller(document.get("controller")),
+        hold=_hold(document.get("hold", "zero")),
         effects=effects,
     )
 
@@ -89,6 +92,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         document["encoder_end"] = rig.encoder_end
     if rig.loop:
         document["controller"] = {"kind": rig.loop}
+    if rig.hold != "zero":
+        document["hold"] = rig.hold
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -233,6 +238,13 @@ def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
     only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
     names_of = (key for key in item if key != "kind")
     return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
+
+
+def _hold(item: Any) -> Hold:
+    for hold in HOLDS:
+        if item == hold:
+            return hold
+    raise RigError(f"hold = {shown(item)}, expected {', '.join(HOLDS)}", "hold")
 
 
 def _controller(item: Any) -> Controller | None:

@@ -33,6 +33,7 @@ _MEANINGS = {
         for end in END_NAMES
         for key, meaning in _END.items()
     },
+    "spring_end.above_sensor": "share of its inertia between spring and F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
@@ -54,6 +55,12 @@ TOP = (
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
     Key("controller", "mapping", "none", "position loop that ran during the record, see below"),
+    Key(
+        "hold",
+        "`zero`, `first` or `band`",
+        "`zero`",
+        "between commands: the last, a line, a band-limited curve",
+    ),
     Key("effects", "list", "none", "effects of the catalogue that act"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )

@@ -17,6 +17,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.loop import STATES, control
 from rsea_ros.model.position_loop import commanded, loop_parameters
@@ -24,6 +25,7 @@ from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
 _AFTER_DELAY = 5
@@ -70,6 +72,7 @@ def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
         closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
         from_rest="position" in record and rig.zero_unknown("position"),
         targeted=rig.loop is not None,
+        hold=rig.hold,
     )
 
 
@@ -103,7 +106,8 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
     at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.command) for n in channels}
+    kinks = drive.kinks
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
 
 
@@ -134,10 +138,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
-    for effect, parameters in settings:
-        effect.vector(parameters)
-        if effect.structure is not None:
-            rig = effect.structure(rig, parameters)
+    rig = structured(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
@@ -146,7 +147,8 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
     table[st.TARGETED] = float(rig.loop is not None)
-    table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
+    table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
+    table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 
 
