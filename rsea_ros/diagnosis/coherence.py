@@ -1,4 +1,4 @@
-"""Coherence with the command: what noise hides in the residual's size, its phase against the command shows.
+"""Coherence with the command: it shows a missed response that the noise hides in the residual's size.
 
 In segments of a block each, coherence^2 = |S_ru|^2 / (S_rr S_uu) of the residual r and the command u. Of K
 segments of mere noise it exceeds 1 - a^(1 / (K - 1)) with probability a (Carter, IEEE Proc. 75, 1987).
@@ -22,6 +22,7 @@ _FEWEST_SEGMENTS = 16
 _LOST = 0.5
 """Coherence^2 below which more than half of a channel's power has nothing to do with the command."""
 _MOST = 0.75
+"""Share of the lines above an edge that must be lost, and of those below it that must not."""
 _LINES = 1024
 _SHORTEST = 8
 """Samples of a segment: a shorter one has no band to speak of."""
@@ -47,7 +48,7 @@ def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArr
 
 
 def lost_above(case: Case, channel: str) -> float | None:
-    """Return the frequency, Hz, above which a channel is mostly noise although the command is there."""
+    """Return the frequency, Hz, above which a channel is mostly noise although the command excites it."""
     if not isinstance(case.drive, Drive):
         return None
     t = case.t[channel]
@@ -58,8 +59,8 @@ def lost_above(case: Case, channel: str) -> float | None:
     frequency, power = signal.welch(u, rate, nperseg=length)
     cross = np.abs(signal.csd(u, y, rate, nperseg=length)[1]) ** 2
     coherence = cross / np.maximum(power * signal.welch(y, rate, nperseg=length)[1], 1e-300)
-    there = (power > 1e-3 * np.median(power)) & (frequency > _LOWEST)
-    is_lost, frequency = (coherence < _LOST)[there], frequency[there]
+    is_excited = (power > 1e-3 * np.median(power)) & (frequency > _LOWEST)
+    is_lost, frequency = (coherence < _LOST)[is_excited], frequency[is_excited]
     count = np.arange(1, len(is_lost) + 1)
     above = np.cumsum(is_lost[::-1])[::-1] / count[::-1]
     below = (np.cumsum(is_lost) - is_lost) / count
@@ -75,8 +76,8 @@ def command_at(drive: Drive, t: FloatArray) -> FloatArray:
 
 def _segments(blocks: IntArray, good: BoolArray) -> list[IntArray]:
     """Return the samples of every block of which all count, cut to the same length."""
-    places = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks)) + 1)
-    whole = [p for p in places if good[p].all()]
+    blocks_of_samples = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks)) + 1)
+    whole = [p for p in blocks_of_samples if good[p].all()]
     length = int(np.median([len(p) for p in whole])) - 2 if whole else 0
     return [p[:length] for p in whole if len(p) >= length > 8]
 

@@ -1,6 +1,6 @@
-"""The next experiment: the cheapest run that would tell rivals apart, found by simulating them.
+"""The next experiment: the cheapest run that would tell rivals apart, by simulating them.
 
-Each option excitation is played to the accepted model; the rival, with all that it may move, is fitted to
+Each possible excitation is applied to the accepted model; the rival, with all that it may move, is fitted to
 that (one linearised step), and what it cannot follow is held against the sensors' noise.
 """
 
@@ -68,15 +68,15 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     present = float(np.max(np.abs(case.drive.command)))
     tried = []
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
-        told = min(_separation(accepted, rival, option, present, rate) for rival in rivals)
-        tried.append((told, option))
-        if told > _ENOUGH:
+        separation = min(_separation(accepted, rival, option, present, rate) for rival in rivals)
+        tried.append((separation, option))
+        if separation > _ENOUGH:
             break
-    told, best = max(tried, key=lambda item: item[0])
-    return _worded(cause, names, told, best, present)
+    separation, best = max(tried, key=lambda item: item[0])
+    return _worded(cause, names, separation, best, present)
 
 
-def _worded(cause: str, names: str, told: float, best: ExcitationOption, present: float) -> Experiment:
+def _worded(cause: str, names: str, separation: float, best: ExcitationOption, present: float) -> Experiment:
     run: dict[str, float | str] = {
         "kind": best.kind,
         "amplitude": round(best.relative * present, 3),
@@ -84,17 +84,17 @@ def _worded(cause: str, names: str, told: float, best: ExcitationOption, present
         "low": best.low,
         "high": best.high,
         "duration": _DURATION,
-        "separation_times_noise": round(told, 3),
+        "separation_times_noise": round(separation, 3),
     }
-    if told > _ENOUGH:
+    if separation > _ENOUGH:
         return Experiment(
             f"{cause} and {names} do as well on these data; "
-            f"this run makes them differ by {told:.1f} times the noise",
+            f"this run makes them differ by {separation:.1f} times the noise",
             run,
         )
     return Experiment(
         f"{cause} and {names} make the same motion under every excitation tried "
-        f"(at most {told:.2f} times the noise apart): "
+        f"(at most {separation:.2f} times the noise apart): "
         "only a value measured apart tells them, such as the spring stiffness by a known weight",
         run,
     )
@@ -105,14 +105,14 @@ def _separation(
 ) -> float:
     """Return what a rival cannot follow of the accepted model under an excitation, over the noise."""
     try:
-        case = _played(accepted, option, option.relative * present, rate)
+        case = _simulated(accepted, option, option.relative * present, rate)
     except RseaError:
         return 0.0
     problem = replace(rival.problem, cases=(case,))
     return _left_over(problem, rival.theta)
 
 
-def _played(accepted: Solution, option: ExcitationOption, amplitude: float, rate: float) -> Case:
+def _simulated(accepted: Solution, option: ExcitationOption, amplitude: float, rate: float) -> Case:
     """Return a case whose measurements are the accepted model's own, without noise."""
     settings = Settings(
         rate=rate,

@@ -1,4 +1,4 @@
-"""Where a model and the data part: by frequency, amplitude, speed, time, angle, against the noise."""
+"""Where a model misfits the data: by frequency, amplitude, speed, time, angle, against the noise."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-_WORTH_TELLING = 1.25
+_SHOWN_ABOVE = 1.25
+"""Times the noise. It steers what is shown, no verdict."""
 _BINS = 8
 _MOST = 3
+"""Misfits shown in each respect."""
 
 
 def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) -> tuple[Misfit, ...]:
     """Return where the residual of a channel is more than its noise, worst first in each respect."""
     residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
-    found = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
+    worst = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
     keep, t = case.mask[channel], case.t[channel]
     for what, unit, values in _respects(case, channel, rig):
-        found += _worst(_binned(what, unit, values[keep], residual[keep], case.noise[channel], channel))
-    found += _worst(
+        worst += _worst(_binned(what, unit, values[keep], residual[keep], case.noise[channel], channel))
+    worst += _worst(
         _binned("time", "s", (t - case.start)[keep], residual[keep], case.noise[channel], channel, equal=True)
     )
-    return tuple(found)
+    return tuple(worst)
 
 
 def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
@@ -108,6 +110,6 @@ def _binned(
 
 
 def _worst(items: list[Misfit]) -> list[Misfit]:
-    """Return the worst that are worth telling, of those that stand out of the rest where all are high."""
-    told = sorted((m for m in items if m.times_noise > _WORTH_TELLING), key=lambda m: -m.times_noise)
-    return told[:_MOST]
+    """Return the worst misfits that are clearly above the noise."""
+    shown = sorted((m for m in items if m.times_noise > _SHOWN_ABOVE), key=lambda m: -m.times_noise)
+    return shown[:_MOST]

@@ -1,8 +1,8 @@
-"""Hypotheses: every effect of the catalogue tried on the residual, cheaply and generously.
+"""Screening: every effect of the catalogue tried on the residual, cheaply and generously.
 
-From each start one simulation and one derivative for each of the effect's parameters; the nominal values
-move along with the derivatives they already have. Two such steps show what a full fit would gain. A mode is
-too sharp for that: near it the nominal values need derivatives of their own.
+From each initial guess one simulation and one derivative for each of the effect's parameters; the nominal
+values move along with the derivatives that they already have. Two such steps show what a full fit would gain.
+A mode is too sharp for that: near it the nominal values need new derivatives.
 """
 
 from __future__ import annotations
@@ -21,6 +21,10 @@ from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.signals import FloatArray
 
 _STEPS = 2
+_SHARES = (1.0, 0.3)
+"""Of a step that are tried, in turn."""
+_DAMPING = 1e-6
+"""Of the curvature: keeps apart what the data do not."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +49,19 @@ def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Prob
     return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
-def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> ScreenedEffect | None:
-    """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have.
+def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]]) -> ScreenedEffect | None:
+    """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 
-    A start may also name values of the rig, which begin there then: no longer where the derivatives are.
+    A guess may also name values of the rig: these then differ from where the derivatives were taken.
     """
     best: ScreenedEffect | None = None
-    for start in starts:
-        own = {name: value for name, value in start.items() if "." not in name}
-        there = moved(present, {name: value for name, value in start.items() if "." in name})
-        try_start = _with_new_derivatives if is_mode(effect) or there is not present else _from_start
+    for guess in guesses:
+        parameters = {name: value for name, value in guess.items() if "." not in name}
+        base = with_values(present, {name: value for name, value in guess.items() if "." in name})
+        needs_derivatives = is_mode(effect) or base is not present
+        try_guess = _with_new_derivatives if needs_derivatives else _with_present_derivatives
         try:
-            tried = try_start(there, effect, own)
+            tried = try_guess(base, effect, parameters)
         except RseaError:
             continue
         if tried is not None and (best is None or tried.cost < best.cost):
@@ -64,8 +69,8 @@ def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]
     return best
 
 
-def moved(present: Solution, values: Mapping[str, float]) -> Solution:
-    """Return a solution with some of its unknowns at other values; itself when there are none to move."""
+def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
+    """Return a solution with some of its unknowns at other values; itself when none of them differs."""
     theta = present.theta.copy()
     for i, unknown in enumerate(present.problem.unknowns):
         if unknown.name in values:
@@ -78,40 +83,54 @@ def is_mode(effect: Effect) -> bool:
     return any(p.name == "damping_ratio" for p in effect.parameters)
 
 
-def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, float]) -> ScreenedEffect:
-    solution = solve(*extended(present.problem, present.theta, effect, start), iterations=_STEPS)
-    problem = solution.problem
-    return ScreenedEffect(effect, problem, solution.theta, solution.cost)
+def _with_new_derivatives(present: Solution, effect: Effect, guess: dict[str, float]) -> ScreenedEffect:
+    solution = solve(*extended(present.problem, present.theta, effect, guess), iterations=_STEPS)
+    return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
 
-def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> ScreenedEffect | None:
-    """Return where two steps lead; None for an effect that no channel shows there, or that runs away."""
-    problem, theta = extended(present.problem, present.theta, effect, start)
-    n = len(present.theta)
-    prior = np.array([1.0 / u.doubt for u in problem.unknowns])
-    centre = start_vector(problem.unknowns)
+def _with_present_derivatives(
+    present: Solution, effect: Effect, guess: dict[str, float]
+) -> ScreenedEffect | None:
+    """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
+    problem, theta = extended(present.problem, present.theta, effect, guess)
     residual = problem.residual(theta)
     if power(residual) == np.inf:
         return None
-    own = jacobian_columns(problem, theta, residual, range(n, len(theta)))
-    if not own.any():
+    columns = jacobian_columns(problem, theta, residual, range(len(present.theta), len(theta)))
+    if not columns.any():
         return None
-    matrix = np.column_stack([present.jacobian, own])
-    normal = matrix.T @ matrix + np.diag(prior**2)
-    normal += np.diag(1e-6 * np.diag(normal) + 1e-12)
-    cost = power(residual) + float(np.sum((prior * (theta - centre)) ** 2))
-    best = ScreenedEffect(effect, problem, theta, cost)
+    step = _Step(problem, np.column_stack([present.jacobian, columns]))
+    best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
     for _ in range(_STEPS):
-        slope = matrix.T @ residual + prior**2 * (theta - centre)
-        aim = bounded_step(problem, theta, normal, slope)
-        for share in (1.0, 0.3):
-            trial = theta + share * (aim - theta)
-            trial_residual = problem.residual(trial)
-            cost = power(trial_residual) + float(np.sum((prior * (trial - centre)) ** 2))
-            if cost < best.cost:
-                break
-        else:
+        better = step.taken(best, residual)
+        if better is None:
             break
-        theta, residual = trial, trial_residual
-        best = ScreenedEffect(effect, problem, theta, cost)
+        best, residual = better
     return best
+
+
+class _Step:
+    """Damped Gauss-Newton steps of a problem with derivatives that are not taken again."""
+
+    def __init__(self, problem: Problem, matrix: FloatArray) -> None:
+        self._problem, self._matrix = problem, matrix
+        self._prior = np.array([1.0 / u.doubt for u in problem.unknowns])
+        self._centre = start_vector(problem.unknowns)
+        normal = matrix.T @ matrix + np.diag(self._prior**2)
+        self._normal = normal + np.diag(_DAMPING * np.diag(normal) + 1e-12)
+
+    def cost(self, theta: FloatArray, residual: FloatArray) -> float:
+        """Return the squared residual and what leaving the priors costs."""
+        return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
+
+    def taken(self, at: ScreenedEffect, residual: FloatArray) -> tuple[ScreenedEffect, FloatArray] | None:
+        """Return where a step leads and the residual there; None where neither it nor a part of it helps."""
+        slope = self._matrix.T @ residual + self._prior**2 * (at.theta - self._centre)
+        aim = bounded_step(self._problem, at.theta, self._normal, slope)
+        for share in _SHARES:
+            theta = at.theta + share * (aim - at.theta)
+            left = self._problem.residual(theta)
+            cost = self.cost(theta, left)
+            if cost < at.cost:
+                return replace(at, theta=theta, cost=cost), left
+        return None

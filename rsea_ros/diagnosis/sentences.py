@@ -64,7 +64,7 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
 
 
 def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
-    """Return what cannot be told because a channel is noise there, as sentences. above: Hz."""
+    """Return above which frequency (Hz) a channel is noise, as a sentence; none where it is not."""
     if above is None:
         return ()
     return (
