@@ -8,7 +8,7 @@ from functools import partial
 
 from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_candidate
 from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
-from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.screening import screen, without_effect
 from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -80,7 +80,7 @@ class ReducedModels:
         old, solution = effect_named(name).main, rest.solution
         same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
         rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
-        guesses = initial_guesses(rival, ResidualView(model.cases[0], rig, rest.outputs[0]))
+        guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         screened = screen(solution, rival, guesses)
         return None if screened is None else self._fit(model, screened.problem, screened.theta)

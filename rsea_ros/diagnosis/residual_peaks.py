@@ -33,10 +33,11 @@ _MOST_PEAKS = 2
 
 def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
     """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats most."""
-    found = missing_torque(case, rig, outputs)
-    if found is None:
+    missing = missing_torque(case, rig, outputs)
+    if missing is None:
         return []
-    return _repeating(found[0] * rig["gear.ratio"], found[1])
+    position, torque = missing
+    return _repeating(position * rig["gear.ratio"], torque)
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
@@ -71,7 +72,7 @@ def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, Flo
 def missing_torque(
     case: Case, rig: Rig, outputs: Mapping[str, FloatArray]
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return the measured position (rad) and the torque that is missing there, N m.
+    """Return the measured position (rad) and the torque that is missing at it, N m.
 
     outputs: simulated channels of the case. None without a position, or for a free housing.
     """
@@ -100,14 +101,14 @@ def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:
     """Return the places of the largest values that are more than so many bins apart."""
-    level, found = level.copy(), []
+    level, largest = level.copy(), []
     for _ in range(_MOST_PEAKS):
         k = int(np.argmax(level))
         if level[k] <= 0.0:
             break
-        found.append(k)
+        largest.append(k)
         level[max(k - apart, 0) : k + apart + 1] = 0.0
-    return found
+    return largest
 
 
 def refined(bins: FloatArray, level: FloatArray, k: int) -> float:

@@ -18,12 +18,13 @@ from rsea_ros.diagnosis.candidate import (
 )
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
 from rsea_ros.diagnosis.data_split import VALIDATION
-from rsea_ros.diagnosis.initial_guess import InitialGuess, ResidualView, initial_guesses
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.score import score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.short_pieces import short_pieces_of
 from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
 from rsea_ros.identification.alternatives import extended
 from rsea_ros.identification.problem import Problem
@@ -63,11 +64,11 @@ class StepFits:
         return solve(problem, theta, iterations=self.settings.fits.present_iterations)
 
     @cached_property
-    def guesses(self) -> dict[str, list[InitialGuess]]:
+    def guesses(self) -> dict[str, list[Guess]]:
         """Where fits of every effect that does not act yet begin."""
         solution = self.present.solution
         rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
-        view = ResidualView(self.present.cases[0], rig, self.present.outputs[0])
+        view = RecordView(self.present.cases[0], rig, self.present.outputs[0])
         effects = [e for e in self.effects if e.name not in solution.problem.acting]
         guesses = self.pools.fits.map(lambda e: initial_guesses(e, view), effects)
         return {e.name: g for e, g in zip(effects, guesses, strict=True)}

@@ -9,8 +9,11 @@ What a step gave is made good in the next one, so an impact just at its end, not
 Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft with play), with inertia.
 """
 
+from collections.abc import Sequence
+
 from rsea_ros.effects._chassis import over_step, path
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import (
     B_S,
     COMMIT,
@@ -59,6 +62,31 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         s[PLAY] = y - d
 
 
+_SHARES = (0.1, 0.3, 0.6)
+"""Of the travel that may be play: a tenth hardly shows, much more than half leaves nothing for the spring."""
+
+
+_OF_JOINTS = (1e-3, 3e-3, 0.01, 0.03)
+"""rad: from a good gear's to a toy servo's; the residual has a minimum about each."""
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin also at shares of the travel; a spring that is nearly unknown is as much stiffer then.
+
+    A joint travels far beside its play, whose size no travel shows.
+    """
+    if view.is_joint:
+        return [{**defaults[0], "gap": gap} for gap in _OF_JOINTS]
+    travel = view.travel()
+    if travel is None:
+        return list(defaults)
+    gaps: list[Guess] = [{"gap": share * travel} for share in _SHARES]
+    if not view.rigid_spring and not view.is_well_known(STIFFNESS):
+        k = view.value(STIFFNESS)
+        gaps += [{"gap": share * travel, STIFFNESS: k / (1.0 - share)} for share in _SHARES]
+    return [*defaults, *({**defaults[0], **gap} for gap in gaps)]
+
+
 EFFECT = Effect(
     name="backlash",
     port=Port.SPRING,
@@ -67,6 +95,7 @@ EFFECT = Effect(
     function=apply,
     states=8,
     reads=(DEFLECTION, DEFLECTION_RATE),
+    guesses=guesses,
     about="play between the gear output and the spring",
     equation="T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2",
 )

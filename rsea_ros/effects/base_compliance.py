@@ -7,11 +7,12 @@ between, it bears a share of the base's inertia:  T_ft = T_s - above_sensor * in
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
+from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 
@@ -30,6 +31,28 @@ def change(rig: Any, parameters: Mapping[str, float]) -> Any:
         "spring_end.above_sensor": parameters["above_sensor"],
     }
     return replace(rig.with_values(values), clamped=rig.clamped - {"spring_end"})
+
+
+_STIFFER = (4.0, 9.0, 20.0)
+"""Stiffness of the base over that of the spring: a stiffer one hardly shows."""
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin with the base's mode at the highest peak of each channel.
+
+    The rig's spring is stiffer then: both in series are what the fit without the effect knows.
+    """
+    if view.rigid_spring:
+        return list(defaults)
+    channels = sorted(set(view.channels) & view.measured - {"motor_torque"})
+    modes = {round(f): f for n in channels for f in view.lines(n, is_sharp=False)[:1]}
+    k = view.value(STIFFNESS)
+    made: list[Guess] = []
+    for f in modes.values():
+        for base, spring in ((ratio * k, k / (1.0 - 1.0 / ratio)) for ratio in _STIFFER):
+            inertia = (base + spring) / (2.0 * math.pi * f) ** 2
+            made.append({**defaults[0], "stiffness": base, STIFFNESS: spring, "inertia": inertia})
+    return made or list(defaults)
 
 
 EFFECT = Effect(
@@ -65,6 +88,7 @@ EFFECT = Effect(
         "position", "odd", amplitude_exponent=1.0, passive=True, confusable_with=("structural_resonance",)
     ),
     structure=change,
+    guesses=guesses,
     about="the clamped end of the spring gives",
     equation="inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s, "
     "T_ft = T_s - above_sensor · inertia · q̈",

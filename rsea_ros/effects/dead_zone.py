@@ -8,8 +8,10 @@ of Systems with Actuator and Sensor Nonlinearities, 1996, section 2.1.
 """
 
 import math
+from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
 RAMP = 0.001
@@ -27,6 +29,19 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         s[signal] = math.copysign(max(beyond, 0.0) + begun, s[signal])
 
 
+_SHOWN = 0.3
+"""Of a command: where the measured torque shows less, the command has not come through."""
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin at the largest command that the measured torque does not show, as a dead zone and a dead band."""
+    unanswered = view.largest_unanswered_command(_SHOWN)
+    if not unanswered:
+        return list(defaults)
+    width = (1.0 + RAMP) * unanswered
+    return [{**defaults[0], "width": width, "jump": jump} for jump in (0.0, 1.0)]
+
+
 EFFECT = Effect(
     name="dead_zone",
     port=Port.COMMAND,
@@ -37,6 +52,7 @@ EFFECT = Effect(
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=0.0),
     function=apply,
+    guesses=guesses,
     about="commands that are too small make no torque",
     equation="T_motor = sign(u) · (|u| - (1 - jump) · width) for |u| > width, else 0",
 )

@@ -14,6 +14,7 @@ from typing import Any, Literal, Protocol
 from numba import types
 
 from rsea_ros.compiler import cfunc
+from rsea_ros.effects.guess import Guess, Guesses
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import shown
@@ -94,6 +95,7 @@ class Effect:
     structure: instead of a function, a change to the rig: `f(rig, parameters) -> rig`.
     main: the parameter that says how large the effect is.
     reads: the signals among FIRST_READ … LAST_READ that the function looks at.
+    guesses: where fits begin by what a residual shows; without it, at `default_guesses`.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Effect:
     order: int = 0
     about: str = ""
     equation: str = ""
+    guesses: Guesses | None = None
 
     @property
     def main(self) -> Parameter:
@@ -122,6 +125,19 @@ class Effect:
     def typical(self) -> dict[str, float]:
         """Return parameters of a size that a bench may well have."""
         return {p.name: p.typical for p in self.parameters}
+
+    @property
+    def default_guesses(self) -> list[Guess]:
+        """Return the typical parameters, then beside them each one's other starts and its other sign.
+
+        An angle (rad) has its signs among its starts.
+        """
+        guesses = [dict(self.typical)]
+        for p in self.parameters:
+            has_both_signs = p.low < 0.0 and not p.logarithmic and p.unit != "rad"
+            others = [*p.starts, *([-p.typical] if has_both_signs else [])]
+            guesses += [{**self.typical, p.name: value} for value in others]
+        return guesses
 
     def vector(self, parameters: Mapping[str, float]) -> tuple[float, ...]:
         """Return parameters in order. Raises ParameterError for a missing, unknown or non-finite one."""

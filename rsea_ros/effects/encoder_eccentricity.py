@@ -7,8 +7,10 @@ Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007 (first harmoni
 """
 
 import math
+from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
 
 
@@ -19,6 +21,11 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     at = wave * s[OUTPUT_ANGLE] + p[2]
     s[POSITION] += p[0] * math.sin(at)
     s[VELOCITY] *= 1.0 + p[0] * wave * math.cos(at)
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin at what of the measured angle's error repeats with the rotor."""
+    return [{**defaults[0], **repeating} for repeating in view.repeating_angle()]
 
 
 EFFECT = Effect(
@@ -37,6 +44,7 @@ EFFECT = Effect(
     ),
     claims=Claims("velocity", "neither", amplitude_exponent=None),
     function=apply,
+    guesses=guesses,
     about="angle error of the encoder that repeats with the rotor's angle",
     equation="position = q + amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
 )  # fmt: skip

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, RigLike
+from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import Port
 
 
@@ -41,6 +42,7 @@ EFFECT = Effect(
         confusable_with=("command_delay", "current_loop_lag"),
     ),
     structure=change,
+    guesses=beside_softer_rotor,
     about="gear train that gives between rotor and spring",
     equation="T = stiffness · (q_gear - q_chassis)",
 )

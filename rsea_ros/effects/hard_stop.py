@@ -8,6 +8,7 @@ The stop sits beside the spring, so the F/T sensor sees its torque too.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import DEFLECTION, SPRING_TORQUE, Port
 
 
@@ -49,6 +50,7 @@ EFFECT = Effect(
     ),
     function=apply,
     reads=(DEFLECTION,),
+    guesses=beside_softer_rotor,
     about="a stop that the spring meets beyond an angle",
     equation="T_s = K_s · d + stiffness · (|d| - angle) · sign(d) for |d| > angle",
 )

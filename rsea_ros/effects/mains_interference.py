@@ -6,6 +6,7 @@ T_ft = T + amplitude * sin(2 pi frequency t + phase)
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, TIME, Port
 
 
@@ -36,6 +37,7 @@ EFFECT = Effect(
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0),
     function=apply,
+    guesses=at_lines("ft", sine=("amplitude", "phase")),
     about="mains hum in the F/T sensor",
     equation="T_ft = T + amplitude · sin(2π · frequency · t + phase)",
 )

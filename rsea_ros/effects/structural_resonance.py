@@ -9,6 +9,7 @@ torque that goes straight from step to step. Source: Ewins, Modal Testing, 2000,
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, STEP, Port
 
 Y, RATE, LAST, STARTED = range(4)
@@ -51,6 +52,7 @@ EFFECT = Effect(
     claims=Claims("ft", "odd", amplitude_exponent=1.0),
     function=apply,
     states=4,
+    guesses=at_lines("ft"),
     about="a mode of the structure that the F/T sensor sees beside the spring",
     equation="T_ft = T · (1 - participation · s² / (s² + 2 damping_ratio Ω s + Ω²)), Ω = 2π frequency",
 )

@@ -6,7 +6,10 @@ The measured current is turned into torque with the same wrong constant, so it d
 Source: facts.md section 3 (6.826 N m/A by the maker's framework, 4.81 N m/A by its data sheet).
 """
 
+from collections.abc import Sequence
+
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, Port
 
 
@@ -16,12 +19,29 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     s[COMMAND] *= p[0]
 
 
+_LOW, _HIGH = 0.2, 3.0
+"""Bounds of the gain: no torque constant is farther from its data sheet."""
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin at the torque constant, relative to the believed one, that the F/T torque shows.
+
+    The motion is the same when all that the motor works against is as much larger.
+    """
+    gain = view.gain("ft")
+    if gain is None:
+        return list(defaults)
+    gain = min(max(gain, _LOW), _HIGH)
+    return [{**defaults[0], "gain": gain, **{n: gain * view.value(n) for n in view.free}}]
+
+
 EFFECT = Effect(
     name="torque_constant_error",
     port=Port.MOTOR,
-    parameters=(Parameter("gain", "1", null=1.0, low=0.2, high=3.0, typical=0.9, logarithmic=True),),
+    parameters=(Parameter("gain", "1", null=1.0, low=_LOW, high=_HIGH, typical=0.9, logarithmic=True),),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("ft_gain_error",)),
     function=apply,
+    guesses=guesses,
     about="the motor makes more or less torque than its current says",
     equation="T_motor = gain · T_command",
 )

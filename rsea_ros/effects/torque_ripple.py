@@ -7,8 +7,10 @@ of a step is the mean over it, so ripple faster than the step averages out inste
 """
 
 import math
+from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 
 LAST, STARTED = range(2)
@@ -22,6 +24,11 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     x[LAST], x[STARTED] = angle, 1.0
     share = math.sin(half) / half if half != 0.0 else 1.0
     s[GEAR_TORQUE] += p[0] * share * math.sin(p[1] * angle + p[2])
+
+
+def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
+    """Begin at what of the missing torque repeats with the rotor; without that there is no ripple."""
+    return [{**defaults[0], **repeating} for repeating in view.repeating_torque()]
 
 
 EFFECT = Effect(
@@ -53,6 +60,7 @@ EFFECT = Effect(
     function=apply,
     states=2,
     reads=(ROTOR_ANGLE,),
+    guesses=guesses,
     about="torque that repeats with the rotor's angle",
     equation="T = amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
 )

@@ -6,6 +6,7 @@ T_m = min(max(T_command, -limit), limit)
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import at_limits
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
 
@@ -34,6 +35,7 @@ EFFECT = Effect(
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=None),
     function=apply,
+    guesses=at_limits,
     about="motor torque that stops growing at a limit",
     equation="T_motor = min(max(T_command, -limit), limit)",
 )

@@ -10,6 +10,7 @@ Hughes, Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.guess import at_limits
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_VELOCITY, Port
 
 
@@ -41,6 +42,7 @@ EFFECT = Effect(
     claims=Claims("velocity", "odd", amplitude_exponent=None, confusable_with=("torque_saturation",)),
     function=apply,
     states=1,
+    guesses=at_limits,
     about="torque limit that falls with speed, by the supply's voltage",
     equation="-limit · (1 + ω / no_load_speed) ≤ T_motor ≤ limit · (1 - ω / no_load_speed)",
 )  # fmt: skip

@@ -1,0 +1,45 @@
+"""Every effect's initial guesses: all of its parameters, and values that the rig may move."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
+from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+@pytest.fixture(scope="module")
+def view():
+    """A record beside a model whose values are 10 % off."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
+    record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
+    case, wrong = case_from(record, rig), rig.with_values({n: 1.1 * rig[n] for n in rig.free()})
+    (outputs,) = Problem((case,), wrong, (), CHANNELS).outputs(np.zeros(0))
+    return RecordView(case, wrong, outputs)
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_guesses_name_all_parameters_and_values_of_the_rig(name, view):
+    effect = effect_named(name)
+    parameters = {p.name: p for p in effect.parameters}
+    for guess in initial_guesses(effect, view):
+        assert set(parameters) <= set(guess) <= set(parameters) | set(view.free)
+        assert all(np.isfinite(value) for key, value in guess.items() if key not in effect.null)
+        assert effect.vector({p: guess[p] for p in parameters})
+
+
+def test_what_the_residual_shows_comes_before_the_typical_size(view):
+    """A limit below the largest command, a constant by which the F/T torque is off."""
+    limits = [g["limit"] for g in initial_guesses(effect_named("torque_saturation"), view)]
+    assert max(limits) <= 1.01 * view.largest_command()
+    (guess,) = initial_guesses(effect_named("torque_constant_error"), view)
+    assert guess["gain"] == pytest.approx(view.gain("ft"))
+    assert guess["spring.stiffness"] == pytest.approx(view.value("spring.stiffness") * guess["gain"])
