@@ -3,7 +3,7 @@
     T_m = gain * T_command
 
 The measured current is turned into torque with the same wrong constant, so it does not show this.
-Source: facts.md section 3 (6.826 N m/A by the maker's framework, 4.81 N m/A by its data sheet).
+For one motor the maker's framework states 6.826 N m/A and its data sheet 4.81 N m/A.
 """
 
 from collections.abc import Sequence

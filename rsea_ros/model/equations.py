@@ -10,7 +10,7 @@ so with J_r = J_m / N^2 the kinetic energy
 
     1/2 J_h w_h^2 + 1/2 J_sc w_c^2 + 1/2 J_r w_rotor^2 + 1/2 J_d w_d^2
 
-makes the rotor an inerter between housing and gear output (facts.md section 1). A clamped end, a rigid
+makes the rotor an inerter between housing and gear output (docs/derivation.md). A clamped end, a rigid
 spring (d = c), a stiff gear (c = g) and no spring on the proximal side (p = h) are constraints
 q_full = P q, so M = P' M_full P and so on.
 """

@@ -118,7 +118,7 @@ def test_the_design_as_a_rig_has_its_band():
 
 
 def test_both_senses_of_the_prototypes_drive():
-    """facts.md: 50 Hz need 1647 N m/rad with the circular spline held, 2759 with the flexspline; all 1728."""
+    """50 Hz need 1647 N m/rad with the circular spline held, 2759 with the flexspline; all 1728."""
     held = {row.train: row for row in by_train(PAPER, UNIT, 260.0)}
     circular, flexspline = held.values()
     assert list(held) == ["harmonic_circular_spline_held", "harmonic_flexspline_held"]

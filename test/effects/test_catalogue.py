@@ -42,7 +42,7 @@ CONTRACT = {
     "hard_stop": {"angle": "rad", "stiffness": "N m/rad"},
     "gear_compliance": {"stiffness": "N m/rad"},
 }
-"""Names and units that other programs rely on (contract.md)."""
+"""Names and units that other programs rely on."""
 
 HALF_STEP = {"ft": 3e-3, "position": 1.2e-6, "velocity": 6e-5}
 """What halving the step may change: a tenth of the torque's noise, a fifth and a third of the others'."""

@@ -69,7 +69,7 @@ def test_without_effects_it_is_the_linear_system_of_the_paper():
     [(0.5, -21.67), (1.3, -53.5), (10.0, -18.77), (20.0, -8.86), (33.0, -24.72)],
 )
 def test_moving_output_has_the_papers_unlumped_response(frequency, decibels):
-    """facts.md, section 2: T_ft/T_m with the rotor as an inerter between housing and chassis."""
+    """T_ft/T_m with the rotor as an inerter between housing and chassis."""
     plant = Bench().having(housing_free=1.0).plant
     response = _response(plant, 2j * np.pi * frequency)
     assert 20.0 * np.log10(abs(response)) == pytest.approx(decibels, abs=0.05)

@@ -46,7 +46,7 @@ def test_both_ends_clamped_is_one_inertia():
 
 
 def test_rotor_is_an_inerter_between_housing_and_chassis():
-    """facts.md section 1: M = [[J_h + J_r (1-N)^2, J_r N (1-N)], [J_r N (1-N), J_sc + J_r N^2]]."""
+    """docs/derivation.md: M = [[J_h + J_r (1-N)^2, J_r N (1-N)], [J_r N (1-N), J_sc + J_r N^2]]."""
     rig = load_rig("paper_moving_output")
     n = 502.0
     j_r = 0.953 / n**2

@@ -127,7 +127,7 @@ def test_edge_has_the_interval_of_damping_rotor_and_train():
 
 
 def test_edge_moves_with_the_damping_as_the_checks_found():
-    """facts.md: ±3 dB at 44.7 to 89 Hz for b_s of 1 to 6; the error's edge lies in the same order."""
+    """±3 dB at 44.7 to 89 Hz for b_s of 1 to 6; the error's edge lies in the same order."""
     edges = [edge_of(PLATFORM.with_values({"spring.damping": b}), 0.4).hz for b in (1.0, 2.0, 3.0, 4.5, 6.0)]
     assert edges == sorted(edges)
     assert edges[0] == pytest.approx(52.5, abs=1.5)

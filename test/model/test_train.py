@@ -61,7 +61,7 @@ def test_a_harmonic_drive_has_no_positive_maker_s_ratio():
     ],
 )
 def test_reference_numbers_of_the_prototype(train, inner, hz, stiffness):
-    """facts.md, found by independent checks; J_m = 1.2 is our estimate."""
+    """Found by independent checks; J_m = 1.2 is an estimate."""
     rig = with_train(KNEE, train)
     assert inner_inertia(rig) == pytest.approx(inner, abs=5e-6)
     assert flat_band(end_to_end(rig)) == pytest.approx(hz, abs=0.05)

@@ -155,7 +155,7 @@ def test_held_by_the_other_end_the_two_torques_change_places(name):
 
 
 def test_the_damper_turns_the_phase_of_what_the_sensor_sees():
-    """facts.md section 1: K_s or K_s + b_s s in the numerator, more than 20 degrees apart from 30 Hz on."""
+    """K_s or K_s + b_s s in the numerator, more than 20 degrees apart from 30 Hz on."""
     rig = load_rig("paper_high_impedance")
     sees = transfer.distal_per_motor(rig)(S) / transfer.distal_per_motor(rig, "element")(S)
     agree(sees, 1 + B_S / K_S * S)

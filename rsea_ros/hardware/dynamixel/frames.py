@@ -1,6 +1,6 @@
 """Frames of Protocol 2.0: `FF FF FD 00 ID LEN_L LEN_H INST PARAM… CRC_L CRC_H`, LEN = parameters + 3.
 
-Source: protocol 2.0 of the maker; facts.md section 4. Pure functions of bytes, no port.
+Source: Dynamixel Protocol 2.0 of the maker. Pure functions of bytes, no port.
 """
 
 from __future__ import annotations
