@@ -15,7 +15,7 @@ import numpy as np
 from rsea_ros.diagnosis.split import Score
 from rsea_ros.signals import FloatArray
 
-_RESAMPLES = 1000
+RESAMPLES = 1000
 MATTERS = 0.02
 """Relative fall of a channel's residual that matters."""
 
@@ -48,7 +48,7 @@ def compare(model: Score, other: Score, extra_parameters: int = 0) -> Standing:
 def bootstrap_means(values: FloatArray, seed: int = 0) -> FloatArray:
     """Return the means of resampled blocks, shape (resamples,)."""
     rng = np.random.default_rng(seed)
-    picks = rng.integers(0, len(values), (_RESAMPLES, len(values)))
+    picks = rng.integers(0, len(values), (RESAMPLES, len(values)))
     means: FloatArray = values[picks].mean(axis=1)
     return means
 
@@ -57,7 +57,7 @@ def gain(with_it: Score, without: Score, channel: str) -> tuple[float, tuple[flo
     """Return 1 - RMS(residual with) / RMS(residual without) of a channel, and its 95 % bootstrap interval."""
     a, b = with_it.sums[channel], without.sums[channel]
     rng = np.random.default_rng(0)
-    picks = rng.integers(0, len(a), (_RESAMPLES, len(a)))
+    picks = rng.integers(0, len(a), (RESAMPLES, len(a)))
     resampled = 1.0 - np.sqrt(a[picks].sum(axis=1) / np.maximum(b[picks].sum(axis=1), 1e-300))
     low, high = np.quantile(resampled, [0.025, 0.975])
     return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
