@@ -10,11 +10,12 @@ import numpy as np
 
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
-from rsea_ros.diagnosis.compare import misfits, spectrum
-from rsea_ros.diagnosis.experiment import amplitude_series, separating
+from rsea_ros.diagnosis.data_split import JUDGE, Score, score_on
+from rsea_ros.diagnosis.evaluation import Stage
 from rsea_ros.diagnosis.judge import gain
+from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
+from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
-from rsea_ros.diagnosis.search import Search
 from rsea_ros.diagnosis.sentences import (
     coherence_lost,
     coloured_noise,
@@ -22,8 +23,7 @@ from rsea_ros.diagnosis.sentences import (
     on_measured_angle,
     verdict_sentence,
 )
-from rsea_ros.diagnosis.split import JUDGE, Score, score_on
-from rsea_ros.diagnosis.stages import Stage
+from rsea_ros.diagnosis.stepwise import Search
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
 from rsea_ros.diagnosis.workers import Workers

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.backward_elimination import pruned
 from rsea_ros.diagnosis.conclusion import conclusion
-from rsea_ros.diagnosis.pruning import pruned
+from rsea_ros.diagnosis.evaluation import judged
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.diagnosis.search import search
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stages import judged
+from rsea_ros.diagnosis.stepwise import search
 from rsea_ros.diagnosis.workers import workers
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.identify import CHANNELS, unknowns_of

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.choice import is_far, is_progress
-from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
-from rsea_ros.diagnosis.hypothesise import reduced
-from rsea_ros.diagnosis.rounds import NOTHING, Played, Round
+from rsea_ros.diagnosis.candidate import Model, effect_size, fitted
+from rsea_ros.diagnosis.criteria import is_far, is_progress
+from rsea_ros.diagnosis.forward_step import NOTHING, Played, Round
+from rsea_ros.diagnosis.screening import reduced
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import Score
+from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.signals import FloatArray
 
 RESAMPLES = 1000

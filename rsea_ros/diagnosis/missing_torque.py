@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rsea_ros.diagnosis.peaks import peaks, refined, sine_at
+from rsea_ros.diagnosis.residual_peaks import peaks, refined, sine_at
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsea_ros.diagnosis.fitting import Model
+from rsea_ros.diagnosis.candidate import Model
 from rsea_ros.identification.problem import Problem
 from rsea_ros.signals import FloatArray
 

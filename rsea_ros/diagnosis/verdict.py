@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rsea_ros.diagnosis.data_split import Score
+from rsea_ros.diagnosis.evaluation import Stage
 from rsea_ros.diagnosis.result import Verdict
-from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.split import Score
-from rsea_ros.diagnosis.stages import Stage
+from rsea_ros.diagnosis.stepwise import Search
 
 FLOOR = 1.1
 """RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""

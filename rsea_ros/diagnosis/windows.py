@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import FIT, block_length, fit_starts, part
+from rsea_ros.diagnosis.data_split import FIT, block_length, fit_starts, part
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray

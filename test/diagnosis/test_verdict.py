@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rsea_ros.diagnosis.conclusion import spoken_of
+from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.sentences import verdict_sentence
-from rsea_ros.diagnosis.split import Score
 from rsea_ros.diagnosis.verdict import FLOOR, verdict_of
 
 RATIOS = st.fixed_dictionaries({n: st.floats(0.3, 300.0) for n in ("ft", "position", "motor_torque")})

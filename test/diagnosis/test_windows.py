@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.fitting import quicker
+from rsea_ros.diagnosis.candidate import quicker
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.identify import CHANNELS

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.diagnosis.choice import as_well, at_bound, choose, is_far, is_progress, loss_excess
-from rsea_ros.diagnosis.fitting import Model, fitted, heavier, on_places, quicker, refitted
-from rsea_ros.diagnosis.hints import Seen, Start, starts_of
-from rsea_ros.diagnosis.hypothesise import Hypothesis, screen
+from rsea_ros.diagnosis.candidate import Model, fitted, heavier, on_places, quicker, refitted
+from rsea_ros.diagnosis.criteria import as_well, at_bound, choose, is_far, is_progress, loss_excess
+from rsea_ros.diagnosis.data_split import CHOOSE, FIT, score_on
+from rsea_ros.diagnosis.initial_guess import Seen, Start, starts_of
 from rsea_ros.diagnosis.judge import compare
-from rsea_ros.diagnosis.split import CHOOSE, FIT, score_on
+from rsea_ros.diagnosis.screening import Hypothesis, screen
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.windows import windows_of
 from rsea_ros.diagnosis.workers import Workers

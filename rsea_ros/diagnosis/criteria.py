@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_ros.diagnosis.fitting import AT_FLOOR, Model
+from rsea_ros.diagnosis.candidate import AT_FLOOR, Model
+from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.judge import compare
-from rsea_ros.diagnosis.split import Score
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from rsea_ros.diagnosis.split import CHOOSE, FIT, Score, part, score_on
+from rsea_ros.diagnosis.data_split import CHOOSE, FIT, Score, part, score_on
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import ABOVE, reestimate_noise
 from rsea_ros.identification.problem import Case, Problem

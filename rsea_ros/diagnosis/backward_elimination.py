@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from rsea_ros.diagnosis.choice import is_far, is_likelier
-from rsea_ros.diagnosis.fitting import Model, effect_size, fitted
-from rsea_ros.diagnosis.hints import Seen, starts_of
-from rsea_ros.diagnosis.hypothesise import reduced, screen
+from rsea_ros.diagnosis.candidate import Model, effect_size, fitted
+from rsea_ros.diagnosis.criteria import is_far, is_likelier
+from rsea_ros.diagnosis.initial_guess import Seen, starts_of
 from rsea_ros.diagnosis.judge import compare
-from rsea_ros.diagnosis.search import Search
+from rsea_ros.diagnosis.screening import reduced, screen
+from rsea_ros.diagnosis.stepwise import Search
 from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named, look_alikes

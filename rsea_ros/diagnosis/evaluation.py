@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from rsea_ros.checks.faults import Checked
-from rsea_ros.diagnosis.fitting import Model, fitted, rescored
-from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, Score, score, score_on
+from rsea_ros.diagnosis.candidate import Model, fitted, rescored
+from rsea_ros.diagnosis.data_split import CHOOSE, FIT, JUDGE, Score, score, score_on
+from rsea_ros.diagnosis.stepwise import Search
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.solver import Map, Solution

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.split import CHOOSE, FIT, JUDGE, set_of
+from rsea_ros.diagnosis.data_split import CHOOSE, FIT, JUDGE, set_of
 
 BLOCKS = np.arange(400)
 

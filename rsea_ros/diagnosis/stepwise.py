@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rsea_ros.diagnosis.candidate import Model, at_floor, fitted, reestimated, refitted, rescored
 from rsea_ros.diagnosis.exchange import exchanged
-from rsea_ros.diagnosis.fitting import Model, at_floor, fitted, reestimated, refitted, rescored
-from rsea_ros.diagnosis.rounds import NOTHING, Round
+from rsea_ros.diagnosis.forward_step import NOTHING, Round
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import signal
 
 from rsea_ros.diagnosis.missing_torque import residual_of, ripples
-from rsea_ros.diagnosis.peaks import peaks, refined, sine_at
+from rsea_ros.diagnosis.residual_peaks import peaks, refined, sine_at
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
