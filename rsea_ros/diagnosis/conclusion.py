@@ -3,38 +3,50 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.data_split import JUDGE, Score, score_on
-from rsea_ros.diagnosis.evaluation import Stage
+from rsea_ros.diagnosis.evaluation import Examined, Stage, effect_added
 from rsea_ros.diagnosis.judge import gain
+from rsea_ros.diagnosis.naming import Named, named
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
+from rsea_ros.diagnosis.result import (
+    Alternative,
+    Cause,
+    Diagnosis,
+    Estimate,
+    Experiment,
+    Rejected,
+    Status,
+    Verdict,
+)
 from rsea_ros.diagnosis.sentences import (
+    also_in_model,
     coherence_lost,
     coloured_noise,
     evidence_of,
+    improbable,
     on_measured_angle,
     verdict_sentence,
 )
 from rsea_ros.diagnosis.stepwise import Search
 from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
+from rsea_ros.diagnosis.weighing import Place, Weighed
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import what_is_not_told
+from rsea_ros.identification.confidence import confidence_of, what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import CLOCK_DOUBT
-from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
 MODEL_DOUBT = 0.0025
@@ -43,28 +55,30 @@ PRIMARY = ("ft", "position", "velocity", "motor_torque")
 """The channel that gains and verdicts speak of: the first of these that is there."""
 
 
-def conclusion(
-    found: Search,
-    stages: list[Stage],
-    checked: Sequence[Checked],
-    records: Sequence[Record],
-    rig: Rig,
-    at_work: Workers,
-) -> Diagnosis:
-    """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
+def conclusion(examined: Examined, places: Sequence[Place], at_work: Workers) -> Diagnosis:
+    """Return what a search and its judged stages come to. places: the evidence for each cause."""
+    found, stages, records, rig = examined.found, examined.stages, examined.records, examined.rig
+    checked = [*examined.checked, *([examined.judging] if examined.judging else [])]
     channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
     if channel is None:
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
-    verdict = verdict_of(found, stages)
+    said = {n.cause.evidence.name: n for n in named(places, reached(stages[-1].judged))}
+    stages = without_unnamed_end(stages, said)
+    verdict = verdict_of(stages, [_status(said, stage) for stage in stages[1:]])
     if verdict == "unexplained":
         stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
     first, last = stages[0], stages[-1]
-    causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
-    named = {c.name for c in causes}
-    others = [t for t in _latest(found.trials) if t.name not in named]
-    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel), others)
+    added = [
+        (_cause(found, a, b, last, channel), said.get(effect_added(b))) for a, b in itertools.pairwise(stages)
+    ]
+    causes = tuple(replace(c, status=n.status, probability=n.probability) for c, n in added if n and n.status)
+    against = [(c.name, w, p) for c, n in added if n and n.status for w, p in n.rivals]
+    alternatives = tuple(at_work.fits.map(lambda item: alternative(*item), against))
+    listed = {c.name for c in causes}
+    others = [t for t in _latest(found.trials) if t.name not in listed]
+    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel, said), others)
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
     where = misfits(case, first.outputs[0], channel, rig)
@@ -90,6 +104,7 @@ def conclusion(
         at_noise_floor=reached(last.judged),
         misfit=where,
         causes=causes,
+        alternatives=alternatives,
         rejected=tuple(rejected),
         next_experiment=_next_experiment(found, stages, verdict, records[0]),
         remaining=misfits(case, last.outputs[0], channel, rig),
@@ -98,6 +113,7 @@ def conclusion(
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
         statements=(
+            *also_in_model([c.name for c, n in added if not n or not n.status]),
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
             *coherence_lost(lost_above(case, channel), channel),
             *on_measured_angle(last.solution.problem),
@@ -111,10 +127,22 @@ def spoken_of(judged: Score, channel: str) -> str:
     return channel if judged.ratio(channel) > FLOOR else judged.worst
 
 
+def without_unnamed_end(stages: Sequence[Stage], said: Mapping[str, Named]) -> list[Stage]:
+    """Return the stages without the last ones whose cause is not to be named: the others need them not."""
+    kept = list(stages)
+    while len(kept) > 1 and _status(said, kept[-1]) is None:
+        kept.pop()
+    return kept
+
+
+def _status(said: Mapping[str, Named], stage: Stage) -> Status | None:
+    n = said.get(effect_added(stage))
+    return n.status if n else None
+
+
 def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
-    setting = with_it.solution.problem.rig.effects[-1]
-    effect = effect_named(setting.name)
+    effect = effect_named(effect_added(with_it))
     speaks = (
         channel
         if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel)
@@ -124,14 +152,9 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     )
     held_out, interval = gain(with_it.judged, without.judged, speaks)
     train, _ = gain(with_it.train, without.train, speaks)
-    estimates = {
-        p.name.split(".")[1]: p
-        for p in parameters_of(last.solution, last.confidence)
-        if p.name.startswith(effect.name + ".")
-    }
     return Cause(
         name=effect.name,
-        parameters={k: honest(e) for k, e in estimates.items()},
+        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence)),
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
@@ -142,6 +165,30 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
         channel=speaks,
         confusable_with=tuple(m.causes[-1] for m in found.rivals_of(effect.name)),
     )
+
+
+def alternative(instead_of: str, weighed: Weighed, probability: float) -> Alternative:
+    """Return a rival of a cause with its size where it acts in that cause's place."""
+    claim = weighed.claim
+    solution = solve(claim.problem, claim.theta, iterations=0)
+    estimates = parameters_of(solution, confidence_of(solution))
+    evidence = weighed.evidence
+    held_out, interval = gain(claim.with_it, claim.without, evidence.channel)
+    return Alternative(
+        name=claim.name,
+        instead_of=instead_of,
+        parameters=sizes(claim.name, estimates),
+        gain_holdout=held_out,
+        gain_holdout_ci95=interval,
+        channel=evidence.channel,
+        probability=probability,
+    )
+
+
+def sizes(effect: str, estimates: Sequence[ParameterEstimate]) -> dict[str, Estimate]:
+    """Return the parameters of an effect among estimates, by their names without the effect's."""
+    own = [p for p in estimates if p.name.startswith(effect + ".")]
+    return {p.name.split(".")[1]: honest(p) for p in own}
 
 
 def honest(estimate: ParameterEstimate) -> Estimate:
@@ -163,7 +210,7 @@ def _next_experiment(
 ) -> Experiment | None:
     """Return the run that would tell what these data cannot; None when nothing is left to tell."""
     for stage in stages[1:]:
-        rivals = found.rivals_of(stage.solution.problem.rig.effects[-1].name)
+        rivals = found.rivals_of(effect_added(stage))
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained"):
@@ -180,12 +227,14 @@ def _latest(trials: Sequence[Trial]) -> list[Trial]:
     return list(best.values())
 
 
-def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
+def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str, said: Mapping[str, Named]) -> Rejected:
     """Return a trial with its gain, on data that judge, over the model that it was tried beside."""
     problem = replace(trial.problem, cases=cases)
     with_it = score_on(problem, cases, JUDGE, problem.outputs(trial.theta))
     without = score_on(problem, cases, JUDGE, trial.beside.outputs)
-    return Rejected(trial.name, gain(with_it, without, channel)[0], trial.why)
+    weighed = said.get(trial.name)
+    why = trial.why if weighed is None else improbable(weighed.cause.evidence, weighed.probability)
+    return Rejected(trial.name, gain(with_it, without, channel)[0], why)
 
 
 def _rms(judged: Score, case: Case) -> dict[str, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from rsea_ros.diagnosis.candidate import AT_FLOOR, Model
 from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.judge import compare
+from rsea_ros.diagnosis.trial import Trial
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import Unknown
@@ -102,7 +103,7 @@ def at_bound(solution: Solution) -> bool:
     return not effect.main.low + _NEAR * span < value < effect.main.high - _NEAR * span
 
 
-def prior_cost(solution: Solution) -> float:
+def prior_cost(solution: Solution | Trial) -> float:
     """Return what the fit paid for leaving the values that were known beforehand."""
     unknowns: Sequence[Unknown] = solution.problem.unknowns
     return float(

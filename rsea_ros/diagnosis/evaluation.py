@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from rsea_ros.identification.solver import Map, Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import FloatArray, Record
 
 _GAIN = 1e-6
 """Relative fall of the cost, at the noise, below which a fit is done."""
@@ -34,6 +35,26 @@ class Stage:
     def confidence(self) -> Confidence:
         """How sure the fit is."""
         return confidence_of(self.solution)
+
+
+def effect_added(stage: Stage) -> str:
+    """Return the name of the effect that a stage adds to the one before."""
+    return stage.solution.problem.rig.effects[-1].name
+
+
+@dataclass(frozen=True)
+class Examined:
+    """All that a conclusion is drawn from: the search, its models judged, and the data.
+
+    checked: the records as checked. judging: the held-out record, where one was given.
+    """
+
+    found: Search
+    stages: list[Stage]
+    checked: Sequence[Checked]
+    judging: Checked | None
+    records: Sequence[Record]
+    rig: Rig
 
 
 def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig, run: Map) -> Stage:

@@ -4,8 +4,8 @@ Beside the named law a small spline of what that law reads (speed, deflection, c
 acts at the same place. Were the named law right, the spline would have nothing left to do; a law that the
 catalogue lacks leaves it much. Fitted linearly, with all other unknowns, on the blocks that do not judge.
 
-The responses to the spline's parts are simulated: a torque at the gear or in the spring is a torque beside the
-command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
+The responses to the spline's parts are simulated: a torque at the gear or in the spring is a torque beside
+the command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     matrix = matrix[:, size > 0.0] / size[size > 0.0]
     fits = ~rows.judges
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
-    left = rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
+    left = (
+        rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
+    )
     before, after = (_by_block(rows, v) for v in (rows.residual, left))
     cause = float(np.sum((rows.residual + rows.contribution)[rows.judges] ** 2) - before.sum())
     return Flexible(
@@ -67,7 +69,7 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
 def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
     """Return the power of values in each judging block."""
     power = np.bincount(rows.block, values**2 * rows.judges)
-    return power[np.bincount(rows.block, rows.judges) > 0]
+    return np.asarray(power[np.bincount(rows.block, rows.judges) > 0], np.float64)
 
 
 def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:
@@ -83,11 +85,11 @@ def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[Floa
     signals = [_signal(c, out, effect) for c, out in zip(problem.cases, base, strict=True)]
     if any(s is None for s in signals):
         return []
-    parts = [_spline(s, effect, _hold(c)) for s, c in zip(signals, problem.cases, strict=True) if s is not None]
+    parts = [
+        _spline(s, effect, _hold(c)) for s, c in zip(signals, problem.cases, strict=True) if s is not None
+    ]
     zero = problem.residual_of(base)
-    moved = (
-        [_with_part(problem, theta, base, effect, [p[k] for p in parts])] for k in range(len(parts[0]))
-    )
+    moved = ([_with_part(problem, theta, base, effect, [p[k] for p in parts])] for k in range(len(parts[0])))
     return [problem.residual_of(m[0]) - zero for m in moved]
 
 
@@ -103,17 +105,17 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
     if effect.port in (st.Port.COMMAND, st.Port.MOTOR):
         return drive.command
     if effect.port is st.Port.SENSOR:
-        return out["ft"] if "ft" in out else None
+        return out.get("ft")
     at = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
     if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
-        return np.interp(at, case.t["velocity"], out["velocity"])
+        return np.asarray(np.interp(at, case.t["velocity"], out["velocity"]))
     if st.GEAR_VELOCITY in effect.reads and "position" in out:
         t = case.t["position"]
-        return np.interp(at, t, np.gradient(out["position"], t))
+        return np.asarray(np.interp(at, t, np.gradient(out["position"], t)))
     read = next((n for n in ("position", "ft") if n in out), None)
     if effect.port is not st.Port.SPRING or read is None:
         return None
-    return np.interp(at, case.t[read], out[read])
+    return np.asarray(np.interp(at, case.t[read], out[read]))
 
 
 def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
@@ -130,7 +132,11 @@ def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
 
 
 def _with_part(
-    problem: Problem, theta: FloatArray, base: Sequence[dict[str, FloatArray]], effect: Effect, parts: Sequence[FloatArray]
+    problem: Problem,
+    theta: FloatArray,
+    base: Sequence[dict[str, FloatArray]],
+    effect: Effect,
+    parts: Sequence[FloatArray],
 ) -> list[dict[str, FloatArray]]:
     """Return the channels with one part of the spline acting where the effect does."""
     if effect.port is st.Port.SENSOR:

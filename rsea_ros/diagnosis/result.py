@@ -14,6 +14,9 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
+Status = Literal["confirmed", "leading", "one_of"]
+"""confirmed: right beyond reasonable doubt. leading: surely helps, part of the truth, and more is missing.
+one_of: it or one of the alternatives that stand against it."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Cause:
-    """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`."""
+    """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`.
+
+    probability: that it is part of the truth under this name, 0 to 1, calibrated (bench/calibration.py).
+    """
 
     name: str
     parameters: Mapping[str, Estimate]
@@ -50,6 +56,21 @@ class Cause:
     equation: str = ""
     channel: str = "ft"
     confusable_with: tuple[str, ...] = ()
+    status: Status = "confirmed"
+    probability: float = 1.0
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What may be right in a cause's place, with its size; gain_…: held out, of `channel`."""
+
+    name: str
+    instead_of: str
+    parameters: Mapping[str, Estimate]
+    gain_holdout: float
+    gain_holdout_ci95: tuple[float, float]
+    channel: str
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -106,6 +127,7 @@ class Diagnosis:
     at_noise_floor: bool
     misfit: tuple[Misfit, ...]
     causes: tuple[Cause, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
     rejected: tuple[Rejected, ...] = ()
     remaining: tuple[Misfit, ...] = ()
     next_experiment: Experiment | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from rsea_ros.diagnosis.evidence import Evidence
 from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
 from rsea_ros.fault_kinds import MASKED
@@ -57,6 +58,27 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
     return (
         f"With {effect.about}, the {_CHANNELS[channel]} residual of data that took no part falls "
         f"from {before:.2f} to {after:.2f} times the noise (gain {gain:.1%})."
+    )
+
+
+def improbable(evidence: Evidence, probability: float) -> str:
+    """Return why a cause that was fitted to everything is not named."""
+    if not evidence.is_sure:
+        return "does not surely lower the residual of data that took no part"
+    return (
+        f"helps on data that took no part (gain {evidence.gain:.0%}), but its law does not fit what it takes "
+        f"away: probability {probability:.2f}"
+    )
+
+
+def also_in_model(names: Sequence[str]) -> tuple[str, ...]:
+    """Return what the extended model has beside the causes, as sentences."""
+    if not names:
+        return ()
+    effects = listed([n.replace("_", " ") for n in names])
+    return (
+        f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
+        "law than that.",
     )
 
 

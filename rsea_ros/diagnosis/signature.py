@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.fitting import heavier
-from rsea_ros.diagnosis.hypothesise import reduced
-from rsea_ros.diagnosis.split import JUDGE, Score, blocks_of, set_of
+from rsea_ros.diagnosis.candidate import heavier
+from rsea_ros.diagnosis.data_split import JUDGE, Score, blocks_of, set_of
+from rsea_ros.diagnosis.screening import reduced
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
@@ -76,7 +76,8 @@ def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Prob
 def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -> Rows | None:
     """Return a model's residuals and what a cause of it contributes; None where that runs away."""
     error = problem.residual(theta)
-    without = (lambda p, t: p.residual(t))(*reduced(problem, theta, name))
+    less, rest = reduced(problem, theta, name)
+    without = less.residual(rest)
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
@@ -135,7 +136,7 @@ def projected(rows: Rows, values: FloatArray) -> FloatArray:
 
 
 def _summed(part: IntArray, cc: FloatArray, cr: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.bincount(part, cc), np.bincount(part, cr)
+    return np.asarray(np.bincount(part, cc), np.float64), np.asarray(np.bincount(part, cr), np.float64)
 
 
 def _spread(cc: FloatArray, cr: FloatArray) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from rsea_ros.diagnosis.candidate import Model, at_floor, fitted, reestimated, refitted, rescored
 from rsea_ros.diagnosis.exchange import exchanged
 from rsea_ros.diagnosis.forward_step import NOTHING, Round
-from rsea_ros.diagnosis.trial import Trial
+from rsea_ros.diagnosis.trial import Trial, trial_of
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Case, Problem
@@ -19,6 +19,8 @@ from rsea_ros.progress import Progress
 
 _FIRST_ITERATIONS = 25
 _MOST_EXCHANGES = 2
+GAVE_WAY = "another took its place beside the causes that came later"
+"""Why a cause that was accepted is none in the end, if nothing else says so."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ def search(
         if accepted is None:
             break
         equals[accepted.causes[-1]] = played.equals
+        trials.append(trial_of(accepted, accepted.causes[-1], present, GAVE_WAY))
         quieter = reestimated(cases, accepted)
         accepted = refitted(quieter, accepted, at_work.run)
         models = [*(rescored(quieter, m) for m in models), accepted]

@@ -1,0 +1,139 @@
+"""Make, fit and score the probabilities of causes.
+
+.venv/bin/python bench/calibration.py make           diagnose records of known truth (resumes)
+.venv/bin/python bench/calibration.py fit            coefficients, from the project's own plants
+.venv/bin/python bench/calibration.py score          reliability, Brier score, wrong names, on the other
+"""
+
+from __future__ import annotations
+
+import argparse
+import copyreg
+import json
+import pickle
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from calibration_records import Plan, made, plans
+
+from rsea_ros.diagnosis.diagnose import examine
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.verdict import reached
+from rsea_ros.diagnosis.weighing import Place, weighed
+from rsea_ros.diagnosis.workers import workers
+
+CACHE = Path("out/calibration/evidence.jsonl")
+
+
+def _read_only(values: dict[str, Any]) -> MappingProxyType[str, Any]:
+    return MappingProxyType(values)
+
+
+copyreg.pickle(MappingProxyType, lambda m: (_read_only, (dict(m),)))  # type: ignore[arg-type]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one of the three steps."""
+    args = _parser().parse_args(argv)
+    return int(args.step(args) or 0)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cache", type=Path, default=CACHE, help="JSON lines, a record each (%(default)s)")
+    verbs = parser.add_subparsers(required=True, metavar="make|fit|score")
+    make = verbs.add_parser("make", help="diagnose records and keep the evidence; goes on where it stopped")
+    make.add_argument("--records", type=int, default=600, help="how many (default %(default)s)")
+    make.add_argument("--searches", type=Path, help="keep the searches here, to weigh them anew without one")
+    make.set_defaults(step=_make)
+    return parser
+
+
+def _make(args: argparse.Namespace) -> None:
+    """Append the evidence of every record that the cache does not hold yet."""
+    args.cache.parent.mkdir(parents=True, exist_ok=True)
+    done = {entry["name"] for entry in read(args.cache)}
+    for plan in plans(args.records):
+        if plan.name not in done:
+            entry = _entry(plan, args.searches)
+            with args.cache.open("a") as file:
+                file.write(json.dumps(entry) + "\n")
+            print(_line(entry), flush=True)
+
+
+def read(cache: Path) -> list[dict[str, Any]]:
+    """Return the entries of a cache, none where it does not exist."""
+    return [json.loads(line) for line in cache.read_text().splitlines()] if cache.exists() else []
+
+
+def _entry(plan: Plan, searches: Path | None) -> dict[str, Any]:
+    """Return what came of one record; an exception is an outcome too."""
+    start = time.perf_counter()
+    entry = {"name": plan.name, "family": plan.family, "group": plan.group, "truth": list(plan.truth)}
+    entry |= {"off": plan.off[0] if plan.off else None, "excitation": plan.excitation, "sizes": plan.hidden}
+    try:
+        entry |= _weighed(plan, searches)
+    except Exception:
+        entry["error"] = traceback.format_exc(limit=-3)
+    return entry | {"seconds": round(time.perf_counter() - start, 2)}
+
+
+def _weighed(plan: Plan, searches: Path | None) -> dict[str, Any]:
+    kept = searches / f"{plan.name}.pickle" if searches else None
+    with workers() as at_work:
+        if kept and kept.exists():
+            examined = pickle.loads(kept.read_bytes())
+        else:
+            record, rig = made(plan)
+            settings = DiagnosisSettings(without=plan.without)
+            examined = examine([record], rig, at_work, None, None, settings)
+            if kept:
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                kept.write_bytes(pickle.dumps(examined))
+        accepted = len(examined.stages)
+        examined, places = weighed(examined, at_work)
+    return {
+        "nothing_wrong": reached(examined.stages[0].judged),
+        "at_floor": reached(examined.stages[-1].judged),
+        "promoted": len(examined.stages) > accepted,
+        "places": [_place(p) for p in places],
+    }
+
+
+def _place(place: Place) -> list[dict[str, Any]]:
+    """Return the evidence for a cause and its rivals, with the size that each has."""
+    return [
+        asdict(w.evidence) | {"values": _values(w.claim.problem, w.claim.theta, w.claim.name)}
+        for w in (place.cause, *place.rivals)
+    ]
+
+
+def _values(problem: Any, theta: Any, name: str) -> dict[str, float]:
+    own = [(u, t) for u, t in zip(problem.unknowns, theta, strict=True) if u.name.startswith(name + ".")]
+    return {u.name.split(".")[1]: u.outer(float(t)) for u, t in own}
+
+
+def _line(entry: dict[str, Any]) -> str:
+    """Return one record in a line: truth, what was accepted with the spread of its lambda, time."""
+    first = [place[0] for place in entry.get("places", [])]
+    right = {e["name"]: "+" if e["name"] in entry["truth"] else "WRONG" for e in first}
+    said = ", ".join(
+        f"{n} {right[n]} {e['signature']['spread']:.3f}" for n, e in zip(right, first, strict=True)
+    )
+    truth = "+".join([*entry["truth"], *([f"({entry['off']})"] if entry["off"] else [])])
+    floor = "at floor" if entry.get("at_floor") else ""
+    return f"{entry['name']:<28} {truth or 'nothing':<50} {said} {floor} {entry['seconds']:.0f} s" + (
+        f"\n{entry['error']}" if "error" in entry else ""
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

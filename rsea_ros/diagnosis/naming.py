@@ -1,0 +1,59 @@
+"""Naming: which causes may be named, with which status, and what stands against each.
+
+A cause and its rivals share the probability that one of them is right; the rest is "none of these". They are
+named where they are likelier than that. At the noise floor, where nothing is left that another law could be
+seen in, a cause is always named, but as `confirmed` only where it is likely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rsea_ros.diagnosis.probability import probability
+from rsea_ros.diagnosis.result import Status
+from rsea_ros.diagnosis.weighing import Place, Weighed
+
+CONFIRMED_AT_FLOOR = 0.8
+"""Probability from which a cause that takes the residual to the floor with its siblings is confirmed."""
+CONFIRMED = 0.98
+"""Probability from which one is confirmed although more is missing: two wrong names in a hundred."""
+NONE_OF_THESE = 0.5
+"""Probability of "none of these" from which nothing is named."""
+RIVAL = 0.05
+"""Probability from which a rival is told of."""
+CLEAR = 0.8
+"""Share of the probability of all that stand in one place from which the first is no `one_of`."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A weighed cause with its probability and status (None: not to be named), and its rivals with theirs."""
+
+    cause: Weighed
+    probability: float
+    status: Status | None
+    rivals: tuple[tuple[Weighed, float], ...]
+
+
+def named(places: Sequence[Place], at_floor: bool) -> list[Named]:
+    """Return what may be said of the cause in each place."""
+    return [_named(place, at_floor) for place in places]
+
+
+def _named(place: Place, at_floor: bool) -> Named:
+    every = [(w, probability(w.evidence)) for w in (place.cause, *place.rivals)]
+    mass = max(1.0, sum(p for _, p in every))
+    (cause, p), *others = [(w, q / mass) for w, q in every]
+    rivals = tuple((w, q) for w, q in others if q >= RIVAL)
+    return Named(cause, p, status_of(p, [q for _, q in rivals], at_floor, cause.evidence.is_sure), rivals)
+
+
+def status_of(p: float, rivals: Sequence[float], at_floor: bool, is_sure: bool) -> Status | None:
+    """Return the status of a cause of probability p beside rivals; None where it is not to be named."""
+    mass = p + sum(rivals)
+    if not at_floor and (mass < NONE_OF_THESE or not is_sure):
+        return None
+    if rivals and p < CLEAR * mass:
+        return "one_of"
+    return "confirmed" if p >= (CONFIRMED_AT_FLOOR if at_floor else CONFIRMED) else "leading"
