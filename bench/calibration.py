@@ -20,7 +20,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from calibration_records import Plan, made, plans
+from calibration_records import Plan, left_out, made, plans
+from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, table
 
 from rsea_ros.diagnosis.diagnose import examine
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -29,6 +30,7 @@ from rsea_ros.diagnosis.weighing import Place, weighed
 from rsea_ros.diagnosis.workers import workers
 
 CACHE = Path("out/calibration/evidence.jsonl")
+TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/coefficients.py"
 
 
 def _read_only(values: dict[str, Any]) -> MappingProxyType[str, Any]:
@@ -53,7 +55,15 @@ def _parser() -> argparse.ArgumentParser:
     make = verbs.add_parser("make", help="diagnose records and keep the evidence; goes on where it stopped")
     make.add_argument("--records", type=int, default=600, help="how many (default %(default)s)")
     make.add_argument("--searches", type=Path, help="keep the searches here, to weigh them anew without one")
+    make.add_argument(
+        "--pool", type=int, default=0, help="try only so many effects a record, 0: all (default %(default)s)"
+    )
     make.set_defaults(step=_make)
+    verbs.add_parser("fit", help=f"write {TABLE.name} from the project's own plants").set_defaults(step=_fit)
+    score = verbs.add_parser("score", help="reliability diagram, Brier score, wrong names")
+    score.add_argument("--markdown", type=Path, help="the tables")
+    score.add_argument("--svg", type=Path, help="the reliability diagram")
+    score.set_defaults(step=_score)
     return parser
 
 
@@ -63,10 +73,40 @@ def _make(args: argparse.Namespace) -> None:
     done = {entry["name"] for entry in read(args.cache)}
     for plan in plans(args.records):
         if plan.name not in done:
-            entry = _entry(plan, args.searches)
+            entry = _entry(plan, args.searches, args.pool)
             with args.cache.open("a") as file:
                 file.write(json.dumps(entry) + "\n")
             print(_line(entry), flush=True)
+
+
+def _fit(args: argparse.Namespace) -> None:
+    """Fit the coefficients to the plants that do not judge, and write their table."""
+    entries = [e for e in usable(args.cache) if e["family"] != JUDGES]
+    coefficients = fitted(*rows(entries))
+    items = "".join(f'        "{name}": {value},\n' for name, value in coefficients.items())
+    head, _, _ = TABLE.read_text().partition("COEFFICIENTS = ")
+    TABLE.write_text(f"{head}COEFFICIENTS = MappingProxyType(\n    {{\n{items}    }}\n)\n")
+    print(f"{len(entries)} records of {', '.join(sorted({e['family'] for e in entries}))}: {TABLE}")
+    print("\n".join(f"{name:<12}{value:8.3f}" for name, value in coefficients.items()))
+
+
+def _score(args: argparse.Namespace) -> None:
+    """Score what is said of the plants that judge, and of those that were fitted to."""
+    text = []
+    for title, chosen in (("The plant that judges", True), ("The plants that were fitted to", False)):
+        entries = [e for e in usable(args.cache) if (e["family"] == JUDGES) == chosen]
+        causes = list(said(entries))
+        text += [f"**{title}**: {len(entries)} records", "", *table(causes), ""]
+        if chosen and args.svg:
+            args.svg.write_text(diagram(reliability(causes)))
+    print("\n".join(text))
+    if args.markdown:
+        args.markdown.write_text("\n".join(text))
+
+
+def usable(cache: Path) -> list[dict[str, Any]]:
+    """Return the entries of a cache that ended without an error."""
+    return [e for e in read(cache) if "error" not in e]
 
 
 def read(cache: Path) -> list[dict[str, Any]]:
@@ -74,26 +114,27 @@ def read(cache: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in cache.read_text().splitlines()] if cache.exists() else []
 
 
-def _entry(plan: Plan, searches: Path | None) -> dict[str, Any]:
+def _entry(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     """Return what came of one record; an exception is an outcome too."""
     start = time.perf_counter()
     entry = {"name": plan.name, "family": plan.family, "group": plan.group, "truth": list(plan.truth)}
-    entry |= {"off": plan.off[0] if plan.off else None, "excitation": plan.excitation, "sizes": plan.hidden}
+    entry |= {"off": plan.off[0] if plan.off else None, "excitation": plan.excitation, "pool": pool}
+    entry["sizes"] = plan.hidden
     try:
-        entry |= _weighed(plan, searches)
+        entry |= _weighed(plan, searches, pool)
     except Exception:
         entry["error"] = traceback.format_exc(limit=-3)
     return entry | {"seconds": round(time.perf_counter() - start, 2)}
 
 
-def _weighed(plan: Plan, searches: Path | None) -> dict[str, Any]:
+def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     kept = searches / f"{plan.name}.pickle" if searches else None
     with workers() as at_work:
         if kept and kept.exists():
             examined = pickle.loads(kept.read_bytes())
         else:
             record, rig = made(plan)
-            settings = DiagnosisSettings(without=plan.without)
+            settings = DiagnosisSettings(without=left_out(plan, pool))
             examined = examine([record], rig, at_work, None, None, settings)
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)

@@ -2,8 +2,8 @@
 
 The plants `open`, `loop`, `sea` and `rigid` are rigs of this project with drawn values, simulated by it,
 with laws that the catalogue lacks put into the command or the sensors; `second` is test/independent, which
-shares no code with it and has such laws in its mechanics too. Coefficients are fitted on the former and judged
-on the latter.
+shares no code with it and has such laws in its mechanics too. Coefficients are fitted on the former and
+judged on the latter.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ RATE = 280.0
 FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
 """Plants in the order in which records are made; `second` judges the others."""
 GROUPS = {
-    "one": 0.10,
-    "two": 0.20,
-    "three": 0.12,
-    "four": 0.06,
-    "off": 0.14,
-    "off_and_one": 0.16,
-    "off_and_two": 0.10,
-    "taken_out": 0.10,
-    "clean": 0.02,
+    "one": 0.15,
+    "two": 0.22,
+    "three": 0.10,
+    "four": 0.03,
+    "off": 0.15,
+    "off_and_one": 0.18,
+    "off_and_two": 0.08,
+    "taken_out": 0.08,
+    "clean": 0.01,
 }
 """Share of the records by what is hidden: effects of the catalogue, a law that it lacks (off), or both."""
 COUNT = {"one": 1, "two": 2, "three": 3, "four": 4, "off_and_one": 1, "off_and_two": 2, "taken_out": 2}
@@ -83,7 +83,7 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
     family = FAMILIES[k % len(FAMILIES)]
     group = str(rng.choice(list(GROUPS), p=np.array(list(GROUPS.values())) / sum(GROUPS.values())))
     names = _drawn_effects(family, COUNT.get(group, 0), rng)
-    hidden = {n: drawn_parameters(n, str(rng.choice(SEVERITIES, p=(0.35, 0.4, 0.25))), rng) for n in names}
+    hidden = {n: _sized(n, family, rng) for n in names}
     off = None
     if group.startswith("off"):
         laws = list(OFF_CATALOGUE) if family == "second" else [n for n, f in LAWS.items() if family in f.on]
@@ -101,6 +101,13 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
         without=_kin(names[0]) if group == "taken_out" else (),
         coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
     )
+
+
+def _sized(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
+    """Return parameters of an effect; a drive without a spring works against larger torques."""
+    drawn = drawn_parameters(name, str(rng.choice(SEVERITIES, p=(0.35, 0.4, 0.25))), rng)
+    torques = {p.name for p in catalogue()[name].parameters if p.unit == "N m"}
+    return {p: v * (6.0 if family == "rigid" and p in torques else 1.0) for p, v in drawn.items()}
 
 
 def _drawn_effects(family: str, count: int, rng: np.random.Generator) -> list[str]:
@@ -124,6 +131,19 @@ def _kin(name: str) -> tuple[str, ...]:
     return (name, *dict.fromkeys([*effects[name].claims.confusable_with, *alike]))
 
 
+def left_out(plan: Plan, pool: int) -> tuple[str, ...]:
+    """Return what a diagnosis has to do without: the plan's, and all but `pool` effects where pool is not 0.
+
+    What is hidden and what it is confused with stay, so that a pool leaves the likeliest wrong names in.
+    """
+    effects = catalogue()
+    mimics = OFF_CATALOGUE[plan.off[0]][1] if plan.off and plan.off[0] in OFF_CATALOGUE else ()
+    wanted = dict.fromkeys([*plan.truth, *mimics, *(k for n in plan.truth for k in _kin(n))])
+    drawn = np.random.default_rng([plan.seed, 1]).permutation(list(effects))
+    stays = [*wanted, *(str(n) for n in drawn if n not in wanted)][: max(pool, len(plan.truth))]
+    return (*plan.without, *(n for n in effects if pool and n not in stays and n not in plan.without))
+
+
 def made(plan: Plan) -> tuple[Record, Rig]:
     """Simulate a plan; return the record and the rig that a user would diagnose it with."""
     rng = np.random.default_rng(plan.seed)
@@ -138,9 +158,9 @@ def _command(plan: Plan, rng: np.random.Generator, size: float = 1.0) -> FloatAr
         return size * chirp_noise(plan.duration, rng)
     if plan.excitation == "multisine":
         return size * odd_multisine(plan.duration, rng, period=5.0 if plan.duration != 12.0 else 4.0)
-    return size * 30.0 * work(plan.duration, rng, smooth=plan.excitation == "work") + size * rng.normal(
-        size=round(plan.duration * RATE)
-    )
+    levels = 30.0 * work(plan.duration, rng, smooth=plan.excitation == "work")
+    noise = 0.0 if plan.family in ("loop", "rigid") else 1.0  # no loop has white noise in its reference
+    return size * (levels + noise * rng.normal(size=len(levels)))
 
 
 def work(duration: float, rng: np.random.Generator, smooth: bool) -> FloatArray:

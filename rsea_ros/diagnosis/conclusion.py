@@ -86,7 +86,13 @@ def conclusion(examined: Examined, places: Sequence[Place], at_work: Workers) ->
     return Diagnosis(
         verdict=verdict,
         sentence=verdict_sentence(
-            verdict, causes, channel, first.judged.ratio(channel), last.judged.ratio(channel), faults
+            verdict,
+            causes,
+            channel,
+            first.judged.ratio(channel),
+            last.judged.ratio(channel),
+            faults,
+            reached(last.judged),
         ),
         rig_name=rig.name,
         sources=tuple(r.source for r in records),

@@ -7,9 +7,11 @@ seen in, a cause is always named, but as `confirmed` only where it is likely.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rsea_ros.diagnosis.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.evidence import Evidence
 from rsea_ros.diagnosis.probability import probability
 from rsea_ros.diagnosis.result import Status
 from rsea_ros.diagnosis.weighing import Place, Weighed
@@ -42,11 +44,23 @@ def named(places: Sequence[Place], at_floor: bool) -> list[Named]:
 
 
 def _named(place: Place, at_floor: bool) -> Named:
-    every = [(w, probability(w.evidence)) for w in (place.cause, *place.rivals)]
-    mass = max(1.0, sum(p for _, p in every))
-    (cause, p), *others = [(w, q / mass) for w, q in every]
-    rivals = tuple((w, q) for w, q in others if q >= RIVAL)
-    return Named(cause, p, status_of(p, [q for _, q in rivals], at_floor, cause.evidence.is_sure), rivals)
+    every = [place.cause, *place.rivals]
+    likely, status = standing([w.evidence for w in every], at_floor)
+    rivals = tuple((w, p) for w, p in zip(every[1:], likely[1:], strict=True) if p >= RIVAL)
+    return Named(place.cause, likely[0], status, rivals)
+
+
+def standing(
+    evidence: Sequence[Evidence], at_floor: bool, coefficients: Mapping[str, float] = COEFFICIENTS
+) -> tuple[list[float], Status | None]:
+    """Return the probability of a cause and of each of its rivals, and the status of the cause.
+
+    evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
+    """
+    likely = [probability(e, coefficients) for e in evidence]
+    likely = [p / max(1.0, sum(likely)) for p in likely]
+    rivals = [p for p in likely[1:] if p >= RIVAL]
+    return likely, status_of(likely[0], rivals, at_floor, evidence[0].is_sure)
 
 
 def status_of(p: float, rivals: Sequence[float], at_floor: bool, is_sure: bool) -> Status | None:

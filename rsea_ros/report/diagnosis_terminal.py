@@ -1,4 +1,4 @@
-"""The essence of a diagnosis on a terminal, in about ten lines."""
+"""The essence of a diagnosis on a terminal, in about a dozen lines."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import was_fitted
+from rsea_ros.report.diagnosis_standing import standing
 from rsea_ros.report.fault_words import fault_lines
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
@@ -32,6 +33,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
+        yield "status", standing(cause, d.alternatives, d.at_noise_floor)
     if d.misfit:
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
     rivals = [r for r in d.rejected if was_fitted(r)][:_MOST]

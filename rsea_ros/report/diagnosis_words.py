@@ -74,6 +74,9 @@ def headline(diagnosis: Diagnosis) -> str:
         size = f"{near if before < 2.0 else _times(before)} the noise"
         return f"The {channel} residual is {size}, and nothing in the catalogue explains it"
     is_, it, explains = ("is", "it", "explains") if len(d.causes) == 1 else ("are", "them", "explain")
+    if d.at_noise_floor and d.verdict == "partly_explained":
+        rest = f"{is_} probably what the simulation lacks; with {it}, only noise is left"
+        return words.sentence(f"{named(d.causes)} {rest}")
     rest = f"{explains} a part of what the simulation gets wrong; the rest stays unexplained"
     if d.verdict == "explained":
         rest = f"{is_} what the simulation lacks; with {it}, only noise is left"

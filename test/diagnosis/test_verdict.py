@@ -28,13 +28,13 @@ def judged(ratios):
 def test_nothing_is_wrong_exactly_when_every_residual_is_the_noise(ratios):
     stage = judged(ratios)
     at_noise = all(stage.judged.ratio(n) <= FLOOR for n in ratios)
-    assert verdict_of(SimpleNamespace(), [stage]) == ("nothing_wrong" if at_noise else "unexplained")
+    assert verdict_of([stage]) == ("nothing_wrong" if at_noise else "unexplained")
 
 
 @given(RATIOS | NEAR)
 def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
     score = judged(ratios).judged
-    verdict = verdict_of(SimpleNamespace(), [judged(ratios)])
+    verdict = verdict_of([judged(ratios)])
     channel = spoken_of(score, "ft") if verdict == "unexplained" else "ft"
     sentence = verdict_sentence(verdict, (), channel, score.ratio(channel), score.ratio(channel), ())
     number = float(re.search(r"([\d.]+) times the noise", sentence)[1])

@@ -1,0 +1,97 @@
+"""What may be named, and as what: the rules between probabilities and the verdict."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rsea_ros.diagnosis.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.data_split import Score
+from rsea_ros.diagnosis.evidence import Evidence
+from rsea_ros.diagnosis.flexible import Flexible
+from rsea_ros.diagnosis.naming import CONFIRMED, CONFIRMED_AT_FLOOR, NONE_OF_THESE, standing, status_of
+from rsea_ros.diagnosis.probability import features, probability
+from rsea_ros.diagnosis.signature import Signature
+from rsea_ros.diagnosis.verdict import verdict_of
+
+SHARE = st.floats(0.0, 1.0)
+SPREAD = st.floats(0.0, 10.0)
+SIGNATURES = st.builds(Signature, st.floats(-2.0, 4.0), *[SPREAD] * 6, st.floats(0.0, 1e4), SHARE)
+FLEXIBLE = st.none() | st.builds(Flexible, SHARE, st.tuples(st.floats(-1.0, 0.5), SHARE), SHARE)
+EVIDENCE = st.builds(
+    Evidence,
+    st.sampled_from(["coulomb_friction", "command_delay"]),
+    SIGNATURES,
+    FLEXIBLE,
+    st.just("ft"),
+    *[SHARE] * 2,
+    st.booleans(),
+    SHARE,
+    *[st.floats(0.5, 1e3)] * 2,
+    st.booleans(),
+    st.integers(0, 3),
+)
+RIGHT = Evidence(
+    "command_delay", Signature(1.0, *[0.01] * 6, 100.0, 0.9), Flexible(0.0, (-0.01, 0.01), 0.0),
+    "ft", 0.9, 0.88, True, 0.98, 50.0, 1.0, False, 0,
+)  # fmt: skip
+
+
+@given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans())
+def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor):
+    likely, _ = standing(evidence, at_floor)
+    assert all(0.0 <= p <= 1.0 for p in likely)
+    assert sum(likely) <= 1.0 + 1e-9
+
+
+@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans())
+def test_only_what_is_likely_is_confirmed_and_only_what_is_likelier_than_none_is_named(
+    p, rivals, at_floor, is_sure
+):
+    status = status_of(p, rivals, at_floor, is_sure)
+    if status == "confirmed":
+        assert p >= (CONFIRMED_AT_FLOOR if at_floor else CONFIRMED)
+    if status is None:
+        assert not at_floor and (p + sum(rivals) < NONE_OF_THESE or not is_sure)
+    if status == "one_of":
+        assert rivals
+
+
+def test_evidence_against_a_law_lowers_its_probability():
+    worse = {
+        "signature": Signature(1.0, *[0.6] * 2, 0.02, *[0.6] * 3, 100.0, 0.9),
+        "flexible": Flexible(0.4, (0.3, 0.5), 0.3),
+        "left": 20.0,
+        "weight": 0.05,
+    }
+    for name, value in worse.items():
+        assert probability(Evidence(**{**vars(RIGHT), name: value})) < probability(RIGHT), name
+    assert set(features(RIGHT)) == set(COEFFICIENTS)
+
+
+def stage(ratio):
+    """Return a stage whose residual is so many times the noise."""
+    score = Score({"ft": np.full(4, 100.0 * ratio**2)}, {"ft": np.full(4, 100.0)})
+    return SimpleNamespace(judged=score)
+
+
+def test_a_verdict_is_explained_only_with_every_cause_confirmed_and_the_floor_reached():
+    assert verdict_of([stage(9.0), stage(1.0)], ["confirmed"]) == "explained"
+    assert verdict_of([stage(9.0), stage(1.0)], ["one_of"]) == "partly_explained"
+    assert verdict_of([stage(9.0), stage(1.53)], ["confirmed"]) == "partly_explained"
+    assert verdict_of([stage(9.0), stage(5.0), stage(1.0)], ["confirmed", "leading"]) == "partly_explained"
+    assert verdict_of([stage(9.0), stage(5.0)], [None]) == "unexplained"
+
+
+def test_an_unchanged_channel_does_not_take_a_cause_away():
+    """One rounding decided: a channel at 1.53 that rose to 1.5301 made `unexplained` of a gain of 0.92."""
+
+    def both(ft, position):
+        scores = {"ft": ft, "position": position}
+        sums = {n: np.full(4, 100.0 * r**2) for n, r in scores.items()}
+        return SimpleNamespace(judged=Score(sums, {n: np.full(4, 100.0) for n in scores}))
+
+    assert verdict_of([both(40.0, 1.53), both(3.2, 1.5301)], ["leading"]) == "partly_explained"
