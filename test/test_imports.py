@@ -14,7 +14,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "files", "new_files"}
-BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording"} | FILES | YAML
+BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "version", "wording"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
@@ -23,6 +23,7 @@ OWN = {
     "fault_kinds": set(),
     "progress": set(),
     "wording": set(),
+    "version": set(),
     "interrupts": set(),
     "files": {"errors", "interrupts"},
     "new_files": {"errors", "files", "interrupts"},

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings
 
 HELP = "topics, rates, clocks, noise, sign, scale, rig: a traffic light a line, in seconds"
+EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 RIG = "paper_high_impedance"
 FOUND = 1
 """Exit status when a light is one that --fail-on names, or worse."""

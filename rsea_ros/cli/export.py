@@ -9,6 +9,7 @@ from rsea_ros.cli._output import add_force
 from rsea_ros.new_files import check_free, write_text
 
 HELP = "a rig as a model for another program: MJCF for MuJoCo"
+EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "frequency response and parameters with confidence from recorded runs"
+EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
@@ -66,11 +67,12 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._checks import checked
 
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
+        from rsea_ros.cli._provenance import provenance
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
-        report = write_results(result, place)
+        report = write_results(result, place, provenance("identify", args.bags, args.rig))
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
     else:

@@ -14,7 +14,7 @@ from types import MappingProxyType, ModuleType
 import rsea_ros.effects as package
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
-from rsea_ros.wording import shown
+from rsea_ros.wording import did_you_mean, shown
 
 _NOT_EFFECTS = {"effect", "catalogue", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
@@ -41,7 +41,8 @@ def effect_named(name: str) -> Effect:
     effects = catalogue()
     if name not in effects:
         known = ", ".join(effects)
-        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}")
+        near = did_you_mean(name, effects)
+        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}{near}")
     return effects[name]
 
 
