@@ -25,7 +25,7 @@ from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, 
 
 from rsea_ros.diagnosis.diagnose import examine
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.verdict import reached
+from rsea_ros.diagnosis.verdict import reached, takes_most
 from rsea_ros.diagnosis.weighing import Place, weighed
 from rsea_ros.diagnosis.workers import workers
 
@@ -144,6 +144,7 @@ def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     return {
         "nothing_wrong": reached(examined.stages[0].judged),
         "at_floor": reached(examined.stages[-1].judged),
+        "takes_most": takes_most(examined.stages[0].judged, examined.stages[-1].judged),
         "promoted": len(examined.stages) > accepted,
         "places": [_place(p) for p in places],
     }

@@ -20,8 +20,18 @@ OUTSIDE = ("off", "taken_out")
 """Groups, by how their names begin, whose record holds a law that the diagnosis cannot know."""
 JUDGES = "second"
 """The plant that no coefficient is fitted on."""
+EXPECTED = {
+    "intercept": 0.0,
+    "shape": -0.7,
+    "rivals": 0.5,
+    "preferred": 0.5,
+    "noise": 0.5,
+    "flexible": -3.0,
+    "edge": -0.7,
+}
+"""Coefficients beforehand: the sign that theory gives each, and a size that a few records may overrule."""
 _RIDGE = 1.0
-"""Of the coefficients, the intercept apart: a standard deviation of 1 for each beforehand."""
+"""Of each coefficient, the intercept apart: a standard deviation of 1 around what is expected."""
 _ITERATIONS = 50
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99, 1.0)
 """Of the bins of the reliability diagram; 0.85 to 0.95 are the causes said with 90 %."""
@@ -60,22 +70,24 @@ def evidence_from(entry: Mapping[str, Any]) -> Evidence:
     return Evidence(**{**values, "signature": Signature(**values["signature"])})
 
 
-def rows(entries: Sequence[Mapping[str, Any]]) -> tuple[list[Evidence], np.ndarray]:
-    """Return all evidence of some records and whether each name is right, shape (n,)."""
-    pairs = [(evidence_from(e), e["name"] in r["truth"]) for r in entries for p in r["places"] for e in p]
-    return [e for e, _ in pairs], np.array([right for _, right in pairs], float)
+def rows(entries: Sequence[Mapping[str, Any]]) -> tuple[list[dict[str, float]], np.ndarray]:
+    """Return the features of all evidence of some records, and whether each name is right, shape (n,)."""
+    every = [(e, k == 0, r["truth"]) for r in entries for p in r["places"] for k, e in enumerate(p)]
+    found = [features(evidence_from(e), preferred) for e, preferred, _ in every]
+    return found, np.array([e["name"] in truth for e, _, truth in every], float)
 
 
-def fitted(evidence: Sequence[Evidence], right: np.ndarray) -> dict[str, float]:
+def fitted(found: Sequence[Mapping[str, float]], right: np.ndarray) -> dict[str, float]:
     """Return the coefficients of greatest posterior probability, by Newton's method."""
-    names = list(features(evidence[0]))
-    x = np.array([list(features(e).values()) for e in evidence])
-    ridge = np.diag([0.0 if n == "intercept" else _RIDGE for n in names])
-    a = np.zeros(len(names))
+    names = list(found[0])
+    x = np.array([list(f.values()) for f in found])
+    ridge = np.diag([1e-9 if n == "intercept" else _RIDGE for n in names])
+    before = np.array([EXPECTED[n] for n in names])
+    a = before.copy()
     for _ in range(_ITERATIONS):
         p = 1.0 / (1.0 + np.exp(-x @ a))
-        slope = x.T @ (right - p) - ridge @ a
-        a = a + np.linalg.solve(x.T @ (x * (p * (1.0 - p))[:, None]) + ridge + 1e-9 * np.eye(len(a)), slope)
+        slope = x.T @ (right - p) - ridge @ (a - before)
+        a = a + np.linalg.solve(x.T @ (x * (p * (1.0 - p))[:, None]) + ridge, slope)
     return {n: round(float(v), 4) for n, v in zip(names, a, strict=True)}
 
 
@@ -86,7 +98,7 @@ def said(
     for record in entries:
         for place in record["places"]:
             evidence = [evidence_from(e) for e in place]
-            likely, status = standing(evidence, record["at_floor"], coefficients)
+            likely, status = standing(evidence, record["at_floor"], record["takes_most"], coefficients)
             rights = [e.name in record["truth"] for e in evidence]
             rest = any(rights[1:])
             for k, (e, p, right) in enumerate(zip(evidence, likely, rights, strict=True)):

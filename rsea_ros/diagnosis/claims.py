@@ -7,10 +7,11 @@ it and does as well in its place; each has a weight by what it leaves of the jud
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from rsea_ros.diagnosis.candidate import Model
+from rsea_ros.diagnosis.candidate import Model, effect_size
 from rsea_ros.diagnosis.criteria import prior_cost
 from rsea_ros.diagnosis.data_split import JUDGE, Score, score_on
 from rsea_ros.diagnosis.evaluation import Stage, effect_added
@@ -54,15 +55,19 @@ def beside(found: Search, model: Model) -> list[Trial]:
 
 
 def weighed(found: Search, claim: Claim, tried: Sequence[Trial], at_work: Workers) -> Contest:
-    """Return a contest of a claim with what was tried beside the same model, or does as well in its place."""
+    """Return a contest of a claim with what was tried beside the same model, or does as well in its place.
+
+    Another cause that was accepted too is no rival, whichever of the two came first.
+    """
     cases, last = found.cases, set(found.last.causes)
+    tried = [t for t in tried if t.name == claim.name or t.name not in last]
     scores = list(at_work.fits.map(lambda t: trial_score(t, cases), tried))
-    weights = _stacked(scores, [prior_cost(t) for t in tried])
+    weights = _stacked(scores, [prior_cost(t) for t in tried], [effect_size(t.name) for t in tried])
     of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
         Claim(t.name, t.problem, t.theta, s, score_on(t.problem, cases, JUDGE, t.beside.outputs), of[t.name])
         for t, s in zip(tried, scores, strict=True)
-        if t.name not in last | {claim.name}
+        if t.name != claim.name
     ]
     swapped = [m for m in found.rivals_of(claim.name) if len(m.causes) == len(last)]
     own, others = of.get(claim.name, 1.0), _weights_of(found, swapped)
@@ -91,11 +96,18 @@ def _weights_of(found: Search, rivals: Sequence[Model]) -> list[float]:
     """Return the weights of the last model and of those with another effect in a cause's place."""
     models = [found.last, *rivals]
     scores = [score_on(m.solution.problem, found.cases, JUDGE, m.outputs) for m in models]
-    return _stacked(scores, [prior_cost(m.solution) for m in models])
+    return _stacked(scores, [prior_cost(m.solution) for m in models], [m.size for m in models])
 
 
-def _stacked(scores: Sequence[Score], prices: Sequence[float]) -> list[float]:
+def _stacked(scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int]) -> list[float]:
+    """Return weights; every number that describes an effect costs the logarithm of the number of blocks.
+
+    A law that holds another as a special case does as well wherever the other is right (Schwarz, Annals of
+    Statistics 6, 1978).
+    """
     if not scores:
         return []
     best = min(scores, key=lambda s: float(s.loss(s).sum()))
-    return [float(w) for w in stacked([s.loss(best) for s in scores], prices)]
+    losses = [s.loss(best) for s in scores]
+    prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
+    return [float(w) for w in stacked(losses, prices)]

@@ -7,14 +7,12 @@ from types import MappingProxyType
 
 COEFFICIENTS = MappingProxyType(
     {
-        "intercept": 0.0,
-        "spread": -1.0,
-        "chance": -0.3,
-        "bent": -0.5,
-        "rivals": 0.5,
-        "flexible": -4.0,
-        "gain": 1.0,
-        "left": -0.5,
-        "edge": -1.0,
+        "intercept": -1.9193,
+        "shape": -0.4801,
+        "rivals": 1.0845,
+        "preferred": 1.601,
+        "noise": 0.2097,
+        "flexible": -3.0661,
+        "edge": -1.0055,
     }
 )

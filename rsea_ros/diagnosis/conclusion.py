@@ -36,7 +36,7 @@ from rsea_ros.diagnosis.sentences import (
 )
 from rsea_ros.diagnosis.stepwise import Search
 from rsea_ros.diagnosis.trial import Trial
-from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
+from rsea_ros.diagnosis.verdict import FLOOR, reached, takes_most, verdict_of
 from rsea_ros.diagnosis.weighing import Place, Weighed
 from rsea_ros.diagnosis.workers import Workers
 from rsea_ros.effects.catalogue import effect_named
@@ -64,14 +64,16 @@ def conclusion(examined: Examined, places: Sequence[Place], at_work: Workers) ->
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
-    said = {n.cause.evidence.name: n for n in named(places, reached(stages[-1].judged))}
+    first, last = stages[0].judged, stages[-1].judged
+    said = {n.cause.evidence.name: n for n in named(places, reached(last), takes_most(first, last))}
     stages = without_unnamed_end(stages, said)
     verdict = verdict_of(stages, [_status(said, stage) for stage in stages[1:]])
     if verdict == "unexplained":
         stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
-    first, last = stages[0], stages[-1]
+    without, all_causes = stages[0], stages[-1]
     added = [
-        (_cause(found, a, b, last, channel), said.get(effect_added(b))) for a, b in itertools.pairwise(stages)
+        (_cause(found, a, b, all_causes, channel), said.get(effect_added(b)))
+        for a, b in itertools.pairwise(stages)
     ]
     causes = tuple(replace(c, status=n.status, probability=n.probability) for c, n in added if n and n.status)
     against = [(c.name, w, p) for c, n in added if n and n.status for w, p in n.rivals]
@@ -81,48 +83,52 @@ def conclusion(examined: Examined, places: Sequence[Place], at_work: Workers) ->
     rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel, said), others)
     case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
-    where = misfits(case, first.outputs[0], channel, rig)
-    baseline = parameters_of(first.solution, first.confidence)
+    where = misfits(case, without.outputs[0], channel, rig)
+    baseline = parameters_of(without.solution, without.confidence)
     return Diagnosis(
         verdict=verdict,
         sentence=verdict_sentence(
             verdict,
             causes,
             channel,
-            first.judged.ratio(channel),
-            last.judged.ratio(channel),
+            without.judged.ratio(channel),
+            all_causes.judged.ratio(channel),
             faults,
-            reached(last.judged),
+            reached(all_causes.judged),
         ),
         rig_name=rig.name,
         sources=tuple(r.source for r in records),
         duration=sum(r.stop - r.start for r in records),
         rate=records[0]["command"].rate,
         faults=faults,
-        baseline_rig=identified_rig(first.solution, baseline),
+        baseline_rig=identified_rig(without.solution, baseline),
         baseline=baseline,
-        extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
+        extended_rig=identified_rig(
+            all_causes.solution, parameters_of(all_causes.solution, all_causes.confidence)
+        ),
         noise_rms=dict(case.noise),
-        residual_rms=_rms(first.judged, case),
-        fit_percent=_fit(first, found.cases),
-        extended_residual_rms=_rms(last.judged, case),
-        extended_fit_percent=_fit(last, found.cases),
-        at_noise_floor=reached(last.judged),
+        residual_rms=_rms(without.judged, case),
+        fit_percent=_fit(without, found.cases),
+        extended_residual_rms=_rms(all_causes.judged, case),
+        extended_fit_percent=_fit(all_causes, found.cases),
+        at_noise_floor=reached(all_causes.judged),
         misfit=where,
         causes=causes,
         alternatives=alternatives,
         rejected=tuple(rejected),
         next_experiment=_next_experiment(found, stages, verdict, records[0]),
-        remaining=misfits(case, last.outputs[0], channel, rig),
+        remaining=misfits(case, all_causes.outputs[0], channel, rig),
         masked=checked[0].masked,
-        before=overlays_of(case, first.outputs[0]),
-        after=overlays_of(case, last.outputs[0]),
-        spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
+        before=overlays_of(case, without.outputs[0]),
+        after=overlays_of(case, all_causes.outputs[0]),
+        spectra=tuple(
+            spectrum(case, without.outputs[0], all_causes.outputs[0], n) for n in without.judged.sums
+        ),
         statements=(
             *also_in_model([c.name for c, n in added if not n or not n.status]),
-            *what_is_not_told(first.solution.problem.unknowns, first.confidence),
+            *what_is_not_told(without.solution.problem.unknowns, without.confidence),
             *coherence_lost(lost_above(case, channel), channel),
-            *on_measured_angle(last.solution.problem),
+            *on_measured_angle(all_causes.solution.problem),
             *coloured_noise(sorted(case.coloured)),
         ),
     )

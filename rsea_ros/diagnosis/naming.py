@@ -1,8 +1,8 @@
 """Naming: which causes may be named, with which status, and what stands against each.
 
 A cause and its rivals share the probability that one of them is right; the rest is "none of these". They are
-named where they are likelier than that. At the noise floor, where nothing is left that another law could be
-seen in, a cause is always named, but as `confirmed` only where it is likely.
+named where they are likelier than that. Causes that together take most of the residual, or all of it, are
+always named, but as `confirmed` only where they are likely.
 """
 
 from __future__ import annotations
@@ -38,35 +38,40 @@ class Named:
     rivals: tuple[tuple[Weighed, float], ...]
 
 
-def named(places: Sequence[Place], at_floor: bool) -> list[Named]:
-    """Return what may be said of the cause in each place."""
-    return [_named(place, at_floor) for place in places]
+def named(places: Sequence[Place], at_floor: bool, takes_most: bool) -> list[Named]:
+    """Return what may be said of the cause in each place. at_floor, takes_most: all causes together."""
+    return [_named(place, at_floor, takes_most) for place in places]
 
 
-def _named(place: Place, at_floor: bool) -> Named:
+def _named(place: Place, at_floor: bool, takes_most: bool) -> Named:
     every = [place.cause, *place.rivals]
-    likely, status = standing([w.evidence for w in every], at_floor)
+    likely, status = standing([w.evidence for w in every], at_floor, takes_most)
     rivals = tuple((w, p) for w, p in zip(every[1:], likely[1:], strict=True) if p >= RIVAL)
     return Named(place.cause, likely[0], status, rivals)
 
 
 def standing(
-    evidence: Sequence[Evidence], at_floor: bool, coefficients: Mapping[str, float] = COEFFICIENTS
+    evidence: Sequence[Evidence],
+    at_floor: bool,
+    takes_most: bool,
+    coefficients: Mapping[str, float] = COEFFICIENTS,
 ) -> tuple[list[float], Status | None]:
     """Return the probability of a cause and of each of its rivals, and the status of the cause.
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
     """
-    likely = [probability(e, coefficients) for e in evidence]
+    likely = [probability(e, k == 0, coefficients) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= RIVAL]
-    return likely, status_of(likely[0], rivals, at_floor, evidence[0].is_sure)
+    return likely, status_of(likely[0], rivals, at_floor, takes_most, evidence[0].is_sure)
 
 
-def status_of(p: float, rivals: Sequence[float], at_floor: bool, is_sure: bool) -> Status | None:
+def status_of(
+    p: float, rivals: Sequence[float], at_floor: bool, takes_most: bool, is_sure: bool
+) -> Status | None:
     """Return the status of a cause of probability p beside rivals; None where it is not to be named."""
     mass = p + sum(rivals)
-    if not at_floor and (mass < NONE_OF_THESE or not is_sure):
+    if not (at_floor or takes_most) and (mass < NONE_OF_THESE or not is_sure):
         return None
     if rivals and p < CLEAR * mass:
         return "one_of"

@@ -15,7 +15,7 @@ from rsea_ros.diagnosis.flexible import Flexible
 from rsea_ros.diagnosis.naming import CONFIRMED, CONFIRMED_AT_FLOOR, NONE_OF_THESE, standing, status_of
 from rsea_ros.diagnosis.probability import features, probability
 from rsea_ros.diagnosis.signature import Signature
-from rsea_ros.diagnosis.verdict import verdict_of
+from rsea_ros.diagnosis.verdict import takes_most, verdict_of
 
 SHARE = st.floats(0.0, 1.0)
 SPREAD = st.floats(0.0, 10.0)
@@ -40,22 +40,22 @@ RIGHT = Evidence(
 )  # fmt: skip
 
 
-@given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans())
-def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor):
-    likely, _ = standing(evidence, at_floor)
+@given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans(), st.booleans())
+def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor, takes_most):
+    likely, _ = standing(evidence, at_floor, takes_most)
     assert all(0.0 <= p <= 1.0 for p in likely)
     assert sum(likely) <= 1.0 + 1e-9
 
 
-@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans())
+@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans(), st.booleans())
 def test_only_what_is_likely_is_confirmed_and_only_what_is_likelier_than_none_is_named(
-    p, rivals, at_floor, is_sure
+    p, rivals, at_floor, takes_most, is_sure
 ):
-    status = status_of(p, rivals, at_floor, is_sure)
+    status = status_of(p, rivals, at_floor, takes_most, is_sure)
     if status == "confirmed":
         assert p >= (CONFIRMED_AT_FLOOR if at_floor else CONFIRMED)
     if status is None:
-        assert not at_floor and (p + sum(rivals) < NONE_OF_THESE or not is_sure)
+        assert not (at_floor or takes_most) and (p + sum(rivals) < NONE_OF_THESE or not is_sure)
     if status == "one_of":
         assert rivals
 
@@ -68,8 +68,8 @@ def test_evidence_against_a_law_lowers_its_probability():
         "weight": 0.05,
     }
     for name, value in worse.items():
-        assert probability(Evidence(**{**vars(RIGHT), name: value})) < probability(RIGHT), name
-    assert set(features(RIGHT)) == set(COEFFICIENTS)
+        assert probability(Evidence(**{**vars(RIGHT), name: value}), True) < probability(RIGHT, True), name
+    assert set(features(RIGHT, True)) == set(COEFFICIENTS)
 
 
 def stage(ratio):
@@ -94,4 +94,5 @@ def test_an_unchanged_channel_does_not_take_a_cause_away():
         sums = {n: np.full(4, 100.0 * r**2) for n, r in scores.items()}
         return SimpleNamespace(judged=Score(sums, {n: np.full(4, 100.0) for n in scores}))
 
-    assert verdict_of([both(40.0, 1.53), both(3.2, 1.5301)], ["leading"]) == "partly_explained"
+    assert takes_most(both(40.0, 1.53).judged, both(1.2, 1.5301).judged)
+    assert not takes_most(both(40.0, 1.53).judged, both(1.2, 1.6).judged)
