@@ -7,12 +7,12 @@ from types import MappingProxyType
 
 COEFFICIENTS = MappingProxyType(
     {
-        "intercept": -1.9193,
-        "shape": -0.4801,
-        "rivals": 1.0845,
-        "preferred": 1.601,
-        "noise": 0.2097,
-        "flexible": -3.0661,
-        "edge": -1.0055,
+        "intercept": -1.7624,
+        "shape": -0.4985,
+        "rivals": 1.0933,
+        "preferred": 1.8044,
+        "noise": 0.0708,
+        "flexible": -2.811,
+        "edge": -1.0853,
     }
 )

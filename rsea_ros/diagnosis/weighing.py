@@ -24,10 +24,11 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Place:
-    """A cause and its rivals, each with its evidence."""
+    """A cause and its rivals, each with its evidence. is_late: the steps of the search had left it out."""
 
     cause: Weighed
     rivals: tuple[Weighed, ...]
+    is_late: bool = False
 
 
 def weighed(examined: Examined, at_work: Workers) -> tuple[Examined, list[Place]]:
@@ -44,8 +45,9 @@ def weighed(examined: Examined, at_work: Workers) -> tuple[Examined, list[Place]
         return [Weighed(c, e) for c in group if (e := of[id(c)]) is not None]
 
     places = []
-    for contest in held:
+    for k, contest in enumerate(held, start=1):
         cause = with_evidence([contest.cause])
         if cause:
-            places.append(Place(cause[0], tuple(with_evidence(contest.rivals))))
+            is_late = k >= len(examined.stages)
+            places.append(Place(cause[0], tuple(with_evidence(contest.rivals)), is_late))
     return replace(examined, found=found, stages=stages), places

@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.evidence import Evidence
 from rsea_ros.diagnosis.flexible import Flexible
-from rsea_ros.diagnosis.naming import CONFIRMED, CONFIRMED_AT_FLOOR, NONE_OF_THESE, standing, status_of
+from rsea_ros.diagnosis.naming import CONFIRMED, CONFIRMED_AT_FLOOR, standing, status_of
 from rsea_ros.diagnosis.probability import features, probability
 from rsea_ros.diagnosis.signature import Signature
 from rsea_ros.diagnosis.verdict import takes_most, verdict_of
@@ -47,17 +47,21 @@ def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor, takes_
     assert sum(likely) <= 1.0 + 1e-9
 
 
-@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans(), st.booleans())
-def test_only_what_is_likely_is_confirmed_and_only_what_is_likelier_than_none_is_named(
-    p, rivals, at_floor, takes_most, is_sure
-):
-    status = status_of(p, rivals, at_floor, takes_most, is_sure)
+@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans())
+def test_only_what_is_likely_is_confirmed_and_only_what_helps_is_named(p, rivals, at_floor, helps):
+    status = status_of(p, rivals, at_floor, helps)
+    assert (status is None) == (not at_floor and not helps)
     if status == "confirmed":
         assert p >= (CONFIRMED_AT_FLOOR if at_floor else CONFIRMED)
-    if status is None:
-        assert not (at_floor or takes_most) and (p + sum(rivals) < NONE_OF_THESE or not is_sure)
     if status == "one_of":
         assert rivals
+
+
+@given(EVIDENCE)
+def test_what_the_data_speak_against_is_not_named(evidence):
+    """Not at the floor and taking less than most: improbable, or no sure help, is no cause."""
+    (p,), status = standing([evidence], at_floor=False, takes_most=False)
+    assert (status is None) == (not evidence.is_sure or p < (0.2 if evidence.gain_low >= 0.1 else 0.5))
 
 
 def test_evidence_against_a_law_lowers_its_probability():
