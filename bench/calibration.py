@@ -23,11 +23,12 @@ from typing import Any
 from calibration_records import Plan, left_out, made, plans
 from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, table
 
-from rsea_ros.diagnosis.diagnose import examine
+from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.diagnose import nominal_problem, search
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.verdict import reached, takes_most
-from rsea_ros.diagnosis.weighing import Place, weighed
-from rsea_ros.diagnosis.workers import workers
+from rsea_ros.diagnosis.verdict import is_at_floor, takes_most
+from rsea_ros.diagnosis.weighing import Place, weigh
+from rsea_ros.identification.workers import worker_pools
 
 CACHE = Path("out/calibration/evidence.jsonl")
 TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/coefficients.py"
@@ -129,24 +130,25 @@ def _entry(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
 
 def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
     kept = searches / f"{plan.name}.pickle" if searches else None
-    with workers() as at_work:
+    settings = DiagnosisSettings(without=left_out(plan, pool))
+    with worker_pools() as pools:
         if kept and kept.exists():
-            examined = pickle.loads(kept.read_bytes())
+            selection, stages = pickle.loads(kept.read_bytes())
         else:
             record, rig = made(plan)
-            settings = DiagnosisSettings(without=left_out(plan, pool))
-            examined = examine([record], rig, at_work, None, None, settings)
+            nominal = nominal_problem([check(record, rig)], rig)
+            selection, stages = search(nominal, None, pools, lambda step, share: None, settings)
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
-                kept.write_bytes(pickle.dumps(examined))
-        accepted = len(examined.stages)
-        examined, places = weighed(examined, at_work)
+                kept.write_bytes(pickle.dumps((selection, stages)))
+        accepted, weighing = len(stages), weigh(selection, stages, None, pools, settings)
+    first, last = weighing.stages[0].test, weighing.stages[-1].test
     return {
-        "nothing_wrong": reached(examined.stages[0].judged),
-        "at_floor": reached(examined.stages[-1].judged),
-        "takes_most": takes_most(examined.stages[0].judged, examined.stages[-1].judged),
-        "promoted": len(examined.stages) > accepted,
-        "places": [_place(p) for p in places],
+        "nothing_wrong": is_at_floor(first),
+        "at_floor": is_at_floor(last),
+        "takes_most": takes_most(first, last),
+        "promoted": len(weighing.stages) > accepted,
+        "places": [_place(p) for p in weighing.places],
     }
 
 

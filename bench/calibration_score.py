@@ -100,7 +100,7 @@ def said(
             evidence = [evidence_from(e) for e in place]
             is_late = record["promoted"] and place is record["places"][-1]
             takes_most = record["takes_most"] and not is_late
-            likely, status = standing(evidence, record["at_floor"], takes_most, coefficients)
+            likely, status = standing(evidence, record["at_floor"], takes_most, coefficients=coefficients)
             rights = [e.name in record["truth"] for e in evidence]
             rest = any(rights[1:])
             for k, (e, p, right) in enumerate(zip(evidence, likely, rights, strict=True)):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from msg_adapters import read_record
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
+from rsea_ros.identification.result import Verdict
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
@@ -20,9 +21,6 @@ EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
-VERDICTS = ("adequate", "misfit", "not_identifiable")
-FOUND = 1
-"""Exit status when the verdict is one that --fail-on names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,15 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print identification.json to stdout and nothing else"
     )
-    parser.add_argument(
-        "--fail-on",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=VERDICTS,
-        metavar="VERDICT",
-        help=f"exit status {FOUND} when the verdict is one of these: {', '.join(VERDICTS)}",
-    )
+    add_fail_on(parser, get_args(Verdict))
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -98,6 +88,6 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.notes):
+    for sentence in (*found, *doubt_sentences(result), *result.statements):
         print(sentence)
     print(f"report: {report}")

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from rsea_ros.diagnosis.data_split import CHOOSE, FIT, JUDGE, Score, score_on
+from rsea_ros.diagnosis.criteria import preference
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.flexible import Flexible, flexible
-from rsea_ros.diagnosis.judge import compare, gain
+from rsea_ros.diagnosis.score import Score, gain, score_on
 from rsea_ros.diagnosis.signature import Signature, rows_of, signature, weighted_by
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
@@ -47,7 +48,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Claim:
-    """A model in which a cause acts, its score on judging blocks, and the score without the cause."""
+    """A model in which a cause acts, its score on test blocks, and the score without the cause."""
 
     name: str
     problem: Problem
@@ -60,7 +61,7 @@ class Claim:
 def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | None:
     """Return the evidence for a claim; None where its simulation runs away."""
     everything = replace(claim.problem, cases=cases)
-    weights = score_on(everything, cases, (*FIT, *CHOOSE, *JUDGE), everything.outputs(claim.theta))
+    weights = score_on(everything, cases, (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta))
     problem = weighted_by(claim.problem, cases, weights)
     rows = rows_of(problem, claim.theta, claim.name, run)
     if rows is None:
@@ -77,12 +78,12 @@ def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | 
         channel=channel,
         gain=gained,
         gain_low=low,
-        is_sure=compare(claim.with_it, claim.without, len(own)).sure,
+        is_sure=preference(claim.with_it, claim.without, len(own)).sure,
         weight=claim.weight,
         before=claim.without.ratio(claim.without.worst),
         left=weights.ratio(weights.worst),
         at_edge=is_at_edge(problem, claim.theta, claim.name),
-        siblings=len(problem.rig.effects) - 1,
+        siblings=len(problem.added) - 1,
     )
 
 

@@ -2,7 +2,7 @@
 
 Beside the named law a small spline of what that law reads (speed, deflection, command, the torque measured)
 acts at the same place. Were the named law right, the spline would have nothing left to do; a law that the
-catalogue lacks leaves it much. Fitted linearly, with all other unknowns, on the blocks that do not judge.
+catalogue lacks leaves it much. Fitted linearly, with all other unknowns, on all blocks but the test blocks.
 
 The responses to the spline's parts are simulated: a torque at the gear or in the spring is a torque beside
 the command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.judge import RESAMPLES
+from rsea_ros.diagnosis.score import RESAMPLES
 from rsea_ros.diagnosis.signature import Rows
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
@@ -36,7 +36,7 @@ _STEP = 1e-2
 
 @dataclass(frozen=True)
 class Flexible:
-    """What the spline gains: share of the residual on judging blocks, its 95 % interval, and how much of what
+    """What the spline gains: share of the residual on test blocks, its 95 % interval, and how much of what
     the cause itself takes away that is (both as powers)."""
 
     gain: float
@@ -52,13 +52,13 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     matrix = np.column_stack([*responses, rows.others])
     size = np.sqrt(np.sum(matrix**2, axis=0))
     matrix = matrix[:, size > 0.0] / size[size > 0.0]
-    fits = ~rows.judges
+    fits = ~rows.tests
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
     left = (
         rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
     )
     before, after = (_by_block(rows, v) for v in (rows.residual, left))
-    cause = float(np.sum((rows.residual + rows.contribution)[rows.judges] ** 2) - before.sum())
+    cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
     return Flexible(
         gain=1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))),
         ci95=_interval(before, after),
@@ -67,9 +67,9 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
 
 
 def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
-    """Return the power of values in each judging block."""
-    power = np.bincount(rows.block, values**2 * rows.judges)
-    return np.asarray(power[np.bincount(rows.block, rows.judges) > 0], np.float64)
+    """Return the power of values in each test block."""
+    power = np.bincount(rows.block, values**2 * rows.tests)
+    return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
 
 
 def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.evidence import Evidence
 from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
 from rsea_ros.fault_kinds import MASKED
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.silent import silent_channels
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
@@ -38,10 +39,10 @@ def verdict_sentence(
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
-    dead = [_CHANNELS.get(f.channel, f.channel) for f in faults if f.kind == "dead_channel"]
-    if verdict == "nothing_wrong" and dead:
+    silent = [_CHANNELS.get(n, n) for n in silent_channels(faults)]
+    if verdict == "unexplained" and silent and before <= AT_NOISE:
         return (
-            f"The {listed(dead)} measures nothing and is left out; with the model's values re-fitted "
+            f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "nothing_wrong":
@@ -65,16 +66,6 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
     return (
         f"With {effect.about}, the {_CHANNELS[channel]} residual of data that took no part falls "
         f"from {before:.2f} to {after:.2f} times the noise (gain {gain:.1%})."
-    )
-
-
-def improbable(evidence: Evidence, probability: float) -> str:
-    """Return why a cause that was fitted to everything is not named."""
-    if not evidence.is_sure:
-        return "does not surely lower the residual of data that took no part"
-    return (
-        f"helps on data that took no part (gain {evidence.gain:.0%}), but its law does not fit what it takes "
-        f"away: probability {probability:.2f}"
     )
 
 

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import heavier
-from rsea_ros.diagnosis.data_split import JUDGE, Score, blocks_of, set_of
-from rsea_ros.diagnosis.screening import reduced
+from rsea_ros.diagnosis.candidate import with_misfit_as_noise
+from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.screening import without_effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
@@ -34,7 +35,7 @@ _SHIFTS = 6
 class Signature:
     """Spreads of lambda, weighted by c.c; 0 for a law that fits everywhere.
 
-    scale: lambda of all judging blocks together. spread: over the judging blocks; over all blocks `overall`.
+    scale: lambda of all test blocks together. spread: over the test blocks; over all blocks `overall`.
     chance: what `overall` would be for a residual that has nothing to do with the cause.
     amplitude, time, frequency: over parts of these. share: c.c / r.r. kept: the share of c.c that no other
     unknown imitates.
@@ -55,7 +56,7 @@ class Signature:
 class Rows:
     """The weighted residuals of a model and what one cause contributes to them, row by row, shape (m,).
 
-    others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, judges:
+    others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, tests:
     whether it takes part in no fit and no choice. runs: rows of one channel of one record, in time.
     """
 
@@ -64,60 +65,60 @@ class Rows:
     others: FloatArray
     prior: FloatArray
     block: IntArray
-    judges: BoolArray
+    tests: BoolArray
     runs: tuple[slice, ...]
 
 
 def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
     """Return a problem on all samples of the cases, each channel in units of what `weights` leaves of it."""
-    return replace(problem, cases=tuple(heavier(c, weights) for c in cases))
+    return replace(problem, cases=tuple(with_misfit_as_noise(c, weights) for c in cases))
 
 
 def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -> Rows | None:
     """Return a model's residuals and what a cause of it contributes; None where that runs away."""
     error = problem.residual(theta)
-    less, rest = reduced(problem, theta, name)
+    less, rest = without_effect(problem, theta, name)
     without = less.residual(rest)
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    block, judges, runs = _places(problem)
+    block, tests, runs = _places(problem)
     return Rows(
         contribution=error - without,
         residual=-error,
         others=jacobian_columns(problem, theta, error, which, run),
         prior=np.array([1.0 / problem.unknowns[i].reach for i in which]),
         block=block,
-        judges=judges,
+        tests=tests,
         runs=runs,
     )
 
 
 def _places(problem: Problem) -> tuple[IntArray, BoolArray, tuple[slice, ...]]:
-    """Return for every row its block, numbered through all records, and whether it judges; and the runs."""
-    blocks, judges, runs, first, at = [], [], [], 0, 0
+    """Return for every row its block, numbered through all records, and whether it tests; and the runs."""
+    blocks, tests, runs, first, at = [], [], [], 0, 0
     for case in problem.cases:
         last = 0
         for n in problem.present(case):
             own = blocks_of(case, n)[case.mask[n]]
             blocks.append(first + own)
-            judges.append(np.isin(set_of(own), JUDGE))
+            tests.append(np.isin(set_of(own), TEST))
             runs.append(slice(at, at + len(own)))
             at, last = at + len(own), max(last, int(own.max(initial=0)))
         first += last + 1
-    return np.concatenate(blocks), np.concatenate(judges), tuple(runs)
+    return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
 
 
 def signature(rows: Rows) -> Signature:
     """Return the signature of a cause."""
     c, r = (projected(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
-    judging = _summed(rows.block, cc * rows.judges, cr * rows.judges)
+    held_out = _summed(rows.block, cc * rows.tests, cr * rows.tests)
     every = _summed(rows.block, cc, cr)
     total = max(float(cc.sum()), 1e-300)
     return Signature(
-        scale=1.0 + float(judging[1].sum() / max(judging[0].sum(), 1e-300)),
-        spread=_spread(*judging),
+        scale=1.0 + float(held_out[1].sum() / max(held_out[0].sum(), 1e-300)),
+        spread=_spread(*held_out),
         overall=_spread(*every),
         chance=_by_chance(rows, c, r),
         amplitude=_spread(*_summed(_parts_by(np.abs(c), cc), cc, cr)),

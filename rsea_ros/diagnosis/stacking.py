@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsea_ros.diagnosis.judge import RESAMPLES
+from rsea_ros.diagnosis.score import RESAMPLES
 from rsea_ros.signals import FloatArray
 
 

@@ -1,45 +1,52 @@
-"""The verdict: from how the first and the last model do on data that judge, and what may be named."""
+"""The verdict: from the scores of the models on the test blocks, and the statuses of the causes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.data_split import Score
-from rsea_ros.diagnosis.evaluation import Stage
-from rsea_ros.diagnosis.judge import MATTERS
 from rsea_ros.diagnosis.result import Status, Verdict
-
-FLOOR = 1.1
-"""RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""
-
-MISFIT = 1.5
-"""RMS of the residual over the noise above which a channel misfits."""
-MUCH = 3.0
-"""RMS of the residual over the noise above which a channel misfits much."""
-HALF = 0.5
-"""What may be left of a misfitting channel's residual where causes take most of it."""
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, FloorSettings
+from rsea_ros.identification.silent import silent_channels
+from rsea_ros.signals import Fault
 
 
-def verdict_of(stages: Sequence[Stage], statuses: Sequence[Status | None] = ()) -> Verdict:
-    """Return the verdict: see contract.md, diagnosis.json.
+def verdict_of(
+    scores: Sequence[Score],
+    statuses: Sequence[Status | None] = (),
+    levels: FloorSettings = DEFAULT.floor,
+    faults: Sequence[Fault] = (),
+) -> Verdict:
+    """Return the verdict of models, from the nominal one to the one with all causes.
 
-    statuses: of the cause that each stage adds to the one before, None for one that is not to be named.
+    scores: on the test blocks, one a model. statuses: of the cause that each model adds to the one before,
+    None for one that is not named. faults: of the data. Where a sensor measures nothing, something is wrong
+    that no effect explains (docs/decisions/0063-a-sensor-that-measures-nothing.md).
+    `nothing_wrong` and `explained`: the residual is at the noise floor, without causes and with such as are
+    all confirmed. `partly_explained`: causes are named although that is not so. `unexplained`: none is.
     """
+    first, last = scores[0], scores[-1]
     if not any(statuses):
-        return "nothing_wrong" if reached(stages[0].judged) else "unexplained"
-    confirmed = all(status == "confirmed" for status in statuses)
-    return "explained" if confirmed and reached(stages[-1].judged) else "partly_explained"
+        is_fine = is_at_floor(first, levels) and not silent_channels(faults)
+        return "nothing_wrong" if is_fine else "unexplained"
+    is_whole = is_at_floor(last, levels) and all(status == "confirmed" for status in statuses)
+    return "explained" if is_whole else "partly_explained"
 
 
-def takes_most(first: Score, last: Score) -> bool:
-    """Tell whether causes take half of the residual in every channel that misfits, or all of one that misfits
-    much without adding to another. A change that does not matter (judge.py) is none."""
-    misfitting = [n for n in first.sums if first.ratio(n) > MISFIT]
-    falls = [last.ratio(n) / first.ratio(n) for n in misfitting]
-    explained = [n for n in misfitting if first.ratio(n) > MUCH and last.ratio(n) < MISFIT]
-    return bool(falls) and (max(falls) < HALF or (bool(explained) and max(falls) <= 1.0 + MATTERS))
-
-
-def reached(judged: Score) -> bool:
+def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
     """Tell whether every channel is at its noise floor."""
-    return all(judged.ratio(n) <= FLOOR for n in judged.sums)
+    return all(test.ratio(n) <= levels.reached for n in test.sums)
+
+
+def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether causes take half of the residual in every channel that misfits, or all of one.
+
+    The latter counts where that one misfits much and no other gets worse by what matters.
+    """
+    levels, unchanged = settings.floor, 1.0 + settings.acceptance.matters
+    misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]
+    left = [last.ratio(n) / first.ratio(n) for n in misfitting]
+    is_explained = any(
+        first.ratio(n) > levels.large_misfit and last.ratio(n) < levels.misfit for n in misfitting
+    )
+    return bool(left) and (max(left) < levels.share_left or (is_explained and max(left) <= unchanged))

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
+from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.claims import contests
-from rsea_ros.diagnosis.evaluation import Examined
+from rsea_ros.diagnosis.evaluation import Evaluated
 from rsea_ros.diagnosis.evidence import Claim, Evidence, evidence_for
 from rsea_ros.diagnosis.promotion import promoted
-from rsea_ros.diagnosis.verdict import reached
-from rsea_ros.diagnosis.workers import Workers
+from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.verdict import is_at_floor
+from rsea_ros.identification.workers import Pools
 
 
 @dataclass(frozen=True)
@@ -31,23 +34,40 @@ class Place:
     is_late: bool = False
 
 
-def weighed(examined: Examined, at_work: Workers) -> tuple[Examined, list[Place]]:
-    """Return what was examined, with one more cause where one surely helps, and the evidence by place."""
-    found, stages = examined.found, examined.stages
-    if not reached(stages[-1].judged):
-        found, stages = promoted(found, stages, examined.judging, examined.rig, at_work)
-    held = contests(found, stages, at_work)
+@dataclass(frozen=True)
+class Weighing:
+    """The selection and its stages, with one more cause where one surely helps, and the evidence by place."""
+
+    selection: Selection
+    stages: list[Evaluated]
+    places: list[Place]
+
+
+def weigh(
+    selection: Selection,
+    stages: Sequence[Evaluated],
+    holdout: Checked | None,
+    pools: Pools,
+    settings: DiagnosisSettings,
+) -> Weighing:
+    """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far.
+
+    holdout: the record that takes the place of the test blocks, where one was given.
+    """
+    accepted = len(stages)
+    if not is_at_floor(stages[-1].test, settings.floor):
+        selection, stages = promoted(selection, stages, holdout, pools, settings)
+    held = contests(selection, stages, pools)
     claims = [c for contest in held for c in (contest.cause, *contest.rivals)]
-    weigh = partial(evidence_for, cases=found.cases, run=at_work.run)
-    of = {id(c): e for c, e in zip(claims, at_work.fits.map(weigh, claims), strict=True)}
+    found = pools.fits.map(partial(evidence_for, cases=selection.cases, run=pools.run), claims)
+    of = {id(c): e for c, e in zip(claims, found, strict=True)}
 
-    def with_evidence(group: Sequence[Claim]) -> list[Weighed]:
-        return [Weighed(c, e) for c in group if (e := of[id(c)]) is not None]
+    def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
+        return tuple(Weighed(c, e) for c in group if (e := of[id(c)]) is not None)
 
-    places = []
-    for k, contest in enumerate(held, start=1):
-        cause = with_evidence([contest.cause])
-        if cause:
-            is_late = k >= len(examined.stages)
-            places.append(Place(cause[0], tuple(with_evidence(contest.rivals)), is_late))
-    return replace(examined, found=found, stages=stages), places
+    places = [
+        Place(cause[0], with_evidence(contest.rivals), is_late=k >= accepted)
+        for k, contest in enumerate(held, start=1)
+        if (cause := with_evidence([contest.cause]))
+    ]
+    return Weighing(selection, list(stages), places)

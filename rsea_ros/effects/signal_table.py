@@ -75,5 +75,7 @@ DEFLECTION_SPAN = 33  # rad, change of DEFLECTION over the step; 0 when COMMIT i
 MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to GEAR_VELOCITY at its end
 J_SC = 35  # kg m^2, spring chassis where it turns with the gear output; 0 behind a gear that gives
 CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is not 0
+TURNS = 37  # 1, turns of the rotor for one of the gear output
+SENSED = 38  # 1, share of the spring's torque that the F/T sensor sees at once
 
-SIZE = 37
+SIZE = 39

@@ -111,7 +111,21 @@ def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
     if rig.rigid_spring:
         return np.array([position, velocity, np.zeros(2 * m.order)])
     deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
-    return np.array([position, velocity, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate])
+    spring = rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate
+    return np.array([position, velocity, _below(rig, m, spring)])
+
+
+def _below(rig: Rig, m: Mechanics, spring: FloatArray) -> FloatArray:
+    """Return the row of T_s less the torque that the load above the sensor takes: part of its J q''.
+
+    J q'' is T_s less what holds the load to ground.
+    """
+    share = rig["spring_end.above_sensor"]
+    if share == 0.0:
+        return spring
+    angle, rate = (read_row(rig, m, s) for s in (st.DISTAL_ANGLE, st.DISTAL_VELOCITY))
+    held = rig["spring_end.stiffness"] * angle + rig["spring_end.damping"] * rate
+    return np.asarray((1.0 - share) * spring + share * held)
 
 
 def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Literal
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
@@ -18,6 +19,8 @@ from rsea_ros.model.train import TRAINS, Train
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
 END_NAMES = ("housing_end", "spring_end")
+Hold = Literal["zero", "first", "band"]
+HOLDS: tuple[Hold, ...] = ("zero", "first", "band")
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "proximal_spring.damping": Field("N m s/rad", default=0.0),
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+        "spring_end.above_sensor": Field("1", default=0.0),
     }
 )
 
@@ -107,7 +111,9 @@ class Rig:
 
     other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
     may move. proximal: which end the paper's *proximal* is. ft_end: which end the
-    F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
+    F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end. hold: what
+    acts between two commands: the first of them, a line to the other, or the curve without a frequency above
+    half the rate, as where an analogue command was sampled behind a filter.
     """
 
     name: str
@@ -121,6 +127,7 @@ class Rig:
     proximal: str = "housing_end"
     ft_end: str = "spring_end"
     controller: Controller | None = None
+    hold: Hold = "zero"
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""
     source: str = ""
@@ -236,8 +243,10 @@ def _check_structure(rig: Rig) -> None:
             f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
         )
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
         raise RigError(
-            f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
+            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
+            "spring.stiffness",
         )
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]

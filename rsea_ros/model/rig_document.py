@@ -17,9 +17,11 @@ from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
     END_NAMES,
     FIELDS,
+    HOLDS,
     Controller,
     EffectSetting,
     Field,
+    Hold,
     Quantity,
     Rig,
     Sensor,
@@ -64,6 +66,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         proximal=text(document.get("proximal", "housing_end"), "proximal"),
         ft_end=text(document.get("ft_end", "spring_end"), "ft_end"),
         controller=_controller(document.get("controller")),
+        hold=_hold(document.get("hold", "zero")),
         effects=effects,
     )
 
@@ -78,6 +81,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
     }
     if rig.ft_end != "spring_end":
         document["ft_end"] = rig.ft_end
+    if rig.hold != "zero":
+        document["hold"] = rig.hold
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -201,6 +206,13 @@ def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
                 f"known[{i}]",
             )
     return frozenset(items)
+
+
+def _hold(item: Any) -> Hold:
+    for hold in HOLDS:
+        if item == hold:
+            return hold
+    raise RigError(f"hold = {shown(item)}, expected {', '.join(HOLDS)}", "hold")
 
 
 def _controller(item: Any) -> Controller | None:

@@ -32,6 +32,7 @@ _MEANINGS = {
         for end in END_NAMES
         for key, meaning in zip(("inertia", "damping", "stiffness", "gravity"), _END, strict=True)
     },
+    "spring_end.above_sensor": "share of its inertia between spring and F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS})
@@ -52,6 +53,12 @@ TOP = (
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
     Key("controller", "mapping", "none", "position loop that ran during the record"),
+    Key(
+        "hold",
+        "`zero`, `first` or `band`",
+        "`zero`",
+        "between commands: the last, a line, a band-limited curve",
+    ),
     Key("effects", "list", "none", "effects of the catalogue that act"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )

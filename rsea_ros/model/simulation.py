@@ -17,12 +17,14 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.loop import control
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
 _SENSORS = 1
@@ -57,7 +59,8 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
     """
     in_loop = rig.controller is not None and "reference" in record
     from_rest = rig.zero_unknown("position")
-    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest))
+    drive = drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest, hold=rig.hold)
+    return simulate_drive(rig, drive)
 
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
@@ -87,7 +90,8 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
     at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.command) for n in channels}
+    kinks = drive.kinks
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
 
 
@@ -117,10 +121,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
-    for effect, parameters in settings:
-        effect.vector(parameters)
-        if effect.structure is not None:
-            rig = effect.structure(rig, parameters)
+    rig = structured(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
@@ -128,7 +129,8 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
-    table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
+    table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
+    table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 
 

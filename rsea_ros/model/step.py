@@ -31,8 +31,8 @@ class Linear(NamedTuple):
     """Propagators of one step and what is read from the state x (order n).
 
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
-    velocity and deflection; outputs (3, n): position, velocity and the linear spring torque; gravity: m g l
-    of the two ends, N m.
+    velocity and deflection; outputs (3, n): position, velocity and the linear torque at the F/T sensor;
+    gravity: m g l of the two ends, N m.
     """
 
     phi: FloatArray
@@ -103,7 +103,7 @@ def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
     """Put what the sensors of the nominal actuator see into the table."""
     s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs[0], x)
     s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs[1], x)
-    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SPRING_TORQUE]
+    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SENSED] * s[st.SPRING_TORQUE]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

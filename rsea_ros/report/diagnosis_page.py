@@ -14,6 +14,7 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import cause_section, tried_section
 from rsea_ros.report.diagnosis_figures import spectrum_figure, time_figure
 from rsea_ros.report.diagnosis_profile import profiles
+from rsea_ros.report.diagnosis_settings import settings_section
 from rsea_ros.report.diagnosis_tables import channel_section, experiment_section
 from rsea_ros.report.diagnosis_where import where_figure
 from rsea_ros.report.fault_words import fault_lines, faults
@@ -34,7 +35,7 @@ def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None)
 
 def _blocks(d: Diagnosis) -> Iterator[Block]:
     """Yield the page from top to bottom: the verdict first, then what it rests on."""
-    main = say.main_channel(d)
+    main = d.channel
     yield key_numbers(_keys(d, main))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'
@@ -54,6 +55,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
         yield experiment_section(d.next_experiment)
     yield _faults(d)
     yield _baseline(d)
+    yield settings_section(d.settings)
 
 
 def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rsea_ros.diagnosis.coefficients import COEFFICIENTS
-from rsea_ros.diagnosis.data_split import Score
 from rsea_ros.diagnosis.evidence import Evidence
 from rsea_ros.diagnosis.flexible import Flexible
-from rsea_ros.diagnosis.naming import CONFIRMED, CONFIRMED_AT_FLOOR, standing, status_of
+from rsea_ros.diagnosis.naming import standing, status_of
 from rsea_ros.diagnosis.probability import features, probability
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.diagnosis.signature import Signature
 from rsea_ros.diagnosis.verdict import takes_most, verdict_of
 
@@ -47,12 +46,12 @@ def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor, takes_
     assert sum(likely) <= 1.0 + 1e-9
 
 
-@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans(), st.booleans())
-def test_only_what_is_likely_is_confirmed_and_only_what_helps_is_named(p, rivals, at_floor, helps):
-    status = status_of(p, rivals, at_floor, helps)
-    assert (status is None) == (not at_floor and not helps)
+@given(SHARE, st.lists(st.floats(0.05, 0.5), max_size=2), st.booleans())
+def test_only_what_is_likely_is_confirmed(p, rivals, at_floor):
+    rule = DEFAULT.naming
+    status = status_of(p, rivals, at_floor, rule)
     if status == "confirmed":
-        assert p >= (CONFIRMED_AT_FLOOR if at_floor else CONFIRMED)
+        assert p >= (rule.confirmed_at_floor if at_floor else rule.confirmed)
     if status == "one_of":
         assert rivals
 
@@ -76,27 +75,23 @@ def test_evidence_against_a_law_lowers_its_probability():
     assert set(features(RIGHT, True)) == set(COEFFICIENTS)
 
 
-def stage(ratio):
-    """Return a stage whose residual is so many times the noise."""
-    score = Score({"ft": np.full(4, 100.0 * ratio**2)}, {"ft": np.full(4, 100.0)})
-    return SimpleNamespace(judged=score)
+def score(**ratios):
+    """Return the score of residuals that are so many times the noise, by channel."""
+    counts = {n: np.full(4, 100.0) for n in ratios}
+    return Score({n: np.full(4, 100.0 * r**2) for n, r in ratios.items()}, counts)
 
 
 def test_a_verdict_is_explained_only_with_every_cause_confirmed_and_the_floor_reached():
-    assert verdict_of([stage(9.0), stage(1.0)], ["confirmed"]) == "explained"
-    assert verdict_of([stage(9.0), stage(1.0)], ["one_of"]) == "partly_explained"
-    assert verdict_of([stage(9.0), stage(1.53)], ["confirmed"]) == "partly_explained"
-    assert verdict_of([stage(9.0), stage(5.0), stage(1.0)], ["confirmed", "leading"]) == "partly_explained"
-    assert verdict_of([stage(9.0), stage(5.0)], [None]) == "unexplained"
+    assert verdict_of([score(ft=9.0), score(ft=1.0)], ["confirmed"]) == "explained"
+    assert verdict_of([score(ft=9.0), score(ft=1.0)], ["one_of"]) == "partly_explained"
+    assert verdict_of([score(ft=9.0), score(ft=1.53)], ["confirmed"]) == "partly_explained"
+    three = [score(ft=9.0), score(ft=5.0), score(ft=1.0)]
+    assert verdict_of(three, ["confirmed", "leading"]) == "partly_explained"
+    assert verdict_of([score(ft=9.0), score(ft=5.0)], [None]) == "unexplained"
 
 
 def test_an_unchanged_channel_does_not_take_a_cause_away():
     """One rounding decided: a channel at 1.53 that rose to 1.5301 made `unexplained` of a gain of 0.92."""
-
-    def both(ft, position):
-        scores = {"ft": ft, "position": position}
-        sums = {n: np.full(4, 100.0 * r**2) for n, r in scores.items()}
-        return SimpleNamespace(judged=Score(sums, {n: np.full(4, 100.0) for n in scores}))
-
-    assert takes_most(both(40.0, 1.53).judged, both(1.2, 1.5301).judged)
-    assert not takes_most(both(40.0, 1.53).judged, both(1.2, 1.6).judged)
+    before = score(ft=40.0, position=1.53)
+    assert takes_most(before, score(ft=1.2, position=1.5301))
+    assert not takes_most(before, score(ft=1.2, position=1.6))

@@ -24,7 +24,7 @@ def rows(residual):
         others=TIME[:, None] - TIME.mean(),
         prior=np.array([1e-3]),
         block=np.repeat(np.arange(BLOCKS), LENGTH),
-        judges=np.repeat(np.arange(BLOCKS) % 4 == 3, LENGTH),
+        tests=np.repeat(np.arange(BLOCKS) % 4 == 3, LENGTH),
         runs=(slice(0, len(TIME)),),
     )
 
