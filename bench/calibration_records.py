@@ -98,9 +98,15 @@ def _plan(k: int, rng: np.random.Generator) -> Plan:
         duration=float(rng.choice((10.0, 12.0))),
         hidden=hidden,
         off=off,
-        without=_kin(names[0]) if group == "taken_out" else (),
+        without=_kin(names[0]) if group == "taken_out" else _unknown(family, off),
         coloured=float(rng.choice((0.0, 0.0, 0.05, 0.2))),
     )
+
+
+def _unknown(family: str, off: tuple[str, float] | None) -> tuple[str, ...]:
+    """Return the effect that a law is, which the diagnosis is not to know."""
+    known = LAWS[off[0]].known_as if off and family != "second" else ""
+    return (known,) if known in catalogue() else ()
 
 
 def _sized(name: str, family: str, rng: np.random.Generator) -> dict[str, float]:
@@ -257,12 +263,15 @@ def _with_colour(record: Record, plan: Plan, rng: np.random.Generator) -> Record
 
 @dataclass(frozen=True)
 class Law:
-    """A law that the catalogue lacks, in the command before it acts or in what the sensors say; the plants
-    that show it."""
+    """A law for the diagnosis not to know, in the command before it acts or in what the sensors say.
+
+    on: the plants that show it. known_as: the effect of the catalogue that it is, which is left out then.
+    """
 
     on: tuple[str, ...]
     command: Callable[[FloatArray, float], FloatArray] | None = None
     sensor: Callable | None = None
+    known_as: str = ""
 
 
 def _dead_zone(u: FloatArray, size: float) -> FloatArray:
@@ -304,14 +313,16 @@ def _sensor(channel: str, error: Callable[..., FloatArray]) -> Callable:
 
 
 LAWS = {
-    "dead_zone": Law(("open", "sea"), command=_dead_zone),
+    "dead_zone": Law(("open", "sea"), command=_dead_zone, known_as="dead_zone"),
     "rate_limit": Law(("open", "sea"), command=_rate_limit),
-    "fade": Law(("open", "sea"), command=_fade),
+    "fade": Law(("open", "sea"), command=_fade, known_as="torque_constant_drift"),
     "one_sided_gain": Law(("open", "sea"), command=_one_sided),
-    "overshoot": Law(("open", "sea"), command=_overshoot),
+    "overshoot": Law(("open", "sea"), command=_overshoot, known_as="current_loop_overshoot"),
     "quadratic_ft": Law(("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 0.004 * y**2)),
     "thermal_ft": Law(
-        ("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1])))
+        ("open", "sea", "loop"),
+        sensor=_sensor("ft", lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1]))),
+        known_as="ft_drift",
     ),
     "walking_ft": Law(
         ("open", "sea", "loop"),
@@ -321,7 +332,9 @@ LAWS = {
         ("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 2.0e-4 * y**3 / (1.0 + 0.01 * y**2))
     ),
     "eccentric_encoder": Law(
-        ("open", "sea", "loop"), sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y))
+        ("open", "sea", "loop"),
+        sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y)),
+        known_as="encoder_eccentricity",
     ),
     "torque_by_position": Law(
         ("rigid",), sensor=_sensor("motor_torque", lambda y, t, rng: 1.5 * np.sin(2.0 * np.pi * t / 1.7))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
+from rsea_ros.diagnosis.joint_scale import joint_starts, torque_scale
 from rsea_ros.diagnosis.residual_peaks import angle_errors, peaks, refined, residual_of, ripples, sine_at
 from rsea_ros.effects.dead_zone import RAMP
 from rsea_ros.effects.effect import Effect
@@ -27,6 +28,8 @@ InitialGuess = dict[str, float]
 """Parameters of an effect, and values of the rig that go with them."""
 STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _GAPS = (0.1, 0.3, 0.6)
+_GAPS_OF_JOINTS = (1e-3, 3e-3, 0.01, 0.03)
+"""rad: from a good gear's to a toy servo's; the residual has a minimum of its own about each."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
 _SHOWN = 0.3
 """Of a command: what the measured torque shows less of has not come through."""
@@ -51,6 +54,8 @@ class ResidualView(NamedTuple):
 def initial_guesses(effect: Effect, seen: ResidualView) -> list[InitialGuess]:
     """Return from where fits of an effect begin; none where it has nothing to act on."""
     own = _own_starts(effect)
+    if seen.rig.loop is not None and effect.main.unit == "N m" and not _has("cycles_per_revolution")(effect):
+        return joint_starts(effect, torque_scale(seen.case, seen.rig))
     for answers, starts in _RULES:
         if answers(effect):
             return starts(effect, own, seen)
@@ -90,7 +95,12 @@ def _zone(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[I
 
 
 def _play(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
-    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then."""
+    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then.
+
+    A joint travels far beside its play, whose size no travel shows.
+    """
+    if seen.rig.loop is not None:
+        return [{**effect.typical, "gap": gap} for gap in _GAPS_OF_JOINTS]
     if "position" not in seen.case.measured:
         return own
     travel, rig = float(np.ptp(seen.case.measured["position"])), seen.rig
