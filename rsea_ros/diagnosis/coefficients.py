@@ -7,12 +7,12 @@ from types import MappingProxyType
 
 COEFFICIENTS = MappingProxyType(
     {
-        "intercept": -1.7624,
-        "shape": -0.4985,
-        "rivals": 1.0933,
-        "preferred": 1.8044,
-        "noise": 0.0708,
-        "flexible": -2.811,
-        "edge": -1.0853,
+        "intercept": -1.9062,
+        "shape": -0.5554,
+        "rivals": 0.5793,
+        "preferred": 2.3893,
+        "noise": 0.5576,
+        "flexible": -2.9564,
+        "edge": -1.0734,
     }
 )
