@@ -60,8 +60,8 @@ def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
 
 def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     """With the verdict `unexplained` it was in neither list."""
-    monkeypatch.setattr(conclusion, "verdict_of", lambda *_: "unexplained")
+    monkeypatch.setattr(conclusion, "naming_of", lambda *_: {})
     diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
-    assert diagnosis.causes == ()
+    assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
     assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5
