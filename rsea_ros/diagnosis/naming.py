@@ -69,9 +69,12 @@ def standing(
 
 
 def _helps(mass: float, evidence: Evidence, settings: DiagnosisSettings) -> bool:
-    """Tell whether a cause surely helps, enough for the probability of it and its rivals."""
+    """Tell whether a cause surely helps, enough for the probability of it and its rivals.
+
+    One of whose parameters has run to a bound may bend to something else: it must be likely.
+    """
     rule = settings.naming
-    brings = evidence.gain_low >= settings.acceptance.fall
+    brings = evidence.gain_low >= settings.acceptance.fall and not evidence.at_edge
     return evidence.is_sure and mass >= (rule.possible if brings else rule.likely)
 
 
