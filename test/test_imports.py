@@ -69,6 +69,7 @@ DIAGNOSIS = (
     {"promotion"},
     {"weighing"},
     {"naming"},
+    {"causes"},
     {"conclusion"},
     {"diagnose"},
 )

@@ -1,58 +1,46 @@
-"""The conclusion: verdict, causes with sizes and gains, what was rejected, what is left, what to run next."""
+"""The conclusion: the verdict, the causes and what was rejected, what is left, and what to run next."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from rsea_ros.checks.faults import Checked
+from rsea_ros.diagnosis.causes import alternative_of, cause_of, dropped_of, latest, rejected_of
 from rsea_ros.diagnosis.coherence import lost_above
-from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
 from rsea_ros.diagnosis.naming import Named, named
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import (
-    Alternative,
-    Cause,
     Diagnosis,
-    Estimate,
     Experiment,
-    Reason,
-    Rejected,
     Verdict,
 )
-from rsea_ros.diagnosis.score import Score, gain, score_on
-from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.sentences import (
     also_in_model,
     coherence_lost,
     coloured_noise,
-    evidence_of,
     on_measured_angle,
     verdict_sentence,
 )
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.diagnosis.verdict import is_at_floor, takes_most, verdict_of
-from rsea_ros.diagnosis.weighing import Weighed, Weighing
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.diagnosis.weighing import Weighing
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import confidence_of, what_is_not_told
+from rsea_ros.identification.confidence import what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.identification.solver import solve
 from rsea_ros.identification.workers import Pools
-from rsea_ros.model.rig import CLOCK_DOUBT, Rig
+from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
-MODEL_DOUBT = 0.0025
-"""Relative, one sigma: measured between the simulation and the second bench in test/independent."""
 PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
-"""The channel that gains and verdicts speak of: the first of these that is there."""
+"""The channel that gains and verdicts speak of: the first of these that is measured."""
 
 
 def diagnosis_of(
@@ -68,11 +56,12 @@ def diagnosis_of(
     channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
     if channel is None:
         raise IdentificationError(
-            f"{records[0].source}: no sample is left to judge by, expected a longer record"
+            f"{records[0].source}: no sample is left to test on, expected a longer record"
         )
     faults = tuple(f for c in checked for f in c.faults)
     levels, said = settings.floor, naming_of(weighing, settings)
-    dropped = [_dropped(a, b, said, channel) for a, b in itertools.pairwise(stages) if not is_named(b, said)]
+    steps = itertools.pairwise(stages)
+    dropped = [dropped_of(a, b, said, channel) for a, b in steps if not is_named(b, said)]
     stages = without_unnamed_end(stages, said)
     statuses = [said[s.added].status if s.added in said else None for s in stages[1:]]
     verdict = verdict_of([s.test for s in stages], statuses, levels, faults)
@@ -80,16 +69,16 @@ def diagnosis_of(
         channel, stages = main_channel(stages[0].test, channel, levels.reached), stages[:1]
     first, last = stages[0], stages[-1]
     causes = tuple(
-        _cause(selection, a, b, last, channel, said[b.added])
+        cause_of(selection, a, b, last, channel, said[b.added])
         for a, b in itertools.pairwise(stages)
         if is_named(b, said)
     )
     main = causes[0].channel if causes else channel
     decided = {c.name for c in causes} | {r.name for r in dropped}
-    others = [t for t in _latest(selection.trials) if t.name not in decided]
+    others = [t for t in latest(selection.trials) if t.name not in decided]
     against = [(c.name, w, p) for c in causes for w, p in said[c.name].rivals]
-    alternatives = tuple(pools.fits.map(lambda item: alternative(*item), against))
-    rejected = pools.fits.map(lambda t: _rejected(t, selection.cases, main), others)
+    alternatives = tuple(pools.fits.map(lambda item: alternative_of(*item), against))
+    rejected = pools.fits.map(lambda t: rejected_of(t, selection.cases, main), others)
     case = selection.cases[0]
     where = misfits(case, first.outputs[0], main, rig)
     baseline = parameters_of(first.solution, first.confidence)
@@ -160,76 +149,6 @@ def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reach
     return channel if test.ratio(channel) > reached else test.worst
 
 
-def _cause(
-    selection: Selection,
-    without: Evaluated,
-    with_it: Evaluated,
-    last: Evaluated,
-    channel: str,
-    said: Named,
-) -> Cause:
-    """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
-    effect = effect_named(with_it.added)
-    speaks = (
-        channel
-        if without.test.ratio(channel) > 1.02 * with_it.test.ratio(channel)
-        else max(without.test.sums, key=lambda n: without.test.ratio(n) / max(with_it.test.ratio(n), 1e-12))
-    )
-    held_out, interval = gain(with_it.test, without.test, speaks)
-    train, _ = gain(with_it.train, without.train, speaks)
-    return Cause(
-        name=effect.name,
-        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence)),
-        gain_train=train,
-        gain_holdout=held_out,
-        gain_holdout_ci95=interval,
-        evidence=evidence_of(
-            effect, speaks, without.test.ratio(speaks), with_it.test.ratio(speaks), held_out
-        ),
-        equation=effect.equation,
-        channel=speaks,
-        confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
-        status=said.status or "leading",
-        probability=said.probability,
-    )
-
-
-def alternative(instead_of: str, weighed: Weighed, probability: float) -> Alternative:
-    """Return a rival of a cause with its size where it acts in that cause's place."""
-    claim, evidence = weighed.claim, weighed.evidence
-    solution = solve(claim.problem, claim.theta, iterations=0)
-    held_out, interval = gain(claim.with_it, claim.without, evidence.channel)
-    return Alternative(
-        name=claim.name,
-        instead_of=instead_of,
-        parameters=sizes(claim.name, parameters_of(solution, confidence_of(solution))),
-        gain_holdout=held_out,
-        gain_holdout_ci95=interval,
-        channel=evidence.channel,
-        probability=probability,
-    )
-
-
-def sizes(effect: str, estimates: Sequence[ParameterEstimate]) -> dict[str, Estimate]:
-    """Return the parameters of an effect among estimates, by their names without the effect's."""
-    own = [p for p in estimates if p.name.startswith(effect + ".")]
-    return {p.name.split(".")[1]: with_model_uncertainty(p) for p in own}
-
-
-def with_model_uncertainty(estimate: ParameterEstimate) -> Estimate:
-    """Return an estimate whose interval also holds what no residual shows.
-
-    The fit's interval speaks of noise alone. Two right simulations of one bench differ by about MODEL_DOUBT
-    in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
-    the sensors' clocks. The interval of the noise alone stands beside the whole one.
-    """
-    value, sd = estimate.value, MODEL_DOUBT * abs(estimate.value)
-    if estimate.unit == "s":
-        sd = float(np.hypot(sd, CLOCK_DOUBT))
-    low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
-    return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
-
-
 def _next_experiment(
     selection: Selection, stages: Sequence[Evaluated], verdict: Verdict, record: Record
 ) -> Experiment | None:
@@ -241,36 +160,6 @@ def _next_experiment(
     if verdict in ("unexplained", "partly_explained") and not is_at_floor(stages[-1].test):
         return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
     return None
-
-
-def _latest(trials: Sequence[Trial]) -> list[Trial]:
-    """Return each effect's trial that says most: one fitted to everything, else the last."""
-    best: dict[str, Trial] = {}
-    for t in trials:
-        if t.name not in best or t.is_full or not best[t.name].is_full:
-            best[t.name] = t
-    return list(best.values())
-
-
-def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
-    """Return a trial with its gain, on data that judge, over the model that it was tried beside."""
-    problem = replace(trial.problem, cases=cases)
-    with_it = score_on(problem, cases, TEST, problem.outputs(trial.theta))
-    without = score_on(problem, cases, TEST, trial.beside.outputs)
-    size = gain(with_it, without, channel)[0]
-    return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
-
-
-def _dropped(
-    without: Evaluated, with_it: Evaluated, said: Mapping[str, Named], channel: str
-) -> Rejected:
-    """Return an effect that was accepted and may not be named, with the gain of what it helps most."""
-    weighed = said.get(with_it.added)
-    if weighed is None:
-        return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
-    evidence = weighed.cause.evidence
-    reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
-    return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
 
 
 def _rms(test: Score, case: Case) -> dict[str, float]:

@@ -18,7 +18,7 @@ from rsea_ros.identification.result import AT_NOISE
 
 INTERCEPT = "intercept"
 _LEAST = 3e-3
-"""Spread of lambda that two right simulations of one law have at least (MODEL_DOUBT in conclusion.py)."""
+"""Spread of lambda that two right simulations of one law have at least (MODEL_DOUBT in causes.py)."""
 _MOST = 3.0
 """Spread of lambda from which a larger one says no more."""
 _CERTAIN = 30.0
