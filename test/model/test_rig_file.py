@@ -192,7 +192,7 @@ def test_a_known_field_must_be_stated(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "holds NoneType, expected a mapping with the keys of a rig"),
+        (b"", "holds nothing, expected a mapping with the keys of a rig"),
         (b"- 1\n", "holds list, expected a mapping"),
         (b"name: [", "not YAML: "),
         (b"\xff\xfe\x00", "not YAML: "),
