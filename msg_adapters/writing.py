@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import secrets
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 
@@ -17,9 +17,11 @@ from msg_adapters.metadata import Topic
 from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
+from msg_adapters.topics import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.interrupts import undisturbed
+from rsea_ros.staging import Stage, make_stage
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
     "mcap": (".mcap", McapStorage),
@@ -60,6 +62,7 @@ class BagWriter:
         self._flushed = time.monotonic()
         self._disk = ThreadPoolExecutor(1, "disk")
         self._syncing: Future[None] | None = None
+        self._stage: Stage | None = None
 
     def __enter__(self) -> BagWriter:
         self._check_name()
@@ -67,7 +70,7 @@ class BagWriter:
         try:
             with undisturbed():
                 self._made = files.make_folder(self.path.parent)
-                self.partial = _new_directory(self.path, self._recording)
+                self.partial = self._new_directory()
                 self._made.insert(0, self.partial)
                 self._open()
         except OSError as error:
@@ -79,12 +82,14 @@ class BagWriter:
         return self
 
     def write(self, topic: str, msgtype: str, log_time: int, raw: bytes) -> None:
-        """Append a serialised message; log_time in ns since the epoch."""
+        """Append a serialised message; log_time in ns since the epoch.
+
+        Raises BagError for a topic that ROS could not have, and for a topic of another type than before.
+        """
         try:
-            if topic not in self._topics:
-                known = Topic(topic, msgtype, definition(msgtype).digest)
-                self._topics[topic] = (self._storage.add(topic, msgtype), known)
-            key, known = self._topics[topic]
+            key, known = self._topics.get(topic) or self._declared(topic, msgtype)
+            if known.msgtype != msgtype:
+                raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
             self._storage.write(key, log_time, raw)
             known.count += 1
             first, last = self._span if self._span[1] else (log_time, log_time)
@@ -92,6 +97,13 @@ class BagWriter:
         except OSError as error:
             raise self._error(error) from None
         self.keep_up()
+
+    def _declared(self, topic: str, msgtype: str) -> tuple[int, Topic]:
+        """Return key and topic of a new one."""
+        check_topic(topic)
+        known = Topic(topic, msgtype, definition(msgtype).digest)
+        self._topics[topic] = (self._storage.add(topic, msgtype), known)
+        return self._topics[topic]
 
     def keep_up(self) -> None:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
@@ -134,6 +146,7 @@ class BagWriter:
             finally:
                 if not complete:
                     self._abandon()
+                self._release()
 
     def _check_name(self) -> None:
         """Refuse a name that is taken by something that may not be replaced. Raises BagError."""
@@ -147,6 +160,19 @@ class BagWriter:
             inside = self.path.iterdir() if self.path.is_dir() else ()
             if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
                 raise BagError(f"{self.path}: holds more than a bag, expected a new name")
+
+    def _new_directory(self) -> Path:
+        """Make a directory that nobody has: a stage, or NAME.partial, which a killed recorder leaves."""
+        with files.naming(self.path):
+            if not self._recording:
+                self._stage = make_stage(self.path.parent, 0o777)
+                return self._stage.path
+            for number in count():
+                path = self.path.with_name(f"{self.path.name}.partial{number or ''}")
+                with suppress(FileExistsError):
+                    path.mkdir()
+                    break
+        return path
 
     def _open(self) -> None:
         suffix, opened = STORAGES[self._kind]
@@ -185,22 +211,16 @@ class BagWriter:
         for path in self._made[1:]:
             with suppress(OSError):
                 path.rmdir()
+        self._release()
+
+    def _release(self) -> None:
+        """Let go of the lock of the stage."""
+        if self._stage is not None:
+            self._stage.release()
+            self._stage = None
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
         if isinstance(error, OutputError):
             return BagError(f"{error}{kept}")
         return BagError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")
-
-
-def _new_directory(path: Path, recording: bool) -> Path:
-    """Make a directory that nobody has: NAME.partial of a recording; a killed recorder's stays."""
-    number = 0
-    while True:
-        name = f"{path.name}.partial{number or ''}" if recording else f"{files.PREFIX}{secrets.token_hex(4)}"
-        try:
-            with files.naming(path):
-                path.with_name(name).mkdir()
-            return path.with_name(name)
-        except FileExistsError:
-            number += 1

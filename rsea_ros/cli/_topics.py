@@ -34,9 +34,6 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
     """Return the map that the options ask for. Raises ParameterError for one that makes no sense."""
-    for name in (args.namespace, args.joint or "", *args.topic):
-        if not name.isprintable():
-            raise ParameterError(f"{name!r}: holds what cannot be printed, expected a name of ROS")
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
 
 

@@ -54,13 +54,16 @@ def run(args: argparse.Namespace) -> int:
 
         raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
+        from rsea_ros.cli._provenance import provenance
         from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
         without = tuple(effect_named(name).name for name in args.without)
         result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
-        report = write_diagnosis(result, raw, place, write_overlay)
+        report = write_diagnosis(
+            result, raw, place, write_overlay, provenance("diagnose", args.bags, args.rig)
+        )
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:

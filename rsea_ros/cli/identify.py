@@ -57,11 +57,12 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._checks import checked
 
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
+        from rsea_ros.cli._provenance import provenance
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
-        report = write_results(result, place)
+        report = write_results(result, place, provenance("identify", args.bags, args.rig))
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
     else:

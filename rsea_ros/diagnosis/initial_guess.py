@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rsea_ros.diagnosis.missing_torque import residual_of, ripples
-from rsea_ros.diagnosis.residual_peaks import peaks, refined, sine_at
+from rsea_ros.diagnosis.residual_peaks import peaks, refined, residual_of, ripples, sine_at
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
@@ -23,7 +22,7 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-Start = dict[str, float]
+InitialGuess = dict[str, float]
 """Parameters of an effect, and values of the rig that go with them."""
 STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _GAPS = (0.1, 0.3, 0.6)
@@ -34,7 +33,7 @@ _SEGMENT = 1024
 _APART = 12
 
 
-class Seen(NamedTuple):
+class ResidualView(NamedTuple):
     """What there is to see: a case, the rig as it is fitted so far, and what that gives for each channel."""
 
     case: Case
@@ -46,7 +45,7 @@ class Seen(NamedTuple):
         return residual_of(self.case, self.outputs, channel)
 
 
-def starts_of(effect: Effect, seen: Seen) -> list[Start]:
+def initial_guesses(effect: Effect, seen: ResidualView) -> list[InitialGuess]:
     """Return from where fits of an effect begin; none where it has nothing to act on."""
     own = _own_starts(effect)
     for answers, starts in _RULES:
@@ -55,7 +54,7 @@ def starts_of(effect: Effect, seen: Seen) -> list[Start]:
     return own
 
 
-def _own_starts(effect: Effect) -> list[Start]:
+def _own_starts(effect: Effect) -> list[InitialGuess]:
     """Return the typical values, then each parameter's others beside them, of both signs if there are two."""
     starts = [dict(effect.typical)]
     for p in effect.parameters:
@@ -65,12 +64,12 @@ def _own_starts(effect: Effect) -> list[Start]:
     return starts
 
 
-def _ripple(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _ripple(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at what repeats with the rotor's angle; without that there is no ripple."""
     return [{**effect.typical, **hint} for hint in ripples(seen.case, seen.rig, seen.outputs)]
 
 
-def _play(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _play(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then."""
     if "position" not in seen.case.measured:
         return own
@@ -81,7 +80,7 @@ def _play(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return own + [{**effect.typical, **hint} for hint in hints]
 
 
-def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _limit(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at the largest torque measured, and at shares of what is asked, N m."""
     if not isinstance(seen.case.drive, Drive):
         return own
@@ -92,7 +91,7 @@ def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return [{**effect.typical, "limit": limit} for limit in limits]
 
 
-def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _mode(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin with a part on a spring of its own, its mode at the highest peak of each channel.
 
     The rig's spring is stiffer then: both in series are what the fit without the effect knows.
@@ -115,7 +114,7 @@ def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     ] or own
 
 
-def _train(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _train(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin with less inertia and damping where a gear train gives between rotor and spring.
 
     The rotor moves 1 + K_s / stiffness as far as the spring: the fit without it takes that for more of both.
@@ -127,7 +126,7 @@ def _train(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return starts
 
 
-def _torque_constant(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _torque_constant(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at the torque constant, relative to the believed one, that the measured torque tells.
 
     The motion is the same when all that the motor works against is as much larger.
@@ -143,7 +142,7 @@ def _torque_constant(effect: Effect, own: list[Start], seen: Seen) -> list[Start
     return [{**effect.typical, effect.main.name: gain, **{n: gain * seen.rig[n] for n in seen.rig.free()}}]
 
 
-def _line(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _line(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at lines in the spectrum of the channel that an effect claims, a sine with its size and phase."""
     channel = effect.claims.channel if effect.claims.channel in seen.outputs else next(iter(seen.outputs))
     names = {p.name for p in effect.parameters}
@@ -156,7 +155,7 @@ def _line(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return starts or own
 
 
-def _lines(seen: Seen, channel: str, sine: bool) -> list[float]:
+def _lines(seen: ResidualView, channel: str, sine: bool) -> list[float]:
     """Return the highest peaks of a channel's residual, Hz. sine: as sharp as the record is long."""
     t, residual = seen.case.t[channel], seen.residual(channel)
     rate = 1.0 / float(np.median(np.diff(t)))
@@ -174,7 +173,10 @@ def _has(*names: str) -> Callable[[Effect], bool]:
     return lambda effect: set(names) <= {p.name for p in effect.parameters}
 
 
-_RULES: tuple[tuple[Callable[[Effect], bool], Callable[[Effect, list[Start], Seen], list[Start]]], ...] = (
+_RULES: tuple[
+    tuple[Callable[[Effect], bool], Callable[[Effect, list[InitialGuess], ResidualView], list[InitialGuess]]],
+    ...,
+] = (
     (_has("cycles_per_revolution"), _ripple),
     (_has("gap"), _play),
     (_has("limit"), _limit),

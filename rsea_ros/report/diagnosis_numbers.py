@@ -55,6 +55,12 @@ def estimate(estimate: Estimate) -> tuple[str, str, str]:
     return value, doubt, prefix + words.unit(estimate.unit)
 
 
+def model_half_width(estimate: Estimate) -> tuple[str, str]:
+    """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
+    factor, prefix = _prefix(estimate)
+    return words.number(1.96 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
+
+
 def _prefix(estimate: Estimate) -> tuple[float, str]:
     """Return the factor and prefix that make a small angle or time readable."""
     if estimate.unit not in ("rad", "s") or not 0.0 < abs(estimate.value) < 0.1:

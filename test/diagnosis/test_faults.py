@@ -8,7 +8,7 @@ from independent.bench import drawn_bench, record_run
 from independent.faults import FAULTS
 
 from rsea_ros.checks.faults import check
-from rsea_ros.diagnosis.diagnose import diagnose, nominal_rig
+from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.diagnosis_words import headline
 from rsea_ros.signals import Channel, Record
@@ -20,7 +20,7 @@ def good():
 
 
 def test_a_good_record_has_none(good):
-    assert check(good, nominal_rig(load_rig("paper_high_impedance"))).faults == ()
+    assert check(good, load_rig("paper_high_impedance")).faults == ()
 
 
 @pytest.mark.parametrize("kind", FAULTS)
