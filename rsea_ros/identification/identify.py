@@ -47,6 +47,7 @@ from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
+from rsea_ros.units import in_motion
 
 CHANNELS = ("ft", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
@@ -249,7 +250,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
         ParameterEstimate(
             name=u.name,
             value=u.outer(float(theta)),
-            unit=u.unit,
+            unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
             spread=u.doubt,

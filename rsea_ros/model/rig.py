@@ -105,6 +105,7 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
+    linear: it moves along a line: m, N and kg stand for rad, N m and kg m^2.
     other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
     may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
@@ -114,6 +115,7 @@ class Rig:
     quantities: Mapping[str, Quantity]
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
+    linear: bool = False
     train: Train = "planetary"
     other_trains: tuple[Train, ...] = ()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)

@@ -54,6 +54,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         quantities=quantities,
         clamped=clamped,
         rigid_spring=switch(groups["spring"], "spring.rigid"),
+        linear=switch(document, "linear"),
         train=groups["gear"].get("train", "planetary"),
         other_trains=_other_trains(groups["gear"].get("or", [])),
         sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
@@ -76,6 +77,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
+    if rig.linear:
+        document["linear"] = True
     if rig.ft_end != "spring_end":
         document["ft_end"] = rig.ft_end
     for name, quantity in rig.quantities.items():

@@ -49,6 +49,7 @@ TOP = (
     Key("source", "text", "empty", "where its values come from"),
     Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "which end the paper calls proximal"),
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "where the F/T sensor sits"),
+    Key("linear", "true or false", "false", "it moves along a line: m, N, kg stand for rad, N m, kg m^2"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
     Key("controller", "mapping", "none", "position loop that ran during the record"),
