@@ -120,3 +120,15 @@ def test_a_lag_of_the_sensor_or_of_the_drive_is_no_average(effect, parameters):
     bench = drawn_bench(np.random.default_rng(1))
     bench = hide(bench, effect, parameters) if effect else bench
     assert check_record(record_run(bench, 3, duration=8.0), RIG).of("smoothing") == ()
+
+
+def test_commands_and_sensors_may_each_have_another_unit():
+    """Position and velocity `fit no unit`, the F/T torque `looks like kN m`."""
+    record = scaled(good(), command=1e3, position=57.29578, velocity=9.549297)
+    record = record.with_channels(motor_torque=record["command"])
+    findings = check_record(record, RIG)
+    assert told(findings, "sign", "scale", "wrong_rig") == {
+        ("scale", "command"), ("scale", "motor_torque"), ("scale", "position"), ("scale", "velocity")
+    }  # fmt: skip
+    remedies = " ".join(f.remedy for f in findings.of("scale"))
+    assert all(f"unit: {unit}" in remedies for unit in ("mN m", "deg", "rpm"))
