@@ -17,6 +17,8 @@ _RUN_UP = 0.5
 """s before a piece that are simulated and not compared: the state there is the measured one."""
 _ENOUGH = 14.0
 """s of data in all pieces together."""
+_ROUNDING = 0.05
+"""Of a period: up to this much less than a whole number of samples is one, jitter of the stamps."""
 
 
 def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...]:
@@ -26,9 +28,10 @@ def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
     fit = part(case, FIT)
-    drive = case.drive
+    thinner = _as_often_as_commands(fit)
+    drive = thinner.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
-        return (fit,)
+        return (thinner,)
     length = 2.0 * block_length(case)
     starts = fit_starts(case)[1:]
     half = round(0.5 * _ENOUGH / length)
@@ -37,7 +40,37 @@ def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + length) for t in chosen)
+    return tuple(_piece(thinner, drive, float(t) - _RUN_UP, float(t) + length) for t in chosen)
+
+
+def _as_often_as_commands(case: Case) -> Case:
+    """Return a case with every k-th sample of a channel that has k or more to a command.
+
+    What a command does shows at its own rate; the rest tells noise from noise, at several times the cost.
+    """
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return case
+    period = drive.hold * drive.step
+    every = {n: slice(None, None, _samples_in(period, t)) for n, t in case.t.items()}
+    thinner = replace(
+        drive,
+        at={n: at[every[n]] for n, at in drive.at.items()},
+        impulse={n: i[every[n]] for n, i in drive.impulse.items()},
+    )
+    return replace(
+        case,
+        drive=thinner,
+        t={n: t[every[n]] for n, t in case.t.items()},
+        measured={n: y[every[n]] for n, y in case.measured.items()},
+        mask={n: m[every[n]] for n, m in case.mask.items()},
+    )
+
+
+def _samples_in(period: float, t: FloatArray) -> int:
+    """Return how many samples of a channel a period holds, 1 at least."""
+    between = float(np.median(np.diff(t))) if len(t) > 1 else period
+    return max(1, int(period / max(between, 1e-3 * period) + _ROUNDING))
 
 
 def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
