@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "new_files"}
+FILES = {"interrupts", "files", "staging", "new_files"}
 BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
@@ -25,7 +25,8 @@ OWN = {
     "wording": set(),
     "interrupts": set(),
     "files": {"errors", "interrupts"},
-    "new_files": {"errors", "files", "interrupts"},
+    "staging": {"files"},
+    "new_files": {"errors", "files", "interrupts", "staging"},
     "units": set(),
     "decimal_number": set(),
     "keys": set(),

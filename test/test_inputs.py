@@ -94,6 +94,11 @@ REFUSALS = {
     "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
+    "sensors of another day to a fit": ("identify", {"stamps": "apart"}, "stamped by the command's clock"),
+    "no measurement": ("identify", {"channels": ()}, "record one, or name its topic with --topic"),
+    "no channel to predict": ("predict", {"channels": ()}, "ft: record it, or name its topic with --topic"),
+    "one stamp for all": ("diagnose", {"stamps": "same"}, "rising stamps: stamp each message when"),
+    "a dead bench to a diagnosis": ("diagnose", {"dead": "all still"}, "are the sensors alive?"),
     "nothing to compare": ("predict", {"stamps": "apart"}, "expected one channel"),
     "a still drive": (
         "identify", {"rig": "bare_drive", "dead": "all zero"}, "no sensor answers to the machine"

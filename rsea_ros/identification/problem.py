@@ -98,7 +98,8 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
-            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one: "
+            "record it, or name its topic with --topic"
         )
     start = float(record["command"].t[0]) + SETTLE
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
