@@ -26,10 +26,11 @@ from rsea_ros.signals import Channel, Record
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
+from inputs import kept_promises
 from inputs_bags import bag_of, record_of
 from inputs_cover import covering, pairs
 from inputs_matrix import BAG_VERBS
-from inputs_outcome import judge
+from inputs_outcome import Outcome, judge
 from inputs_server import MODULES
 
 BENCH = {
@@ -195,6 +196,23 @@ def test_a_still_command_is_refused_without_a_warning():
 )
 def test_the_gate_tells_a_kept_promise_from_a_broken_one(status, out, err, kind):
     assert judge(status, out, err, is_json=status in (0, 1)).kind == kind
+
+
+def test_a_gate_that_broke_off_goes_on_without_the_promises_that_were_kept(tmp_path):
+    log = tmp_path / "log.jsonl"
+    said = [
+        ("b0001 verb=check", "result"),
+        ("b0002 verb=predict", "traceback"),
+        ("b0003 verb=export", "crash"),
+        ("b0007 verb=export", "refused"),
+        ("b0001 verb=design", "result"),
+        ("b0002 verb=design", "memory"),
+    ]
+    lines = [json.dumps({"case": case, **vars(Outcome(kind))}) for case, kind in said]
+    log.write_text("\n".join([*lines, '{"case": "b0009 verb=control", "ki']))
+    kept = {case: outcome.kind for case, outcome in kept_promises(log).items()}
+    assert kept == {"verb=check": "result", "verb=export": "refused"}
+    assert kept_promises(tmp_path / "none") == kept_promises(None) == {}
 
 
 def test_the_covering_design_holds_every_pair():
