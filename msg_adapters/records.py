@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import encoding
+from msg_adapters.remarks import Remarks
 from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
@@ -43,7 +44,8 @@ def write_records(
     series = [one for record, topics in records for one in _series(record, topics)]
     _check_apart(series)
     notes = [note for record, _ in records for note in record.notes]
-    with BagWriter(path, storage, recording=False, notes=notes, force=force) as bag:
+    remarks = Remarks(notes, [fault for record, _ in records for fault in record.faults])
+    with BagWriter(path, storage, recording=False, remarks=remarks, force=force) as bag:
         for log_time, name, msgtype, raw in _in_order(series):
             bag.write(name, msgtype, log_time, raw)
 

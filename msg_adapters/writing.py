@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from itertools import count
@@ -14,6 +14,7 @@ from msg_adapters import metadata
 from msg_adapters.definitions import definition
 from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
+from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
 from msg_adapters.topics import check_topic
@@ -45,8 +46,8 @@ class BagWriter:
     """
 
     def __init__(
-        self, path: str | Path, storage: str = "mcap", *, recording: bool = True, notes: Sequence[str] = (),
-        force: bool = False, interval: float = INTERVAL,
+        self, path: str | Path, storage: str = "mcap", *, recording: bool = True,
+        remarks: Remarks | None = None, force: bool = False, interval: float = INTERVAL,
     ) -> None:  # fmt: skip
         self.path = Path(path)
         by_suffix = {suffix: name for name, (suffix, _) in STORAGES.items()}
@@ -55,7 +56,7 @@ class BagWriter:
         if self._kind not in STORAGES:
             raise BagError(f"{path}: storage {storage!r}, expected one of {', '.join(STORAGES)}")
         self._recording, self._force, self._interval = recording, force, interval
-        self.notes = list(notes)
+        self.remarks = remarks or Remarks()
         self._topics: dict[str, tuple[int, Topic]] = {}
         self._span = (0, 0)
         self._flushed = time.monotonic()
@@ -182,6 +183,8 @@ class BagWriter:
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
+        if self._single:
+            self._storage.remark(self.remarks.texts())
         self._storage.close()
         file = self._storage.path
         if self._single:
@@ -191,7 +194,7 @@ class BagWriter:
         topics = [topic for _, topic in self._topics.values()]
         files.remove(self.partial / metadata.NAME)
         files.write_new(
-            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.notes)
+            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.remarks)
         )
         files.give_names([(self.partial, self.path)], force=self._force)
 

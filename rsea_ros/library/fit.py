@@ -33,6 +33,11 @@ class Fit:
         return self.result.rig
 
     @property
+    def verdict(self) -> str:
+        """`adequate`, `misfit` or `not_identifiable`, as in identification.json."""
+        return self.result.verdict
+
+    @property
     def parameters(self) -> dict[str, ParameterEstimate]:
         """Estimates by name, SI, each with `value`, `ci95` and `unit`."""
         return {p.name: p for p in self.result.parameters}

@@ -15,7 +15,7 @@ from rsea_ros.errors import FieldError, OutputError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document, rig_to_document
 from rsea_ros.new_files import write_text
-from rsea_ros.wording import shown
+from rsea_ros.wording import did_you_mean, shown
 
 
 def rig_path(name_or_path: str | Path) -> Path:
@@ -31,8 +31,16 @@ def rig_path(name_or_path: str | Path) -> Path:
     for folder in rig_folders():
         if (folder / f"{name_or_path}.yaml").exists():
             return folder / f"{name_or_path}.yaml"
-    known = sorted({p.stem for folder in rig_folders() for p in folder.glob("*.yaml")})
-    raise RigError(f"rig {str(name_or_path)!r} not found, expected a YAML file or one of {', '.join(known)}")
+    known = rig_names()
+    near = did_you_mean(str(name_or_path), known)
+    raise RigError(
+        f"rig {str(name_or_path)!r} not found, expected a YAML file or one of {', '.join(known)}{near}"
+    )
+
+
+def rig_names() -> list[str]:
+    """Return the names of the rigs that come with the package."""
+    return sorted({p.stem for folder in rig_folders() for p in folder.glob("*.yaml")})
 
 
 def rig_folders() -> list[Path]:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.candidate import quicker
-from rsea_ros.diagnosis.windows import windows_of
+from rsea_ros.diagnosis.candidate import with_doubled_step
+from rsea_ros.diagnosis.short_pieces import short_pieces_of
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.identify import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
@@ -34,7 +34,7 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
     record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
     case = case_from(record, rig)
     problem = Problem((case,), rig, (), CHANNELS)
-    pieces = windows_of(case, problem.outputs(np.zeros(0))[0])
+    pieces = short_pieces_of(case, problem.outputs(np.zeros(0))[0])
     assert len(pieces) > 5
     for piece in pieces:
         (out,) = Problem((piece,), rig, (), CHANNELS).outputs(np.zeros(0))
@@ -55,9 +55,12 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
     stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
     record = synthesize(rig, Channel(stamps, command), seed=5)
     case = with_stated_noise(case_from(record, rig), rig)
-    pieces = windows_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
+    pieces = short_pieces_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
     assert len(pieces) > 5
-    for problem in (Problem(pieces, rig, (), CHANNELS), quicker(Problem(pieces, rig, (), CHANNELS))):
+    for problem in (
+        Problem(pieces, rig, (), CHANNELS),
+        with_doubled_step(Problem(pieces, rig, (), CHANNELS)),
+    ):
         residual = problem.residual(np.zeros(0))
         assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
 
@@ -78,7 +81,7 @@ def test_pieces_hold_a_channel_no_more_than_about_as_often_as_commands(times, ke
     record = asked.with_channels(**{n: Channel(asked[n].t, y) for n, y in measured.items()})
     case = with_stated_noise(case_from(record, rig), rig)
     problem = Problem((case,), rig, (), CHANNELS)
-    pieces = Problem(windows_of(case, problem.outputs(np.zeros(0))[0]), rig, (), CHANNELS)
+    pieces = Problem(short_pieces_of(case, problem.outputs(np.zeros(0))[0]), rig, (), CHANNELS)
     counts = {n: sum(np.count_nonzero(p.mask[n]) for p in pieces.cases) for n in ("ft", "position")}
     assert counts["position"] == pytest.approx(kept * counts["ft"], rel=0.02)
     residual = pieces.residual(np.zeros(0))
