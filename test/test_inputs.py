@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main, verbs
-from rsea_ros.diagnosis.initial_guess import Seen, starts_of
+from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify
@@ -92,12 +92,12 @@ REFUSALS = {
     "a sample of 1e308": ("identify", {"dead": "1e308"}, "expected a finite value up to 1e+30"),
     "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N m and nothing moves"),
     "a dead bench": ("identify", {"dead": "all still"}, "no sensor answers to the machine"),
-    "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
+    "too few samples": ("identify", {"dead": "few"}, "position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
     "sensors of another day to a fit": ("identify", {"stamps": "apart"}, "stamped by the command's clock"),
     "no measurement": ("identify", {"channels": ()}, "record one, or name its topic with --topic"),
-    "no channel to predict": ("predict", {"channels": ()}, "ft: record it, or name its topic with --topic"),
+    "no channel to predict": ("predict", {"channels": ()}, "record it, or name its topic with --topic"),
     "one stamp for all": ("diagnose", {"stamps": "same"}, "rising stamps: stamp each message when"),
     "a dead bench to a diagnosis": ("diagnose", {"dead": "all still"}, "are the sensors alive?"),
     "nothing to compare": ("predict", {"stamps": "apart"}, "expected one channel"),
@@ -144,8 +144,8 @@ def test_a_simulation_that_runs_away_is_refused():
 
 def test_a_limit_is_guessed_without_a_motor_torque():
     case = case_from(record(), load_rig("paper_high_impedance"))
-    seen = Seen(case, load_rig("paper_high_impedance"), dict(case.measured))
-    limits = [start["limit"] for start in starts_of(effect_named("torque_saturation"), seen)]
+    seen = ResidualView(case, load_rig("paper_high_impedance"), dict(case.measured))
+    limits = [start["limit"] for start in initial_guesses(effect_named("torque_saturation"), seen)]
     assert len(limits) == 4 and min(limits) > 0.0
 
 
