@@ -18,7 +18,7 @@ def _sample_smooth(values, at, command):  # type: ignore[no-untyped-def]
     out, last = np.empty(len(at)), len(values) - 1
     for i in range(len(at)):
         u = min(max(at[i], 0.0), float(last))
-        k = min(int(u), last - 1)
+        k = int(u)
         if u == k:
             out[i] = values[k]
             continue
