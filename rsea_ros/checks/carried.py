@@ -38,7 +38,8 @@ def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
     if not set(channels) - {"command", "reference"}:
         reasons = "; ".join(f"{f.channel}: {f.detail or f.kind}" for f in found.faults if f.channel in dead)
         raise IdentificationError(
-            f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does"
+            f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does: "
+            "rsea check shows each"
         )
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in found.faults if f.kind not in again and f not in record.faults))
