@@ -23,11 +23,14 @@ import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
+from bench.driver_lateness import noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 AMPLITUDE = 10.0
+MEASURED, ATTEMPTS = 3, 8
+"""Faults by lateness that are measured, and how often one is tried for."""
 BURN = "while True: pass"
 
 
@@ -52,6 +55,7 @@ def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, s
     for rate in args.rate:
         for load in (0, os.cpu_count() or 1):
             rows += _trial(rate, load, folder / f"tty{rate:g}-{load}")
+        rows.append(_lateness_fault(rate, folder))
     rclpy.shutdown()
     return rows
 
@@ -85,6 +89,25 @@ def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
         (f"{name}: error", "≤ 2 %" if not load else "", f"{error}, {acting} writes of torque, {told}"),
         (f"{name}: largest |ft|", f"≤ {1.3 * AMPLITUDE:g} N m", f"{largest:.2f} N m"),
     ]
+
+
+def _lateness_fault(rate: float, folder: Path) -> tuple[str, str, str]:
+    """Measure the time from the fault that lateness latches to zero torque, some times over."""
+    outside, place = Outside(), folder / f"late{rate:g}"
+    place.mkdir()
+    with ExitStack() as kept:
+        bench = kept.enter_context(RemoteBench(place / "tty"))
+        bench.hurry()
+        own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
+        kept.enter_context(running("driver", 0, **own))
+        process, file = kept.enter_context(noted_controller(place, rate))
+        outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
+        runs: list[tuple[str, str]] = []
+        while sum(run[0].isdigit() for run in runs) < MEASURED and len(runs) < ATTEMPTS:
+            _drive(outside)
+            runs.append(to_zero(outside, bench, process, file))
+    outside.node.destroy_node()
+    return row(f"{rate:g} Hz, controller held up", runs)
 
 
 def _drive(outside: Outside) -> None:
