@@ -1,8 +1,8 @@
 """The controller node in a process of its own, with the instants at which it latches a fault written down.
 
-SIGUSR1 holds its work up for STRETCH periods, again and again with as long between, until SIGUSR1 comes
-again: as a busy machine does it, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes
-a message out of shared memory holds up whoever publishes, here the driver, for a second.
+SIGUSR1 holds its work up for HELD periods, again and again with RUNS between, until SIGUSR1 comes again: as a
+busy machine does it, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message
+out of shared memory holds up whoever publishes, here the driver, for a second.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 MARK, HOLD = "RSEA_BENCH_FAULTS", "RSEA_BENCH_HOLD"
-STRETCH = 3.0
+HELD, RUNS = 8.0, 3.0
 """Periods for which it is held up, and for which it runs."""
 
 
 class Hold:
-    """Whether and when the work is held up; seconds: for how long each time."""
+    """Whether and when the work is held up. period: s."""
 
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._on, self._next = seconds, False, 0.0
+    def __init__(self, period: float) -> None:
+        self._period, self._on, self._next = period, False, 0.0
 
     def toggle(self, number: int, frame: object) -> None:
         """Begin, or end."""
@@ -33,8 +33,8 @@ class Hold:
     def pause(self) -> None:
         """Hold the caller up when it is time to."""
         if self._on and time.monotonic() > self._next:
-            time.sleep(self._seconds)
-            self._next = time.monotonic() + self._seconds
+            time.sleep(HELD * self._period)
+            self._next = time.monotonic() + RUNS * self._period
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 """From the fault that lateness latches to zero torque at the motor, by the bench's own log.
 
-The controller is held up for half of the time, some periods at a stretch (bench/controller_node.py), also
+The controller is held up for most of the time, some periods at a stretch (bench/controller_node.py), also
 while its fault takes the torque away.
 """
 
@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 
-from bench.controller_node import HOLD, MARK, STRETCH
+from bench.controller_node import HOLD, MARK
 from bench.torque_control_nodes import ROOT, Outside
 from msg_adapters.ros import torque_command_message
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -38,7 +38,7 @@ def noted_controller(
     words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={value}")]
     process = subprocess.Popen(
         [sys.executable, str(ROOT / "bench" / "controller_node.py"), "--ros-args", *words], cwd=ROOT,
-        env={**os.environ, MARK: str(file), HOLD: f"{STRETCH / rate}", "PYTHONPATH": str(ROOT)},
+        env={**os.environ, MARK: str(file), HOLD: f"{1.0 / rate}", "PYTHONPATH": str(ROOT)},
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:
