@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import BagError, ParameterError
+from rsea_ros.wording import shown
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
@@ -29,6 +31,18 @@ def sign_and_index(axis: str) -> tuple[float, int]:
     return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
 
 
+_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_LONGEST = 247
+"""Characters of a topic: ROS 2 puts eight more in front, and DDS takes 255."""
+
+
+def check_topic(topic: str) -> None:
+    """Refuse a name that no node can have: rosbag2 could not play it. Raises BagError."""
+    if not _NAME.fullmatch(topic) or len(topic) > _LONGEST:
+        expected = f"letters, digits and _ between slashes, none beginning with a digit, up to {_LONGEST}"
+        raise BagError(f"topic {shown(topic)}: is no name of ROS, expected {expected} characters")
+
+
 @dataclass(frozen=True)
 class TopicMap:
     """Names of the topics of one bench; the defaults are the contract's.
@@ -40,6 +54,7 @@ class TopicMap:
 
     joint: which joint, where the messages hold several.
     axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
+    Raises ParameterError for another axis, and for a name that cannot be printed.
     """
 
     namespace: str = "/rsea"
@@ -51,6 +66,10 @@ class TopicMap:
     axis: str = "torque.z"
 
     def __post_init__(self) -> None:
+        for field in ("namespace", *ROLES, "joint"):
+            name = getattr(self, field) or ""
+            if not name.isprintable():
+                raise ParameterError(f"{field} {name!r}: cannot be printed, expected a name of ROS")
         if self.axis.removeprefix("-") not in AXES:
             raise ParameterError(
                 f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"

@@ -130,8 +130,9 @@ class Record:
         t: stamps, s, shape (n,), rising: a command takes effect at its stamp and is held, a measurement was
         taken at its stamp, so the row of a control loop that reads and then commands is one stamp.
         channels: values by name of UNITS (or an alias such as `q`, `u`, `tau`), in SI, shape (n,): arrays,
-        lists or columns of a table.
-        Raises ChannelError for an unknown name, another shape, or stamps that do not rise.
+        lists or columns of a table; NaN, or masked, where a measurement is missing.
+        Raises ChannelError for an unknown name, another shape, what is no real number, stamps that do not
+        rise, and stamps or commands that are not finite.
         """
         from rsea_ros.arrays import record_from_arrays
 

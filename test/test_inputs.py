@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main, verbs
-from rsea_ros.diagnosis.hints import Seen, starts_of
+from rsea_ros.diagnosis.initial_guess import Seen, starts_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify

@@ -135,7 +135,12 @@ def _term(field: str, value: object, dimension: str) -> Term:
     sign = _number(body.get("sign", 1), f"{field}.sign")
     if sign not in (1, -1):
         raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
-    gain = sign * factor * _number(body.get("scale", 1), f"{field}.scale")
+    scale = _number(body.get("scale", 1), f"{field}.scale")
+    if scale == 0.0:
+        raise FieldError(
+            f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
+        )
+    gain = sign * factor * scale
     column, constant = _column(body["column"], f"{field}.column"), body.get("constant", 0)
     return Term(column, str(body["unit"]), gain, _number(constant, f"{field}.constant"))
 

@@ -37,7 +37,7 @@ TERM = (
     Key("column", "name or number of a column", NEEDED, "the measured values"),
     Key("unit", "unit", NEEDED, "of the column; another dimension than the channel's needs a scale"),
     Key("sign", "1 or -1", "1", "-1 turns the axis"),
-    Key("scale", "number", "1", "SI unit of the channel for each SI unit of the column"),
+    Key("scale", "number other than 0", "1", "SI unit of the channel for each SI unit of the column"),
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
 )
 CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())

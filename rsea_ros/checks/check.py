@@ -12,9 +12,12 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
+from rsea_ros.checks.impedance import impedance_findings
+from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
@@ -84,16 +87,39 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
                 remedy="cut it with --from and --to",
             )
         ]
-    found = noises(record, rig)
+    found = []
     whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
-    compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
-    readings = readings_of(compared, rig)
-    silent = set(compared) - set(readings.channels if readings else ())
-    found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
-    if readings is None:
+    compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    late = lags(compared)
+    if late:
+        record = in_step(record, late)
+        found = lag_findings(late, len(compared))
+        compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    readings, matched = _matched(record, compared, rig, axis)
+    found += [*noises(record, rig), *matched]
+    if readings is None or late or _is_elsewhere(found):
         return found
-    found += gain_findings(readings, rig, axis)
-    return found if _is_elsewhere(found) else [*found, *_linearised(checked, rig, readings)]
+    return [*found, *_linearised(checked, rig, readings)]
+
+
+def _matched(
+    record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
+) -> tuple[Readings | None, list[Finding]]:
+    """Return the readings of the channels, and what they say of signs, scales and the rig."""
+    related = quotients(compared)
+    readings = readings_of(related, rig)
+    silent = set(related) - set(readings.channels if readings else ())
+    found = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
+    found += gain_findings(readings, rig, axis) if readings else []
+    another = _another(record, compared, rig)
+    return readings, [*another, *(f for f in found if not (another and f.kind == "wrong_rig"))]
+
+
+def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
+    """Return what makes the machine of a record another one than a rig without a spring."""
+    if not is_inverse(rig):
+        return []
+    return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
 
 
 def _is_elsewhere(found: list[Finding]) -> bool:
@@ -151,5 +177,6 @@ def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
 
 
 def _fault(f: Finding) -> Fault:
-    detail = "; ".join(filter(None, (f.detail, f.remedy)))
+    """Return the fault of a finding; whether the rig is right is asked once, before the results."""
+    detail = "; ".join(filter(None, (f.detail, "" if f.kind == "wrong_rig" else f.remedy)))
     return Fault(f.kind, f.channel, float("nan"), detail, f.value, f.unit)

@@ -10,7 +10,7 @@ from rsea_ros.fault_kinds import FAULT_KINDS
 from rsea_ros.signals import Channel, Record
 
 SHORTEST = 4.0
-"""s of commands: four blocks of every set (diagnosis/split.py) of a quarter of a second each."""
+"""s of commands: four blocks of every set (diagnosis/data_split.py) of a quarter of a second each."""
 
 
 def check_diagnosable(record: Record) -> None:

@@ -25,6 +25,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free
 
 HELP = "a motor on a pseudo-terminal and an F/T sensor on UDP, with a simulated plant behind both"
+EXAMPLE = "rsea bench --rig paper_high_impedance --port bench_tty"
 PLANT_RATE = 2000.0
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from msg_adapters import write_record
 from msg_adapters.tables import import_record, load_map, summary
+from rsea_ros.cli._maps import map_path
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
-from rsea_ros.model.rig_file import rig_folders
 from rsea_ros.new_files import check_free
 
 HELP = "turn a CSV, TSV or MAT file of a real machine into a bag, by a map of columns and units"
+EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,8 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag and say what is in it."""
-    check_free([Path(args.out)], force=args.force, inputs=[args.file, _map_path(args.map)])
-    mapping = load_map(_map_path(args.map))
+    path = map_path(args.map)
+    check_free([Path(args.out)], force=args.force, inputs=[args.file, path])
+    mapping = load_map(path)
     record = import_record(args.file, mapping)
     write_record(record, args.out, topic_map(args), args.storage, force=args.force)
     for line in summary(record, mapping):
@@ -36,12 +38,3 @@ def run(args: argparse.Namespace) -> int:
     rate = next(iter(record.channels.values())).rate
     print(f"{args.out}: {record.stop - record.start:.3f} s at {rate:.1f} Hz")
     return 0
-
-
-def _map_path(name: str) -> Path:
-    """Return the file of a map given by path, or by the bare name of one in config/imports."""
-    for folder in rig_folders():
-        path = folder.parent / "imports" / f"{name}.yaml"
-        if path.exists() and not Path(name).suffix:
-            return path
-    return Path(name)

@@ -24,6 +24,7 @@ from rsea_ros.signals import Channel
 from rsea_ros.wording import shown
 
 HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
+EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ import rsea_ros.effects as package
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
-from rsea_ros.wording import shown
+from rsea_ros.wording import did_you_mean, shown
 
 _NOT_EFFECTS = {"effect", "catalogue", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
@@ -40,7 +40,8 @@ def effect_named(name: str) -> Effect:
     effects = catalogue()
     if name not in effects:
         known = ", ".join(effects)
-        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}")
+        near = did_you_mean(name, effects)
+        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}{near}")
     return effects[name]
 
 

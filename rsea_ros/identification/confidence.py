@@ -78,13 +78,27 @@ def confidence_of(solution: Solution) -> Confidence:
     if np.linalg.eigvalsh(information * np.outer(doubt, doubt))[0] < _WEAK:
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
         information = solution.jacobian.T @ solution.jacobian
-    inverse = np.linalg.pinv(information + prior, hermitian=True)
+    inverse = _inverse(information + prior)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
     return Confidence(solution.theta, covariance, _told(information, doubt), information)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a positive definite matrix whose unknowns may be scaled very differently.
+
+    Each unknown is brought to the scale of its own diagonal first: otherwise a value that only wide bounds
+    hold is taken for a singular direction beside one that is known well. What rounding hides of an eigenvalue
+    counts as the smallest that rounding shows, which leaves a wide variance and never none.
+    """
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    values = np.maximum(values, len(values) * np.finfo(float).eps * values[-1])
+    result: FloatArray = (vectors / values) @ vectors.T * np.outer(scale, scale)
+    return result
 
 
 def _alike(case: Case) -> float:

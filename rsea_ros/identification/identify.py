@@ -75,9 +75,8 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
             cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
         )
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
-        if misfits:
-            steady = evened(records, rig, solution)
-        if steady.scatter:
+        while misfits and (more := evened(steady.records, rig, solution)).scatter:
+            steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
             solution, cases = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)

@@ -183,13 +183,27 @@ def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[s
 
 @dataclass(frozen=True)
 class Problem:
-    """Records, the rig, and what may move. channels: what the residual is made of."""
+    """Records, the rig, and what may move. channels: what the residual is made of.
+
+    stated: names of the effects that belong to the nominal rig; a search adds others beside them.
+    """
 
     cases: tuple[Case, ...]
     rig: Rig
     unknowns: tuple[Unknown, ...]
     channels: tuple[str, ...]
     ride: bool = False
+    stated: frozenset[str] = frozenset()
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Return the names of all effects of the rig."""
+        return tuple(e.name for e in self.rig.effects)
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Return the names of the effects that a search has added, in the order in which it did."""
+        return tuple(name for name in self.acting if name not in self.stated)
 
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""

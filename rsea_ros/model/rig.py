@@ -236,8 +236,10 @@ def _check_structure(rig: Rig) -> None:
             f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
         )
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
         raise RigError(
-            f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
+            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
+            "spring.stiffness",
         )
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
