@@ -3,6 +3,8 @@
 A sine of 5 Hz, 10 N m: its error, RMS, and the largest |ft|, which a load may not raise. The bare loop of the
 same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO where that is permitted: motor
 and sensor have processors of their own; at 1 kHz a bench that waits for one is a motor that does not answer.
+Each rate as any process, and with both nodes at SCHED_FIFO where that is permitted (--priority): the machine's
+other work is then out of their way, but for the kernel's worker that carries the bytes of a pseudo-terminal.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
+from bench.bare_loop import permitted
 from bench.driver_lateness import noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
@@ -53,22 +56,24 @@ def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, s
     rclpy.init()
     rows = []
     for rate in args.rate:
-        for load in (0, os.cpu_count() or 1):
-            rows += _trial(rate, load, folder / f"tty{rate:g}-{load}")
-        rows.append(_lateness_fault(rate, folder))
+        for priority in filter(permitted, args.priority):
+            for load in (0, os.cpu_count() or 1):
+                rows += _trial(rate, load, priority, folder / f"tty{rate:g}-{load}-{priority}")
+        rows.append(_lateness_fault(rate, max(filter(permitted, args.priority)), folder))
     rclpy.shutdown()
     return rows
 
 
-def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
+def _trial(rate: float, load: int, priority: int, path: Path) -> list[tuple[str, str, str]]:
     """Run one trial; a fault ends the sine, which is part of what is asked."""
     outside = Outside()
     with ExitStack() as kept:
         bench = kept.enter_context(RemoteBench(path))
         bench.hurry()
-        own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
-        kept.enter_context(running("driver", 0, **own))
-        kept.enter_context(running("controller", 0, rate=rate))
+        own = {**bench.parameters(), "baud": 4_000_000, "autostart": "true"}
+        both = {"rate": rate, "realtime_priority": priority}
+        kept.enter_context(running("driver", 0, **own, **both))
+        kept.enter_context(running("controller", 0, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         kept.enter_context(burning(load))
         late = _lateness(rate)
@@ -80,6 +85,7 @@ def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
     outside.node.destroy_node()
     name = f"{rate:g} Hz, {'beside ' + str(load) + ' that burn' if load else 'quiet'}"
+    name += f", FIFO {priority}" if priority else ""
     own = outside.health.get("controller", {})
     share, missed = own.get("feedback_share"), own.get("missed_measurements")
     told = f"feedback at the end {share}, {own.get('late_commands')} late, {missed} measurements missed"
@@ -91,7 +97,7 @@ def _trial(rate: float, load: int, path: Path) -> list[tuple[str, str, str]]:
     ]
 
 
-def _lateness_fault(rate: float, folder: Path) -> tuple[str, str, str]:
+def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str, str]:
     """Measure the time from the fault that lateness latches to zero torque, some times over."""
     outside, place = Outside(), folder / f"late{rate:g}"
     place.mkdir()
@@ -99,8 +105,8 @@ def _lateness_fault(rate: float, folder: Path) -> tuple[str, str, str]:
         bench = kept.enter_context(RemoteBench(place / "tty"))
         bench.hurry()
         own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
-        kept.enter_context(running("driver", 0, **own))
-        process, file = kept.enter_context(noted_controller(place, rate))
+        kept.enter_context(running("driver", 0, **own, realtime_priority=priority))
+        process, file = kept.enter_context(noted_controller(place, rate, realtime_priority=priority))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         runs: list[tuple[str, str]] = []
         while sum(run[0].isdigit() for run in runs) < MEASURED and len(runs) < ATTEMPTS:
