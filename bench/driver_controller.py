@@ -3,7 +3,7 @@
 A sine of 5 Hz, 10 N m: its error, RMS, and the largest |ft|, which a load may not raise. The bare loop of the
 same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO where that is permitted: motor
 and sensor have processors of their own; at 1 kHz a bench that waits for one is a motor that does not answer.
-Each rate as any process, and with both nodes at SCHED_FIFO where that is permitted (--priority): the machine's
+Each rate as any process, and with both nodes at SCHED_FIFO where permitted (--priority): the machine's
 other work is then out of their way, but for the kernel's worker that carries the bytes of a pseudo-terminal.
 """
 
