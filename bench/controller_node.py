@@ -1,8 +1,8 @@
 """The controller node in a process of its own, with the instants at which it latches a fault written down.
 
-SIGUSR1 holds its work up for HELD periods, again and again with RUNS between, until SIGUSR1 comes again: as a
-busy machine does it, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message
-out of shared memory holds up whoever publishes, here the driver, for a second.
+From SIGUSR1 on, until it comes again, HELD periods pass between taking measurements and commanding for them:
+as on a busy machine, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message out of
+shared memory holds up whoever publishes, here the driver, for a second.
 """
 
 from __future__ import annotations
@@ -11,39 +11,39 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 MARK, HOLD = "RSEA_BENCH_FAULTS", "RSEA_BENCH_HOLD"
-HELD, RUNS = 8.0, 3.0
-"""Periods for which it is held up, and for which it runs."""
+HELD = 4.0
 
 
 class Hold:
-    """Whether and when the work is held up. period: s."""
+    """Whether the work is held up. period: s."""
 
     def __init__(self, period: float) -> None:
-        self._period, self._on, self._next = period, False, 0.0
+        self._period, self._on = period, False
 
     def toggle(self, number: int, frame: object) -> None:
         """Begin, or end."""
         self._on = not self._on
 
     def pause(self) -> None:
-        """Hold the caller up when it is time to."""
-        if self._on and time.monotonic() > self._next:
+        """Hold the caller up."""
+        if self._on:
             time.sleep(HELD * self._period)
-            self._next = time.monotonic() + RUNS * self._period
 
 
 def main() -> int:
     """Run the node with a note of its faults: a line with ns of the monotonic clock and the fault each."""
+    from rsea_ros.control.controller import Reading
     from rsea_ros.nodes import controller
 
     hold = Hold(float(os.environ[HOLD]))
     signal.signal(signal.SIGUSR1, hold.toggle)
-    latch, work = controller.Controller._latch, controller.Controller._work
+    latch, take = controller.Controller._latch, controller.Measurements.take
 
     def noted(self: controller.Controller, fault: str) -> None:
         now = time.monotonic_ns()
@@ -51,12 +51,14 @@ def main() -> int:
         with Path(os.environ[MARK]).open("a") as file:
             file.write(f"{now} {fault}\n")
 
-    def held(self: controller.Controller) -> None:
-        hold.pause()
-        work(self)
+    def held(self: controller.Measurements) -> Iterator[tuple[int, Reading]]:
+        arrived = list(take(self))
+        if arrived:
+            hold.pause()
+        return iter(arrived)
 
     controller.Controller._latch = noted  # type: ignore[method-assign]
-    controller.Controller._work = held  # type: ignore[method-assign]
+    controller.Measurements.take = held  # type: ignore[method-assign]
     return controller.main()
 
 

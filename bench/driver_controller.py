@@ -26,7 +26,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from bench.bare_loop import permitted
-from bench.driver_lateness import noted_controller, row, to_zero
+from bench.driver_lateness import Torques, noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -101,17 +101,16 @@ def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str,
     """Measure the time from the fault that lateness latches to zero torque, some times over."""
     outside, place = Outside(), folder / f"late{rate:g}"
     place.mkdir()
+    torques = Torques(outside)
     with ExitStack() as kept:
-        bench = kept.enter_context(RemoteBench(place / "tty"))
-        bench.hurry()
-        own = {**bench.parameters(), "rate": rate, "baud": 4_000_000, "autostart": "true"}
-        kept.enter_context(running("driver", 0, **own, realtime_priority=priority))
+        own = {"rate": rate, "autostart": "true", "realtime_priority": priority}
+        kept.enter_context(running("driver", 0, **own))
         process, file = kept.enter_context(noted_controller(place, rate, realtime_priority=priority))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         runs: list[tuple[str, str]] = []
         while sum(run[0].isdigit() for run in runs) < MEASURED and len(runs) < ATTEMPTS:
             _drive(outside)
-            runs.append(to_zero(outside, bench, process, file))
+            runs.append(to_zero(outside, torques, process, file))
     outside.node.destroy_node()
     return row(f"{rate:g} Hz, controller held up", runs)
 

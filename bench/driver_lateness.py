@@ -1,6 +1,7 @@
-"""From the fault that lateness latches to zero torque at the motor, by the bench's own log.
+"""From the fault that lateness latches to zero torque at the motor, by stamps of the measured motor torque.
 
-The controller is held up for most of the time, some periods at a stretch (bench/controller_node.py), also
+The driver drives the simulation: on a pseudo-terminal a busy machine latches faults of the wire first. The
+controller is held up before each of its commands (bench/controller_node.py), also
 while its fault takes the torque away.
 """
 
@@ -19,12 +20,31 @@ from statistics import median
 from bench.controller_node import HOLD, MARK
 from bench.torque_control_nodes import ROOT, Outside
 from msg_adapters.ros import torque_command_message
-from rsea_ros.hardware.peer.remote import RemoteBench
+from msg_adapters.topics import JOINT_STATE
+from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._qos import MEASUREMENT
 
 LONGEST = 8.0
 """s until the lateness is a fault."""
 ASKED = 50.0
 """ms."""
+SMALL, REACHED = 0.5, 8.0
+"""N m of the motor that are noise, and that are the torque which is asked for."""
+
+
+class Torques:
+    """The motor torque that the driver measures, by its stamps."""
+
+    def __init__(self, outside: Outside) -> None:
+        self._mailbox = Mailbox(
+            outside.node, JOINT_STATE, "joint_states", MEASUREMENT, lambda: None, ("effort", 0)
+        )
+        self.heard: list[tuple[int, float]] = []
+
+    def newest(self) -> float:
+        """Return the newest torque, N m."""
+        self.heard += [(stamp, torque) for stamp, (torque,), _ in self._mailbox.take()]
+        return self.heard[-1][1] if self.heard else 0.0
 
 
 @contextmanager
@@ -59,28 +79,32 @@ def _held_up(process: subprocess.Popen[bytes]) -> Iterator[None]:
 
 
 def to_zero(
-    outside: Outside, bench: RemoteBench, process: subprocess.Popen[bytes], file: Path
+    outside: Outside, torques: Torques, process: subprocess.Popen[bytes], file: Path
 ) -> tuple[str, str]:
     """Hold 10 N m, hold the controller up, and return what was measured and which fault it was."""
-    begun, faults = time.monotonic_ns(), file.read_text().splitlines()
+    faults = file.read_text().splitlines()
     end = time.monotonic() + LONGEST
-    _hold(outside, lambda: abs(outside.wrenches[-1][1] - 10.0) < 2.0 or time.monotonic() > end)
+    _hold(outside, lambda: torques.newest() > REACHED or time.monotonic() > end)
     if time.monotonic() > end:
         return "torque not reached", "none"
     end = time.monotonic() + LONGEST
     with _held_up(process):
         _hold(outside, lambda: len(file.read_text().splitlines()) > len(faults) or time.monotonic() > end)
         time.sleep(0.3)
+        torques.newest()
     new = file.read_text().splitlines()[len(faults) :]
     if not new:
         return "no fault", "none"
     at, _, fault = new[0].partition(" ")
-    log = [(t, goal if on else 0) for t, goal, on in bench.log(begun)["torque"]]
-    acting = [goal for t, goal in log if t <= int(at)][-1:] or [0]
-    if not acting[0]:
+    latched = int(at) + time.time_ns() - time.monotonic_ns()
+    before = [torque for stamp, torque in torques.heard if stamp <= latched]
+    if not before or abs(before[-1]) < SMALL:
         return "no torque acted any more", fault
-    zero = next((t for t, goal in log if t > int(at) and goal == 0), None)
-    return ("never" if zero is None else f"{(zero - int(at)) / 1e6:.0f}"), fault
+    after = [(stamp, torque) for stamp, torque in torques.heard if stamp > latched]
+    last = max((k for k, (_, torque) in enumerate(after) if abs(torque) > SMALL), default=-1)
+    if last + 1 >= len(after):
+        return "never", fault
+    return f"{(after[last + 1][0] - latched) / 1e6:.0f}", fault
 
 
 def _hold(outside: Outside, condition: object) -> None:
