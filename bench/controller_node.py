@@ -1,8 +1,8 @@
 """The controller node in a process of its own, with the instants at which it latches a fault written down.
 
 From SIGUSR1 on, until it comes again, HELD periods pass between taking measurements and commanding for them:
-as on a busy machine, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message out of
-shared memory holds up whoever publishes, here the driver, for a second.
+as on a busy machine, but by plan. SIGSTOP would not do: a subscriber that is stopped while it takes a message
+out of shared memory holds up whoever publishes, here the driver, for a second.
 """
 
 from __future__ import annotations

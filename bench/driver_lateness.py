@@ -90,8 +90,9 @@ def to_zero(
     end = time.monotonic() + LONGEST
     with _held_up(process):
         _hold(outside, lambda: len(file.read_text().splitlines()) > len(faults) or time.monotonic() > end)
-        time.sleep(0.3)
-        torques.newest()
+        for _ in range(30):
+            time.sleep(0.01)
+            torques.newest()
     new = file.read_text().splitlines()[len(faults) :]
     if not new:
         return "no fault", "none"
