@@ -1,11 +1,11 @@
 """Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, and the largest |ft|, which a load may not
-raise. The bare loop of the same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO where
-that is permitted: motor and sensor have processors of their own; at 1 kHz a bench that waits for one is a motor
-that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where permitted (--priority):
-the machine's other work is then out of their way, but for the kernel's worker that carries the bytes of a
-pseudo-terminal.
+raise. The bare loop of the same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO
+if that is permitted: motor and sensor have processors of their own; at 1 kHz a bench that waits for one is
+a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where permitted
+(--priority): the machine's other work is then out of their way, but for the kernel's worker that carries
+the bytes of a pseudo-terminal.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from bench.driver_lateness import Torques, noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
 from rsea_ros.hardware.peer.remote import RemoteBench
+
 
 class Kind(NamedTuple):
     """A bench: its rig, amplitude of the sine (N m), error that is asked for (%)."""
@@ -101,15 +102,17 @@ def _trial(
         faults = _faults(outside)
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
     outside.node.destroy_node()
-    name = f"{kind.name}, {rate:g} Hz, {'beside ' + str(load) + ' that burn' if load else 'quiet'}"
+    beside = f"beside {load} that burn" if load else "quiet"
+    name = f"{kind.name}, {rate:g} Hz, {beside}"
     name += (f", FIFO {priority}" if priority else "") + (", patient" if patient else "")
     own = outside.health.get("controller", {})
     share, missed = own.get("feedback_share"), own.get("missed_measurements")
     told = f"feedback at the end {share}, {own.get('late_commands')} late, {missed} measurements missed"
     told += f", faults {faults or 'none'}, bare loop late in {late:.1%} of its cycles"
     error = f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
+    told = f"{error}, {acting} writes of torque, {told}"
     return [
-        (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", f"{error}, {acting} writes of torque, {told}"),
+        (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", told),
         (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N m", f"{largest:.2f} N m"),
     ]
 

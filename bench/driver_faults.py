@@ -2,8 +2,9 @@
 
 Times are the bench's own, over the cycle's period: a machine that stalls shows in `most`. What is asked is
 judged by the driver's own cycles until it writes zero, which no machine stretches; by time where it stands
-still itself, is asked to end, or the supervisor is at work. The bench runs at SCHED_FIFO where that is permitted. Where it or this loop stood still for a cycle and the driver did not hear
-it, that is no answer to what is asked: such a run is done again, and told.
+still itself, is asked to end, or the supervisor is at work. The bench runs at SCHED_FIFO where that is
+permitted. Where it or this loop stood still for a cycle and the driver did not hear it, that is no answer
+to what is asked: such a run is done again, and told.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def test_every_model_is_on_the_bench_too_with_the_same_units():
 SMALL = Limits(2.0, deflection=math.inf, voltage=9.0, current=10.0)
 
 
-@pytest.mark.parametrize("model", [1020, 1040, 1170, 2120, 53769])
+@pytest.mark.parametrize("model", [1020, 1040, 2120])
 def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
     bench = benches(model)
     well_behaved(bench)
@@ -170,5 +170,10 @@ def test_angles_count_from_configure_or_from_the_motors_zero_with_its_homing_off
 
 
 def test_a_motor_without_a_known_constant_needs_one(benches):
-    with pytest.raises(RseaError, match="torque_constant = 0, expected N m/A: no source gives that of PM42"):
-        device_on(benches(2100), SMALL).open()
+    bench = benches(2120)
+    bench.ask("model", number=2100)
+    try:
+        with pytest.raises(RseaError, match="torque_constant = 0, expected N m/A: no source gives"):
+            device_on(bench, SMALL).open()
+    finally:
+        bench.ask("model", number=2120)
