@@ -13,12 +13,13 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 
 AXES = tuple(f"{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
-ROLES = ("torque_command", "joint_states", "ft", "desired_position")
+ROLES = ("torque_command", "joint_states", "ft", "deflection", "desired_position")
 
 FIELDS: Mapping[str, Mapping[str, str]] = {
     "torque_command": {"command": "effort"},
     "joint_states": {"position": "position", "velocity": "velocity", "motor_torque": "effort"},
     "ft": {"ft": "wrench"},
+    "deflection": {"deflection": "position"},
     "desired_position": {"reference": "position"},
 }
 """By role: the channels of the record, and the field of the message that each comes from."""
@@ -52,6 +53,8 @@ class TopicMap:
     the record. It is named like its sibling `desired_torque`, after what it asks for: `reference` says
     neither of what nor in which unit, and in ROS names a reference frame as often as a set point.
 
+    deflection is a JointState whose position is the angle of the spring by its own encoder.
+
     joint: which joint, where the messages hold several.
     axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
     Raises ParameterError for another axis, and for a name that cannot be printed.
@@ -61,6 +64,7 @@ class TopicMap:
     torque_command: str = "torque_command"
     joint_states: str = "joint_states"
     ft: str = "ft"
+    deflection: str = "deflection"
     desired_position: str = "desired_position"
     joint: str | None = None
     axis: str = "torque.z"

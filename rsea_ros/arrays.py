@@ -24,6 +24,8 @@ ALIASES: Mapping[str, str] = MappingProxyType(
         "tau_d": "ft",
         "torque": "ft",
         "q_ref": "reference",
+        "target_position": "reference",
+        "q_spring": "deflection",
     }
 )
 """Other names that people give to the channels of signals.UNITS."""

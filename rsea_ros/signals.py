@@ -25,6 +25,7 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "position": "rad",
         "velocity": "rad/s",
         "ft": "N m",
+        "deflection": "rad",
         "reference": "rad",
     }
 )
@@ -36,6 +37,8 @@ position      gear output relative to the housing
 velocity      its rate
 ft            torque of the F/T sensor about the actuator axis, positive when the spring pushes
               the distal side forward
+deflection    angle of the spring by an encoder of its own, positive when the spring pushes the distal side
+              forward
 reference     position asked for by a controller that ran during the record
 """
 
@@ -165,6 +168,11 @@ class Record:
         except KeyError:
             have = ", ".join(self.channels) or "none"
             raise ChannelError(f"{self.source}: no channel {name!r}, expected it beside: {have}") from None
+
+    @property
+    def driving(self) -> Channel | None:
+        """What drove the run: its torques, else its target positions; None where neither was recorded."""
+        return self.channels.get("command", self.channels.get("reference"))
 
     @property
     def start(self) -> float:

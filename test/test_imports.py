@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "new_files"}
+FILES = {"interrupts", "files", "staging", "new_files"}
 FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -28,7 +28,8 @@ OWN = {
     "plugins": {"errors"},
     "interrupts": set(),
     "files": {"errors", "interrupts"},
-    "new_files": {"errors", "files", "interrupts"},
+    "staging": {"errors", "files", "interrupts"},
+    "new_files": {"errors", "files", "interrupts", "staging"},
     "units": set(),
     "decimal_number": set(),
     "keys": set(),

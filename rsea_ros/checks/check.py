@@ -25,6 +25,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 
@@ -45,7 +46,9 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
     tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
     """
     with one_blas_thread(), np.errstate(all="ignore"):
-        record = bounded(record)
+        if rig.loop is not None and "reference" not in record:
+            return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
+        record = bounded(record if rig.loop is None else commanded(record, rig))
         checked = check(record, rig)
         found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
         found += [*order(record), *rates(record, rig)]
@@ -54,7 +57,27 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
             found += _against_rig(checked, rig, axis) if is_commanded(checked.record) else []
         found += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
-    return Findings(record.source, rig.name, tuple(found), faults)
+    findings = tuple(_of_targets(f) for f in found) if rig.loop is not None else tuple(found)
+    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults)
+
+
+def _no_targets(record: Record) -> Finding:
+    return Finding(
+        "red",
+        "topics",
+        "reference",
+        expected="the target positions that drove the run",
+        detail=f"only {', '.join(record.channels)}",
+        remedy="record the targets, or name their topic with --topic desired_position=…",
+    )
+
+
+def _of_targets(f: Finding) -> Finding:
+    """Return a finding about the command as one about the target positions that it is."""
+    if f.channel != "command":
+        return f
+    unit, detail = ("rad" if f.unit == "N m" else f.unit), f.detail.replace("N m", "rad")
+    return replace(f, channel="reference", unit=unit, detail=detail)
 
 
 def _topics(record: Record) -> list[Finding]:

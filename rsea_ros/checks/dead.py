@@ -39,7 +39,7 @@ def dead_channels(record: Record, rig: Rig, frozen: Collection[str] = ()) -> lis
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
 
 
-_SENSORS = ("ft", "position", "velocity", "motor_torque")
+_SENSORS = ("ft", "deflection", "position", "velocity", "motor_torque")
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:

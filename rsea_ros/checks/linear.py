@@ -18,17 +18,16 @@ from rsea_ros.identification.confidence import BLOCK
 from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import (
-    CLOCK_DOUBT,
     Unknown,
     clocks,
     start_vector,
     unknowns_of_rig,
 )
-from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import drive_of
 from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 
-TIMED = ("ft", "position", "velocity")
+TIMED = ("ft", "deflection", "position", "velocity")
 """Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
 _ROUNDS = 6
@@ -173,12 +172,6 @@ class _Setting(NamedTuple):
     values: tuple[Unknown, ...]
 
 
-def _drive(record: Record, case: Case, rig: Rig) -> Drive:
-    """Return what drives the record, as case_from makes it."""
-    in_loop = rig.controller is not None and "reference" in record
-    return drive_from(record, closed_loop=in_loop, from_rest="position" in case.floating)
-
-
 def _on_time(record: Record, start: float, timed: Sequence[str], state: _State) -> Record:
     """Return the record with the stamps that its sensors would have had without offset and drift."""
     moved = {}
@@ -224,8 +217,8 @@ class _Rows:
 def _left(setting: _Setting, state: _State) -> _Left:
     """Return what a state leaves: one simulation."""
     record = _on_time(setting.record, setting.start, setting.timed, state)
-    case = replace(setting.case, drive=_drive(record, setting.case, setting.rig))
-    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed))
+    case = replace(setting.case, drive=drive_of(record, setting.rig))
+    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
     problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
     theta = np.concatenate([state.theta, np.zeros(len(wide))])
     residual, of = problem.residual(theta), _channel_of(case, setting.timed)
@@ -303,7 +296,8 @@ def _told(setting: _Setting, rows: _Rows) -> tuple[dict[str, float], dict[str, f
         return {}, {}
     keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
     columns = rows.matrix[:, keep]
-    doubt = np.array([*(_doubt(u) for u in values), *[CLOCK_DOUBT] * m, *[np.inf] * m])
+    clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
+    doubt = np.array([*(_doubt(u) for u in values), *clock_doubts, *[np.inf] * m])
     part = columns.T @ columns + np.diag(doubt**-2.0)
     scale = np.sqrt(np.diag(part) + 1e-300)
     after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale

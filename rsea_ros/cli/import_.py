@@ -18,9 +18,13 @@ EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("file", help="measurement: .csv, .tsv (also .gz) or .mat (up to version 7)")
+    parser.add_argument(
+        "file", help="measurement: .csv, .tsv (also .gz) or .mat (up to version 7); a directory for some maps"
+    )
     parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
     parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
+    which = "which joint, from 0, of cells that hold several (name[#] in a map)"
+    parser.add_argument("--index", type=int, metavar="N", help=which)
     add_force(parser)
     parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
     add_topic_options(parser)
@@ -31,9 +35,9 @@ def run(args: argparse.Namespace) -> int:
     path = map_path(args.map)
     check_free([Path(args.out)], force=args.force, inputs=[args.file, path])
     mapping = load_map(path)
-    record = import_record(args.file, mapping)
+    record = import_record(args.file, mapping, args.index)
     write_record(record, args.out, topic_map(args), args.storage, force=args.force)
-    for line in summary(record, mapping):
+    for line in summary(record, mapping.at(args.index)):
         print(line)
     rate = next(iter(record.channels.values())).rate
     print(f"{args.out}: {record.stop - record.start:.3f} s at {rate:.1f} Hz")

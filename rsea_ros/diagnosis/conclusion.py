@@ -32,14 +32,13 @@ from rsea_ros.identification.confidence import what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.identification.unknowns import CLOCK_DOUBT
 from rsea_ros.identification.workers import Pools
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 from rsea_ros.signals import Record
 
 MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
-PRIMARY = ("ft", "position", "velocity", "motor_torque")
+PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
 """The channel that gains and verdicts speak of: the first of these that is there."""
 
 

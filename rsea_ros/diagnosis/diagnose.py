@@ -25,6 +25,7 @@ from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.steady import steadied
 from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.extent import bounded
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
@@ -47,8 +48,8 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
-    records = [bounded(r) for r in records]
-    holdout = bounded(holdout) if holdout is not None else None
+    records = [bounded(commanded(r, rig)) for r in records]
+    holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     checked, sentences = _steady([check(r, rig) for r in records], rig)

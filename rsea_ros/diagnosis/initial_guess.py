@@ -13,7 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rsea_ros.diagnosis.residual_peaks import peaks, refined, residual_of, ripples, sine_at
+from rsea_ros.diagnosis.joint_scale import joint_starts, torque_scale
+from rsea_ros.diagnosis.residual_peaks import angle_errors, peaks, refined, residual_of, ripples, sine_at
+from rsea_ros.effects.dead_zone import RAMP
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import Case
@@ -26,7 +28,11 @@ InitialGuess = dict[str, float]
 """Parameters of an effect, and values of the rig that go with them."""
 STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _GAPS = (0.1, 0.3, 0.6)
+_GAPS_OF_JOINTS = (1e-3, 3e-3, 0.01, 0.03)
+"""rad: from a good gear's to a toy servo's; the residual has a minimum of its own about each."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
+_SHOWN = 0.3
+"""Of a command: what the measured torque shows less of has not come through."""
 _STIFFER = (4.0, 9.0, 20.0)
 """Than the rig's spring what gives beside it may be: softer is told at once, stiffer hardly shows."""
 _SEGMENT = 1024
@@ -48,6 +54,8 @@ class ResidualView(NamedTuple):
 def initial_guesses(effect: Effect, seen: ResidualView) -> list[InitialGuess]:
     """Return from where fits of an effect begin; none where it has nothing to act on."""
     own = _own_starts(effect)
+    if seen.rig.loop is not None and effect.main.unit == "N m" and not _has("cycles_per_revolution")(effect):
+        return joint_starts(effect, torque_scale(seen.case, seen.rig))
     for answers, starts in _RULES:
         if answers(effect):
             return starts(effect, own, seen)
@@ -69,8 +77,30 @@ def _ripple(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list
     return [{**effect.typical, **hint} for hint in ripples(seen.case, seen.rig, seen.outputs)]
 
 
+def _eccentric(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
+    """Begin at what of the measured angle's error repeats with the rotor's angle."""
+    return [{**effect.typical, **hint} for hint in angle_errors(seen.case, seen.rig, seen.outputs)]
+
+
+def _zone(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
+    """Begin at the largest command that the measured torque does not show, N m, and at those with less."""
+    case = seen.case
+    if not isinstance(case.drive, Drive) or "motor_torque" not in case.measured:
+        return own
+    steps = np.rint(case.drive.at["motor_torque"]).astype(np.int64) - 1
+    asked = np.abs(case.drive.command[np.clip(steps, 0, len(case.drive.command) - 1)])
+    silent = asked[case.mask["motor_torque"] & (np.abs(case.measured["motor_torque"]) < _SHOWN * asked)]
+    width = (1.0 + RAMP) * float(np.max(silent, initial=0.0))
+    return [{**effect.typical, "width": width, "jump": jump} for jump in (0.0, 1.0)] if width else own
+
+
 def _play(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
-    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then."""
+    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then.
+
+    A joint travels far beside its play, whose size no travel shows.
+    """
+    if seen.rig.loop is not None:
+        return [{**effect.typical, "gap": gap} for gap in _GAPS_OF_JOINTS]
     if "position" not in seen.case.measured:
         return own
     travel, rig = float(np.ptp(seen.case.measured["position"])), seen.rig
@@ -177,7 +207,9 @@ _RULES: tuple[
     tuple[Callable[[Effect], bool], Callable[[Effect, list[InitialGuess], ResidualView], list[InitialGuess]]],
     ...,
 ] = (
+    (lambda effect: effect.port is Port.SENSOR and _has("cycles_per_revolution")(effect), _eccentric),
     (_has("cycles_per_revolution"), _ripple),
+    (_has("width"), _zone),
     (_has("gap"), _play),
     (_has("limit"), _limit),
     (_has("stiffness", "inertia"), _mode),

@@ -17,6 +17,7 @@ import numpy as np
 
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -35,12 +36,29 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
     found = missing_torque(case, rig, outputs)
     if found is None:
         return []
-    angle, torque = found[0] * rig["gear.ratio"], found[1] - np.mean(found[1])
-    cycles, power = _periodogram(angle, torque)
+    return _repeating(found[0] * rig["gear.ratio"], found[1])
+
+
+def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
+    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of what repeats most.
+
+    Of the measured angle less the simulated one.
+    """
+    if not isinstance(case.drive, Drive) or "position" not in case.measured:
+        return []
+    keep = case.mask["position"]
+    angle = train_ratio(rig) * case.measured["position"][keep]
+    return _repeating(angle, residual_of(case, outputs, "position")[keep])
+
+
+def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
+    """Return cycles per revolution, amplitude and phase of what repeats most with an angle (rad)."""
+    values = values - np.mean(values)
+    cycles, power = _periodogram(angle, values)
     seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
     power = np.where(seen & (cycles < _MOST), power, 0.0)
     at = [refined(cycles, power, k) for k in peaks(power, apart=6)]
-    return [{"cycles_per_revolution": c, **sine_at(angle, torque, c)} for c in at]
+    return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in at]
 
 
 def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -16,6 +16,7 @@ from rsea_ros.wording import listed
 
 _CHANNELS = {
     "ft": "F/T torque",
+    "deflection": "spring deflection",
     "position": "position",
     "velocity": "velocity",
     "motor_torque": "motor torque",

@@ -15,7 +15,7 @@ Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_JUDGED = ("ft", "position", "velocity")
+_JUDGED = ("ft", "deflection", "position", "velocity")
 """Channels that judge a model; the motor torque only echoes the command, and judges where no other can."""
 _TOLD = 0.5
 """Share of what is known of a value that the data must have brought for it to be identified."""

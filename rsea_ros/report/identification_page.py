@@ -20,7 +20,7 @@ from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.statics_words import statics_sentences
 from rsea_ros.signals import UNITS
 
-_ORDER = ("ft", "position", "velocity")
+_ORDER = ("ft", "deflection", "position", "velocity")
 
 
 def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:

@@ -10,6 +10,7 @@ CHANNELS = {
     "position": "position",
     "velocity": "velocity",
     "ft": "F/T torque",
+    "deflection": "spring deflection",
     "reference": "reference position",
 }
 
