@@ -97,14 +97,16 @@ def natural_frequency(rig: Rig) -> float:
 def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) -> AtRate:
     swept = robustness(clamped, loads, found)
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
+    near = following(clamped, clamped, found)
+    far = following(hard(loads), clamped, found, late=1)
     return AtRate(
         found,
         swept,
-        tuple(trials(clamped, loads, found, swept)),
+        tuple(trials(clamped, loads, found, swept, near, far)),
         tuple(compensations(clamped, found)),
-        following(clamped, clamped, found),
+        near,
         following(light, clamped, found),
-        following(hard(clamped, loads), clamped, found, late=1),
+        far,
         impedance(clamped, found.rate, found.gains, grid),
     )
 
