@@ -100,7 +100,7 @@ class TorqueController:
         self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
         self._begin = self._sent = torque
         self._known = self._learned = (0.0, 0.0)
-        self._age = 0
+        self._age, self._crossed = 0, 0.0
         self.share = Share()
 
     def step(
@@ -166,6 +166,8 @@ class TorqueController:
         """
         model = self._reference
         (torque, speed), (ft, velocity) = model.at(offset), model.at(0.0)
+        speed += self._crossed
+        velocity += self._crossed
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
         return torque - reading.ft, speed - reading.velocity, placed
 
@@ -177,7 +179,8 @@ class TorqueController:
         s, turned = self._state, reading.velocity - self._state.velocity
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist():
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
-            self.learned.hear(ft, velocity, s.applied + self._learned[0], sure=sure)
+            torque = s.applied + self._learned[0]
+            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
         share = missed / (missed + 1)
         acted = reading.motor_torque - self._known[0]
         self._state = s._replace(
@@ -204,6 +207,7 @@ class TorqueController:
             return 0.0
         way = [c.way(float(torque)) for torque in (*self._reference.promised, ahead[0], ahead[1])]
         start, stop = 0.5 * (way[2] - way[0]) / h, 0.5 * (way[3] - way[1]) / h
+        self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
     def _allowed(self) -> tuple[float, float]:

@@ -18,9 +18,9 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
 UNLIMITED = Limits(torque=1e6, slew=1e12, ramp=0.0)
-SHARES = (0.003, 0.007, 0.018, 0.035, 0.055, 0.075, 0.11, 0.16, 0.23, 0.32, 0.45)
+SHARES = (0.007, 0.018, 0.035, 0.055, 0.075, 0.11, 0.16, 0.25, 0.45)
 """Of the rate: the frequencies of the sines."""
-PERIODS, WAIT, BAND = 12.0, 1.0, 0.05
+PERIODS, WAIT, BAND = 5.0, 0.7, 0.05
 STEP = 5.0
 """N m: a step that the motor's limits hardly meet."""
 

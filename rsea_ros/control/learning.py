@@ -81,16 +81,17 @@ class Learning:
         self._parts = np.zeros(2)
         self._followed = self._expected = 0.0
 
-    def hear(self, ft: float, velocity: float, torque: float, *, sure: bool = True) -> None:
+    def hear(self, ft: float, velocity: float, torque: float, *, gap: float = 0.0, sure: bool = True) -> None:
         """Take a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
 
-        sure: whether that is surely the torque that acted; else nothing is learned from it.
+        gap: rad/s, of that velocity, with which backlash is crossed: it is no load's. sure: whether that is
+        surely the torque that acted; else nothing is learned from it.
         """
         speed, mean = 0.5 * (velocity + self._velocity), 0.5 * (ft + self._ft)
         parts = self._yielding.advance(mean)
         first, second = 0.5 * (parts + self._parts)
         rows = np.array([
-            [self._stretch.rate(ft), first, second, speed],
+            [self._stretch.rate(ft), first, second, speed - gap],
             [(velocity - self._velocity) / self._period, speed, math.tanh(speed / CREEP), torque - mean],
         ])  # fmt: skip
         self._ft, self._velocity, self._parts = ft, velocity, parts

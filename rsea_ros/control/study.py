@@ -95,7 +95,7 @@ def natural_frequency(rig: Rig) -> float:
 
 
 def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) -> AtRate:
-    swept = robustness(clamped, loads, found)
+    swept = robustness(clamped, loads, found, steps=3)
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
     near = following(clamped, clamped, found)
     far = following(hard(loads), clamped, found, late=1)
