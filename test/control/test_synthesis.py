@@ -26,7 +26,7 @@ def found():
 
 
 def test_what_is_demanded_is_kept_with_every_load(found):
-    """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the corners of the set; |Z| over the spring's at most 1.2."""
+    """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the set's corners; |Z| over the spring's at most 1.2."""
     for margin in found.margins.values():
         assert margin.sensitivity <= 2.02 and margin.phase >= 28.9 and margin.gain >= 5.95
         assert margin.delay >= 1.0
