@@ -8,9 +8,9 @@
     u_c    = friction, ripple, backlash, from the model's own motion       compensation.py
     u      = u_ff + u_fb + u_c within the limits
 
-It needs no load: a rig's ends are not looked at. What the limits take away is taken from the model too. So
-the torque that feedback asks for is always one that the motor can make, nothing winds up, and the bench comes
-back to the desired torque as fast as the limits let it. A reading that is off its place in the grid of
+It needs no load: a rig's ends are not looked at. What the limits take away from the model's torque is taken
+from the model too, and integration stops at a limit. So nothing winds up, and the bench comes back to the
+desired torque as fast as the limits let it. A reading that is off its place in the grid of
 samples is compared with the model at its own instant.
 """
 
@@ -100,7 +100,7 @@ class TorqueController:
         self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
         self._begin = self._sent = torque
         self._known = self._learned = (0.0, 0.0)
-        self._age = 0
+        self._age, self._crossed = 0, 0.0
         self.share = Share()
 
     def step(
@@ -123,23 +123,24 @@ class TorqueController:
         for wanted in self._prediction.between(desired, missed):
             self._coast(wanted)
         ahead, model = self._ahead(desired), self._reference
-        forward = model.torque(ahead)
+        low, high = self._allowed()
+        forward = min(max(model.torque(ahead), low), high)
         more, learned = model.more(forward)
+        more = min(max(more, low - forward), high - forward)
         error, slowness, reading = self._compare(reading, offset)
         self._hear(reading, missed, error, slowness, sure=trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
         known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + more + back + known + crossing
-        torque = self._within(asked)
+        torque = min(max(asked, low), high)
         if (asked - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)
-        taken = (torque - asked) * abs(forward) / max(abs(forward) + abs(more), 1e-12)
         self.share = Share(
             float(model.now[0]), forward + more, back, known + crossing, torque, torque != asked
         )
-        model.advance(forward + taken, float(ahead[0]))
+        model.advance(forward, float(ahead[0]))
         return torque
 
     def _ahead(self, desired: float) -> FloatArray:
@@ -165,6 +166,8 @@ class TorqueController:
         """
         model = self._reference
         (torque, speed), (ft, velocity) = model.at(offset), model.at(0.0)
+        speed += self._crossed
+        velocity += self._crossed
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
         return torque - reading.ft, speed - reading.velocity, placed
 
@@ -176,7 +179,8 @@ class TorqueController:
         s, turned = self._state, reading.velocity - self._state.velocity
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist():
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
-            self.learned.hear(ft, velocity, s.applied + self._learned[0], sure=sure)
+            torque = s.applied + self._learned[0]
+            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
         share = missed / (missed + 1)
         acted = reading.motor_torque - self._known[0]
         self._state = s._replace(
@@ -203,11 +207,13 @@ class TorqueController:
             return 0.0
         way = [c.way(float(torque)) for torque in (*self._reference.promised, ahead[0], ahead[1])]
         start, stop = 0.5 * (way[2] - way[0]) / h, 0.5 * (way[3] - way[1]) / h
+        self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
-    def _within(self, torque: float) -> float:
+    def _allowed(self) -> tuple[float, float]:
+        """Return the least and the largest torque that the limits let through now, N m."""
         limits, before, h = self._limits, self._sent, self._law.period
         grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
-        torque = min(max(torque, before - limits.slew * h), before + limits.slew * h)
         largest = min(limits.torque, max(abs(self._begin), limits.torque * grown))
-        return min(max(torque, -largest), largest)
+        low, high = before - limits.slew * h, before + limits.slew * h
+        return min(max(low, -largest), largest), min(max(high, -largest), largest)

@@ -39,18 +39,20 @@ CREEP = 5e-3
 """rad/s, over which the learned friction changes its sign: sharper is sharper than its estimate."""
 FLOORS = (4e-3, 0.1)
 """rad/s, N m: the least that a fit leaves, by noise and quanta of the sensors."""
-SPREADS = (np.array([0.15, 20.0, 60.0]), np.array([0.2, 0.6, 5.0]))
+SPREADS = (np.array([0.15, 20.0, 20.0]), np.array([0.2, 0.6, 5.0]))
 """Standard deviations of theta (1, 1/(kg m^2), 1/(kg m^2)); of J and b, of the rig's; of c, N m."""
+EVERY = 4
+"""Samples after which each fit is solved anew: it costs more than all the rest of a step."""
 QUICK = 0.03
-"""s: a load that stops where it turned (a foot that lands) is no longer believed after about this."""
-BELIEVED, DENIED = 0.2, 0.6
-"""Part of the load's motion, power over power, that may be missing: all is believed, nothing is."""
+"""s, in which a load is seen to have stopped: a foot that lands."""
+FOLLOWS, STOPPED = 0.1, 0.3
+"""rad/s that the load should turn by, and the part of that below which it has stopped: it is forgotten."""
 LIGHTEST = 25.0
 """1/(kg m^2): no load is taken for lighter than 1/25 kg m^2."""
 
 
 class Learning:
-    """drive: J (kg m^2), b (N m s/rad), c (N m)."""
+    """load: theta. drive: J (kg m^2), b (N m s/rad), c (N m)."""
 
     def __init__(self, rig: Rig, law: Law) -> None:
         h = law.period
@@ -64,10 +66,10 @@ class Learning:
         self._priors = [(LOCKED, 1.0 / spreads[0] ** 2), (known, 1.0 / spreads[1] ** 2)]
         self._bounds = [
             (np.array([0.8, 0.0, -LIGHTEST]), np.array([1.25, LIGHTEST, 3.0 * LIGHTEST])),
-            (np.array([0.5, 0.2, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
+            (np.array([0.5, -0.5, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
         ]
-        self._load, self.drive = LOCKED, known
-        self._moments = np.zeros((2, 4, 4))
+        self.load, self.drive = LOCKED, known
+        self._moments, self._turn = np.zeros((2, 4, 4)), 0
         self.start(0.0, 0.0)
 
     def start(self, ft: float, velocity: float) -> None:
@@ -77,35 +79,32 @@ class Learning:
         self._ft, self._velocity = ft, velocity
         self._filtered = np.zeros((4, 2, 4))
         self._parts = np.zeros(2)
-        self._missing = self._expected = 0.0
+        self._followed = self._expected = 0.0
 
-    @property
-    def load(self) -> FloatArray:
-        """theta, as far as what the gear did last agrees with it."""
-        share = self._missing / self._expected if self._expected > MOVES**2 else 0.0
-        belief = min(max((DENIED - share) / (DENIED - BELIEVED), 0.0), 1.0)
-        believed: FloatArray = LOCKED + belief * (self._load - LOCKED)
-        return believed
-
-    def hear(self, ft: float, velocity: float, torque: float, *, sure: bool = True) -> None:
+    def hear(self, ft: float, velocity: float, torque: float, *, gap: float = 0.0, sure: bool = True) -> None:
         """Take a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
 
-        sure: whether that is surely the torque that acted; else nothing is learned from it.
+        gap: rad/s, of that velocity, with which backlash is crossed: it is no load's. sure: whether that is
+        surely the torque that acted; else nothing is learned from it.
         """
         speed, mean = 0.5 * (velocity + self._velocity), 0.5 * (ft + self._ft)
         parts = self._yielding.advance(mean)
         first, second = 0.5 * (parts + self._parts)
         rows = np.array([
-            [self._stretch.rate(ft), first, second, speed],
+            [self._stretch.rate(ft), first, second, speed - gap],
             [(velocity - self._velocity) / self._period, speed, math.tanh(speed / CREEP), torque - mean],
         ])  # fmt: skip
         self._ft, self._velocity, self._parts = ft, velocity, parts
         seen = self._band(rows)
-        self._believe(seen[0])
+        if self._stopped(seen[0]):
+            self.load, self._moments[0] = LOCKED, 0.0
         if sure and max(abs(seen[0, 0]), abs(seen[0, 3])) > MOVES:
             self._moments += self._fresh * (seen[:, :, None] * seen[:, None, :] - self._moments)
-            self._load = self._solve(0, self._load)
-            self.drive = self._solve(1, self.drive)
+            self._turn = (self._turn + 1) % EVERY
+            if self._turn == 0:
+                self.load = self._solve(0, self.load)
+            elif self._turn == EVERY // 2:
+                self.drive = self._solve(1, self.drive)
 
     def _band(self, rows: FloatArray) -> FloatArray:
         """Return signals between SLOWEST and CORNER."""
@@ -118,12 +117,13 @@ class Learning:
             rows = rows - state
         return rows
 
-    def _believe(self, seen: FloatArray) -> None:
+    def _stopped(self, seen: FloatArray) -> bool:
+        """Tell whether the gear no longer turns as the torque would have its load turn."""
         quick = self._period / QUICK
-        followed = float(self._load[1:] @ seen[1:3])
-        missing = float(seen[3] - self._load @ seen[:3])
-        self._missing += quick * (missing**2 - self._missing)
-        self._expected += quick * (followed**2 - self._expected)
+        expected = float(self.load[1:] @ seen[1:3])
+        self._expected += quick * (expected**2 - self._expected)
+        self._followed += quick * (expected * float(seen[3] - self.load[0] * seen[0]) - self._followed)
+        return self._expected > FOLLOWS**2 and self._followed < STOPPED * self._expected
 
     def _solve(self, which: int, before: FloatArray) -> FloatArray:
         """Return the least squares of a fit, within its bounds."""

@@ -17,8 +17,8 @@ from scipy.linalg import expm
 
 from rsea_ros.signals import FloatArray
 
-SLOW = 2.0 * math.pi * 0.5
-"""w_1, rad/s: below 0.5 Hz the motion of the load is left to feedback."""
+SLOW = 2.0 * math.pi * 1.5
+"""w_1, rad/s: below 1.5 Hz the motion of the load is left to feedback."""
 
 LOCKED: FloatArray = np.array([1.0, 0.0, 0.0])
 

@@ -57,7 +57,7 @@ def design_of(values: Values) -> Design:
         return check(rig, loads, values["rate"], Gains(*stated))
     if any(value >= 0.0 for value in stated):
         given = ", ".join(f"{value:g}" for value in stated)
-        raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all three, or -1 for all")
+        raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all five, or -1 for all")
     names = ("sensitivity", "robust", "impedance")
     return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
 
