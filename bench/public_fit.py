@@ -6,6 +6,7 @@ numbers of its initial state, and those on the first samples only, which no scor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -43,30 +44,33 @@ def record_of(command: FloatArray, position: FloatArray, rate: float) -> Record:
     return Record({"command": Channel(t, command), "position": Channel(t, position)}, source="benchmark")
 
 
-def fitted(
+def case_of(
     rig: Rig,
     record: Record,
     skip: int,
     refine: int = REFINE,
-    iterations: int = 60,
     initial: tuple[float, float] = (0.0, 0.0),
-) -> Solution:
-    """Return the fit of all free values of a rig and its effects, by output error on position.
+) -> Case:
+    """Return a record ready to be fitted to its position.
 
     skip: samples at the start that no residual looks at: the initial state, position and velocity, decays in
     them.
     """
     mask = np.arange(len(record["position"])) >= skip
-    case = Case(
+    return Case(
         drive=replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial),
         t={"position": record["position"].t},
         measured={"position": record["position"].y},
         noise={"position": rig.sensors["position"].noise},
         mask={"position": mask},
     )
+
+
+def fitted(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
+    """Return the fit of all free values of a rig and its effects, by output error on position."""
     effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
     unknowns = (*unknowns_of_rig(rig), *(u for group in effects for u in group))
-    return solve(Problem((case,), rig, unknowns, ("position",)), iterations=iterations)
+    return solve(Problem(tuple(cases), rig, unknowns, ("position",)), iterations=iterations)
 
 
 def rig_of(solution: Solution) -> Rig:

@@ -41,6 +41,10 @@ class FrequencyResponse:
     distortion: FloatArray | None = None
 
 
+CLOCKS = ("clock.", "clock_rate.")
+"""What the names of the sensors' clocks begin with."""
+
+
 @dataclass(frozen=True)
 class ParameterEstimate:
     """A parameter in SI with its 95 % interval.
@@ -112,6 +116,6 @@ class Identification:
         """Return whether the model fits, and whether the data tell any of its values."""
         if any(not ratio <= AT_NOISE for ratio in self.times_noise.values()):
             return "misfit"
-        physical = [p for p in self.parameters if not p.name.startswith("clock.")]
+        physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
         told = any(p.told_by_data >= _TOLD for p in physical)
         return "adequate" if told or not physical else "not_identifiable"

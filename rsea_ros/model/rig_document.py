@@ -33,6 +33,8 @@ from rsea_ros.wording import shown
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
+_FASTEST = 1000.0
+"""ppm. A clock that runs faster than this counts in other units."""
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -110,7 +112,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
     body |= {"zero_unknown": True} if sensor.zero_unknown else {}
-    return body | ({"clock": {"value": sensor.clock, "unit": "s"}} if sensor.clock else {})
+    body |= {"clock": {"value": sensor.clock, "unit": "s"}} if sensor.clock else {}
+    return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -158,15 +161,18 @@ def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     return low, high
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
-    field = f"sensors.{name}.clock"
-    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
+def _clock(fields: Mapping[str, Any], name: str, key: str, unit_name: str, most: float) -> float:
+    """Return a value from `clock: {value: …, unit: s}` or its like; 0 where there is none."""
+    field = f"sensors.{name}.{key}"
+    item = mapping(fields.get(key, {"value": 0.0, "unit": unit_name}), field)
     only_keys(item, names(CLOCK), field)
-    unit(item.get("unit"), f"{field}.unit", "s")
-    value = number(item.get("value"), f"{field}.value", "s")
-    if not abs(value) < _LATEST:
-        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
+    unit(item.get("unit"), f"{field}.unit", unit_name)
+    value = number(item.get("value"), f"{field}.value", unit_name)
+    if not abs(value) < most:
+        raise RigError(
+            f"{field}.value = {value:g} {unit_name}, expected less than {most:g} {unit_name} either way",
+            field,
+        )
     return value
 
 
@@ -185,8 +191,11 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
                 f"sensors.{name}",
             )
-        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, clock)
+        floating = switch(fields, f"sensors.{name}.zero_unknown")
+        clock = _clock(fields, name, "clock", "s", _LATEST)
+        sensors[name] = Sensor(
+            noise, quantum, floating, clock, _clock(fields, name, "clock_rate", "ppm", _FASTEST)
+        )
     return sensors
 
 

@@ -76,8 +76,9 @@ SENSOR = (
     Key("source", "text", "empty", "where the values come from"),
     Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
+    Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "by how much later still with time"),
 )
-CLOCK = (Key("value", "number", NEEDED), Key("unit", "s", NEEDED))
+CLOCK = (Key("value", "number", NEEDED), Key("unit", "s or ppm", NEEDED))
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N m s/rad, >= 0", NEEDED),
