@@ -2,7 +2,7 @@
 
 With c = d r / d clock, the other unknowns projected out of it, and r the weighted residual without the clock,
 
-    z = sum_b s_b / sqrt(max(sum_b s_b^2, c'c)),   s_b = c_b' r_b of blocks of one second
+    z = c'r / sqrt(max(sum_b s_b^2, c'c)),   s_b = c_b' (r_b - c_b c'r / c'c) of blocks of one second
 
 is a standard normal where the clock is right (score test; blocks as in confidence.py). A clock that is not
 asked for is taken as right: free, it takes the place of damping, for a late F/T sensor looks like more b_m.
@@ -24,6 +24,8 @@ from rsea_ros.signals import FloatArray, IntArray
 
 ASKED = 3.5
 """Standard deviations from which a clock is asked for: one of six in 360 records where all are right."""
+KEPT = 2.0
+"""Standard deviations from right, below which a clock that was asked for is taken as right after all."""
 MISFIT = 1.3
 """RMS of what clocks leave over the noise, above which something else is wrong and the rate of one stands in
 for it."""
@@ -51,7 +53,7 @@ class Asked:
 
 
 def asked_of(solution: Solution, run: Map = serial) -> Asked:
-    """Return the clocks that a fit without any must move, offsets and rates: none that the others spare."""
+    """Return the clocks that a fit without any must move, offsets and rates."""
     problem = solution.problem
     if is_inverse(problem.rig):
         return Asked()
@@ -65,10 +67,6 @@ def asked_of(solution: Solution, run: Map = serial) -> Asked:
         if max(z) < ASKED:
             break
         taken.append(rest[int(np.argmax(z))])
-    for i in tuple(taken[:-1]):
-        beside = [k for k in taken if k != i]
-        if _score(solution, columns, [*beside, i], left, blocks) < ASKED:
-            taken = beside
     if _left_over(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
         taken = [i for i in taken if not left[i].is_rate]
     others = [i for i, c in enumerate(left) if not c.is_rate and i not in taken]
@@ -83,6 +81,18 @@ def freed(solution: Solution, asked: Asked) -> tuple[Problem, FloatArray]:
     return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])
 
 
+def without_needless(solution: Solution) -> tuple[Problem, FloatArray]:
+    """Return the problem of a fit without clocks that it leaves near enough to right, and where it is."""
+    problem, prior = solution.problem, np.diag([u.doubt**-2 for u in solution.problem.unknowns])
+    sd = np.sqrt(np.diag(np.linalg.pinv(solution.jacobian.T @ solution.jacobian + prior, hermitian=True)))
+    kept = [
+        i
+        for i, (u, theta) in enumerate(zip(problem.unknowns, solution.theta, strict=True))
+        if not u.is_clock or abs(theta) > KEPT * sd[i]
+    ]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in kept)), solution.theta[kept]
+
+
 def _score(
     solution: Solution, columns: FloatArray, which: Sequence[int], left: Sequence[Unknown], blocks: IntArray
 ) -> float:
@@ -95,9 +105,11 @@ def _score(
     clocked = base[:, solution.jacobian.shape[1] :]
     slope = np.concatenate([np.zeros(solution.jacobian.shape[1]), clocked.T @ solution.residual])
     residual = solution.residual - base @ np.linalg.lstsq(normal, slope, rcond=None)[0]
-    scores = np.bincount(blocks, column * residual)
-    variance = max(float(scores @ scores), float(column @ column))
-    return abs(float(scores.sum())) / np.sqrt(variance) if variance > 0.0 else 0.0
+    slope, information = float(column @ residual), float(column @ column)
+    if information == 0.0:
+        return 0.0
+    scores = np.bincount(blocks, column * (residual - column * slope / information))
+    return abs(slope) / float(np.sqrt(max(scores @ scores, information)))
 
 
 def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
-from rsea_ros.identification.clocks import Asked, asked_of, freed
+from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
 from rsea_ros.identification.confidence import (
     Confidence,
     confidence_of,
@@ -87,7 +87,11 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
-    return replace(result, statements=(*steady.sentences, *asked.sentences, *result.statements))
+    return replace(
+        result,
+        statements=(*steady.sentences, *result.statements),
+        notes=(*result.notes, *asked.sentences),
+    )
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
@@ -148,6 +152,7 @@ def fit(
     asked = asked_of(solution, run)
     if asked.clocks:
         solution = solve(*freed(solution, asked), run=run)
+        solution = solve(*without_needless(solution), run=run)
         problem = solution.problem
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(problem, outputs)
