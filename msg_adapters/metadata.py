@@ -11,14 +11,13 @@ import yaml
 
 from msg_adapters import yaml_text
 from msg_adapters.contents import Contents
+from msg_adapters.remarks import Remarks, remarks_of
 from rsea_ros.errors import BagError
 from rsea_ros.wording import brief
 
 NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
-NOTES = "rsea_notes"
 VERSION = 9
-_LONGEST_NOTE, _MOST_NOTES = 500, 50
 
 
 @dataclass
@@ -33,11 +32,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class Known:
-    """What the metadata of a bag say: its files, how many messages each topic has, and notes."""
+    """What the metadata of a bag say: its files, how many messages each topic has, and remarks."""
 
     files: list[Path] = field(default_factory=list)
     counts: Mapping[str, int] = field(default_factory=dict)
-    notes: Sequence[str] = ()
+    remarks: Remarks = field(default_factory=Remarks)
 
 
 def known(bag: Path, contents: Contents) -> Known:
@@ -75,9 +74,7 @@ def _known(bag: Path, document: Any) -> Known:
     ]
     counts = {_text_of(name): int(topic["message_count"]) for name, topic in topics}
     custom = root.get("custom_data")
-    notes = custom.get(NOTES, "") if isinstance(custom, dict) else ""
-    lines = [brief(line, _LONGEST_NOTE) for line in _text_of(notes).splitlines()]
-    return Known(files, counts, lines[:_MOST_NOTES])
+    return Known(files, counts, remarks_of(custom if isinstance(custom, dict) else {}))
 
 
 def _text_of(value: Any) -> str:
@@ -93,7 +90,7 @@ def _list_of(value: Any) -> list[Any]:
 
 
 def text(
-    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], notes: Sequence[str]
+    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], remarks: Remarks
 ) -> str:
     """Return the metadata of a bag of one file; span is its first and last log time, ns."""
     document: Mapping[str, Any] = {
@@ -105,7 +102,7 @@ def text(
         "compression_mode": "",
         "relative_file_paths": [file.name],
         "files": [{"path": file.name, **_amount(topics, span)}],
-        "custom_data": {NOTES: "\n".join(notes)} if notes else None,
+        "custom_data": remarks.texts() or None,
         "ros_distro": "rsea_ros",
     }
     return str(yaml.safe_dump({ROOT: document}, sort_keys=False))

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linear import Linear, Number
-from rsea_ros.identification.unknowns import CLOCK_DOUBT
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""

@@ -7,7 +7,7 @@ import numpy as np
 from rsea_ros.checks.motion import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
-from rsea_ros.signals import Channel, Record
+from rsea_ros.signals import UNITS, Channel, Record
 
 SHORTEST = 4.0
 """s of commands: four blocks of every set (diagnosis/data_split.py) of a quarter of a second each."""
@@ -15,7 +15,8 @@ SHORTEST = 4.0
 
 def check_diagnosable(record: Record) -> None:
     """Raise IdentificationError for a record without commands, too short, without motion or in reverse."""
-    if "command" not in record:
+    driving = record.driving
+    if driving is None:
         have = ", ".join(record.channels) or "nothing"
         raise IdentificationError(
             f"{record.source}: no command, expected the torques that drove the run beside {have}"
@@ -25,7 +26,7 @@ def check_diagnosable(record: Record) -> None:
             raise IdentificationError(
                 f"{record.source}: {name}: {len(channel)} samples, expected rising stamps"
             )
-    length = float(np.ptp(record["command"].t))
+    length = float(np.ptp(driving.t))
     if length < SHORTEST:
         raise IdentificationError(
             f"{record.source}: {length:.3g} s of commands, expected {SHORTEST:g} s or more"
@@ -42,11 +43,12 @@ def check_diagnosable(record: Record) -> None:
 
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
-    command = record.channels.get("command")
+    command = record.driving
     if command is None or not len(command) or not _constant(command) or not is_still(record):
         return
+    unit = UNITS["command" if "command" in record else "reference"]
     raise IdentificationError(
-        f"{record.source}: the command stays at {command.y[0]:g} N m and nothing moves, "
+        f"{record.source}: the command stays at {command.y[0]:g} {unit} and nothing moves, "
         "expected a run in which the command excites the machine"
     )
 

@@ -1,4 +1,4 @@
-"""Pruning: no cause stays that the others make needless, or that a simpler or likelier one replaces."""
+"""Backward elimination: no cause stays that the others make redundant, or that a simpler one replaces."""
 
 from __future__ import annotations
 
@@ -6,132 +6,150 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from rsea_ros.diagnosis.candidate import Model, effect_size, fitted
-from rsea_ros.diagnosis.criteria import is_far, is_likelier
-from rsea_ros.diagnosis.initial_guess import Seen, starts_of
-from rsea_ros.diagnosis.judge import compare
-from rsea_ros.diagnosis.screening import reduced, screen
-from rsea_ros.diagnosis.stepwise import Search
-from rsea_ros.diagnosis.trial import Trial, trial_of
-from rsea_ros.diagnosis.workers import Workers
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_candidate
+from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
+from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
+from rsea_ros.diagnosis.screening import screen, without_effect
+from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
 
-def pruned(found: Search, effects: Sequence[Effect], at_work: Workers) -> Search:
-    """Return the search with no cause more than the data need, and its models as they nest."""
-    smaller = Smaller(found.cases, effects, at_work)
-    return sequenced(with_better(without_needless(found, smaller), smaller), smaller)
+def eliminate_backwards(
+    selection: Selection, effects: Sequence[Effect], pools: Pools, settings: DiagnosisSettings
+) -> Selection:
+    """Return the selection with no cause more than the data need, and its models as they nest."""
+    models = ReducedModels(effects, pools, settings)
+    selection = without_redundant(selection, models)
+    selection = with_replacements(selection, models)
+    return nested_sequence(selection, models)
 
 
 @dataclass(frozen=True)
-class Smaller:
+class ReducedModels:
     """Fits models again without one of their causes, or with another in its place; each only once."""
 
-    cases: tuple[Case, ...]
     effects: Sequence[Effect]
-    at_work: Workers
-    known: dict[tuple[str, ...], dict[str, Model]] = field(default_factory=dict)
+    pools: Pools
+    settings: DiagnosisSettings
+    fitted: dict[tuple[str, ...], dict[str, Candidate]] = field(default_factory=dict)
 
-    def without(self, model: Model) -> dict[str, Model]:
+    def without(self, model: Candidate) -> dict[str, Candidate]:
         """Return by cause the model without it."""
-        if model.causes not in self.known:
-            found = self.at_work.fits.map(partial(self._less, model), model.causes)
-            self.known[model.causes] = dict(zip(model.causes, found, strict=True))
-        return self.known[model.causes]
+        if model.causes not in self.fitted:
+            models = self.pools.fits.map(partial(self._without, model), model.causes)
+            self.fitted[model.causes] = dict(zip(model.causes, models, strict=True))
+        return self.fitted[model.causes]
 
-    def with_rivals(self, model: Model) -> list[tuple[str, str, Model]]:
+    def with_rivals(self, model: Candidate) -> list[tuple[str, str, Candidate]]:
         """Return cause, another effect that it is said to be confused with, and the model with that.
 
         The other is simpler, or as simple where the choice between them was made without the other causes
         and the model is near the floor: far from it priors say nothing.
         """
-        as_simple = len(model.causes) > 1 and not is_far(model)
+        as_simple = len(model.causes) > 1 and not self._is_far(model)
         pairs = [
             (name, rival)
             for name in model.causes
             for rival in look_alikes(name, self.effects)
-            if rival.name not in model.causes and effect_size(rival.name) < effect_size(name) + as_simple
+            if rival.name not in model.problem.acting
+            and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
-        found = self.at_work.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
-        return [(name, rival.name, m) for (name, rival), m in zip(pairs, found, strict=True) if m is not None]
+        models = self.pools.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
+        return [
+            (name, rival.name, m) for (name, rival), m in zip(pairs, models, strict=True) if m is not None
+        ]
 
-    def _less(self, model: Model, name: str) -> Model:
+    def is_needed(self, model: Candidate, without: Candidate) -> bool:
+        """Tell whether a model is better than one without a cause of it, or with another in its place."""
+        extra, rule = model.parameters - without.parameters, self.settings.acceptance
+        return preference(model.validation, without.validation, extra, rule).better
+
+    def _without(self, model: Candidate, name: str) -> Candidate:
         """Fit a model again without one of its causes."""
-        return self._fitted(model, *reduced(model.solution.problem, model.solution.theta, name))
+        return self._fit(model, *without_effect(model.problem, model.solution.theta, name))
 
-    def _with(self, model: Model, rest: Model, name: str, rival: Effect) -> Model | None:
+    def _with(self, model: Candidate, rest: Candidate, name: str, rival: Effect) -> Candidate | None:
         """Fit a model again with a rival, of the same size where that is one, in the place of a cause."""
-        old, there = effect_named(name).main, rest.solution
+        old, solution = effect_named(name).main, rest.solution
         same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
-        rig, _ = apply(there.problem.rig, there.problem.unknowns, there.theta)
-        starts = starts_of(rival, Seen(self.cases[0], rig, rest.outputs[0]))
-        starts += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
-        begun = screen(there, rival, starts)
-        return None if begun is None else self._fitted(model, begun.problem, begun.theta)
+        rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
+        guesses = initial_guesses(rival, ResidualView(model.cases[0], rig, rest.outputs[0]))
+        guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
+        screened = screen(solution, rival, guesses)
+        return None if screened is None else self._fit(model, screened.problem, screened.theta)
 
-    def _fitted(self, model: Model, problem: Problem, theta: FloatArray) -> Model:
-        """Fit what is left or made of a model as that was."""
-        run, far = self.at_work.run, is_far(model)
-        return fitted(self.cases, problem, theta, weights=model.choose, run=run, quick=far)
+    def _fit(self, model: Candidate, problem: Problem, theta: FloatArray) -> Candidate:
+        """Fit a problem as a model was fitted from which it was made."""
+        setup = FitSetup(model.cases, self.settings.fits, self.pools.run, model.validation)
+        return fit_candidate(replace(setup, is_quick=self._is_far(model)), problem, theta)
+
+    def _is_far(self, model: Candidate) -> bool:
+        return is_far_from_floor(model, self.settings)
 
 
-def without_needless(found: Search, smaller: Smaller) -> Search:
+def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
     """Take out every accepted cause without which the others do as well."""
-    last = found.last
-    for name, rest in smaller.without(last).items() if len(last.causes) > 1 else ():
-        if not compare(last.choose, rest.choose, last.parameters - rest.parameters).better:
-            trial = trial_of(last, name, rest, "not needed beside the other causes")
-            return without_needless(_replaced(found, rest, trial), smaller)
-    return found
+    last = selection.last
+    for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
+        if not models.is_needed(last, rest):
+            trial = trial_of(last, name, rest, "redundant")
+            return without_redundant(_replaced(selection, rest, trial), models)
+    return selection
 
 
-def with_better(found: Search, smaller: Smaller) -> Search:
+def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
     """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
-    last = found.last
-    for name, rival, other in smaller.with_rivals(last):
-        if compare(last.choose, other.choose, last.parameters - other.parameters).better:
+    last = selection.last
+    for name, rival, other in models.with_rivals(last):
+        if models.is_needed(last, other):
             continue
-        without = smaller.without(last)[name]
+        without = models.without(last)[name]
         if other.size < last.size:
-            why = f"no better than {rival}, which is simpler"
-            return with_better(_replaced(found, other, trial_of(last, name, without, why)), smaller)
-        if is_likelier(other, last):
-            why = f"no better than {rival}, which needs less of what is known beforehand"
-            swapped = _replaced(found, other, trial_of(last, name, without, why))
-            equal = _sorted(last, [*(c for c in last.causes if c != name), name])
-            return with_better(replace(swapped, rivals={**found.rivals, rival: (equal,)}), smaller)
-    return found
+            trial = trial_of(last, name, without, "no_better_than_simpler", rival)
+            return with_replacements(_replaced(selection, other, trial), models)
+        if costs_priors_less(other, last, models.settings):
+            trial = trial_of(last, name, without, "no_better_than_likelier", rival)
+            swapped = _replaced(selection, other, trial)
+            equal = _ordered(last, [*(c for c in last.causes if c != name), name])
+            rivals = {**selection.rivals, rival: (equal,)}
+            return with_replacements(replace(swapped, rivals=rivals), models)
+    return selection
 
 
-def sequenced(found: Search, smaller: Smaller) -> Search:
-    """Return the search with its models as they nest: from all causes back, what tells least goes first."""
-    models = [found.last]
-    while len(models[-1].causes) > 1:
-        largest = models[-1]
-        rests = smaller.without(largest).values()
-        models.append(min(rests, key=lambda m: float(m.choose.loss(largest.choose).sum())))
-    nominal = [found.models[0]] if found.last.causes else []
-    return replace(found, models=(*nominal, *_in_order(list(reversed(models)))))
+def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
+    """Return the selection with nested models: from all causes back, the least useful goes first."""
+    nested = [selection.last]
+    while len(nested[-1].causes) > 1:
+        largest = nested[-1]
+        rests = models.without(largest).values()
+        nested.append(min(rests, key=lambda m: float(m.validation.loss(largest.validation).sum())))
+    nominal = [selection.models[0]] if selection.last.causes else []
+    return replace(selection, models=(*nominal, *_in_order(list(reversed(nested)))))
 
 
-def _in_order(models: list[Model]) -> list[Model]:
+def _in_order(models: list[Candidate]) -> list[Candidate]:
     """Return nested models with the effects of each rig in the order in which they come in."""
     order: list[str] = []
     for m in models:
         order += [name for name in m.causes if name not in order]
-    return [_sorted(m, order) for m in models]
+    return [_ordered(m, order) for m in models]
 
 
-def _sorted(model: Model, order: Sequence[str]) -> Model:
-    problem = model.solution.problem
-    rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: order.index(e.name)))
+def _ordered(model: Candidate, order: Sequence[str]) -> Candidate:
+    """Return a model with its causes in an order, after the effects that the rig states."""
+    problem = model.problem
+    stated = [name for name in problem.acting if name in problem.stated]
+    place = {name: k for k, name in enumerate([*stated, *order])}
+    rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: place[e.name]))
     return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig)))
 
 
-def _replaced(found: Search, last: Model, trial: Trial) -> Search:
-    return replace(found, models=(found.models[0], last), trials=(*found.trials, trial))
+def _replaced(selection: Selection, last: Candidate, trial: Trial) -> Selection:
+    return replace(selection, models=(selection.models[0], last), trials=(*selection.trials, trial))

@@ -1,4 +1,4 @@
-"""Stages: the accepted models one after another, re-fitted on all that does not judge, and judged."""
+"""Evaluation: the accepted models, each re-fitted on all blocks but the test blocks and scored on those."""
 
 from __future__ import annotations
 
@@ -6,48 +6,67 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from rsea_ros.checks.faults import Checked
-from rsea_ros.diagnosis.candidate import Model, fitted, rescored
-from rsea_ros.diagnosis.data_split import CHOOSE, FIT, JUDGE, Score, score, score_on
-from rsea_ros.diagnosis.stepwise import Search
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
+from rsea_ros.diagnosis.score import Score, score, score_on
+from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import case_from, simulated
-from rsea_ros.identification.solver import Map, Solution
+from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.workers import Pools
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-_GAIN = 1e-6
-"""Relative fall of the cost, at the noise, below which a fit is done."""
-
 
 @dataclass(frozen=True)
-class Stage:
-    """A model of the accepted sequence, re-fitted on all blocks but those that judge, and judged there."""
+class Evaluated:
+    """A model of the selection as it is reported.
+
+    train: its score on the blocks that it was fitted to. test: on the test blocks, or on the held-out record.
+    """
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
     train: Score
-    judged: Score
+    test: Score
 
     @cached_property
     def confidence(self) -> Confidence:
-        """How sure the fit is."""
+        """The doubt that is left of the fit's values."""
         return confidence_of(self.solution)
 
 
-def judged(found: Search, chosen: Model, judging: Checked | None, rig: Rig, run: Map) -> Stage:
-    """Re-fit a model on all that does not judge, and judge it."""
-    start, weights = chosen.solution, rescored(found.cases, chosen).choose
-    places = (*FIT, *CHOOSE)
-    model = fitted(found.cases, start.problem, start.theta, places, weights=weights, gain=_GAIN, run=run)
-    problem = model.solution.problem
-    train = score_on(problem, found.cases, places, model.outputs)
-    if judging is None:
-        on_judge = score_on(problem, found.cases, JUDGE, model.outputs)
-        return Stage(model.solution, model.outputs, train, on_judge)
-    case = replace(case_from(judging.record, rig, judging.masked), noise=found.cases[0].noise)
-    moved, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
-    moved = in_phase(moved, judging.record)
-    outputs = simulated((case,), moved, offsets, ride=problem.ride)
-    return Stage(model.solution, model.outputs, train, score(problem, (case,), outputs))
+def evaluate(
+    selection: Selection,
+    chosen: Candidate,
+    holdout: Checked | None,
+    pools: Pools,
+    settings: DiagnosisSettings,
+) -> Evaluated:
+    """Re-fit a model to the training and validation blocks, and score it on the test blocks.
+
+    holdout: a record that takes the place of the test blocks.
+    """
+    cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
+    setup = FitSetup(
+        cases, settings.fits, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
+    )
+    model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
+    train = score_on(model.problem, cases, blocks, model.outputs)
+    if holdout is None:
+        test = score_on(model.problem, cases, TEST, model.outputs)
+    else:
+        test = _score(model, holdout, selection.models[0].problem.rig)
+    return Evaluated(model.solution, model.outputs, train, test)
+
+
+def _score(model: Candidate, holdout: Checked, nominal: Rig) -> Score:
+    """Return the score of a model on all of a held-out record."""
+    problem = model.problem
+    case = replace(case_from(holdout.record, nominal, holdout.masked), noise=model.cases[0].noise)
+    rig, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
+    outputs = simulated((case,), in_phase(rig, holdout.record), offsets, ride=problem.ride)
+    return score(problem, (case,), outputs)

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy import signal
 
-from rsea_ros.diagnosis.missing_torque import angle_errors, residual_of, ripples
-from rsea_ros.diagnosis.residual_peaks import peaks, refined, sine_at
+from rsea_ros.diagnosis.joint_scale import joint_starts, torque_scale
+from rsea_ros.diagnosis.residual_peaks import angle_errors, peaks, refined, residual_of, ripples, sine_at
 from rsea_ros.effects.dead_zone import RAMP
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
@@ -24,10 +24,12 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-Start = dict[str, float]
+InitialGuess = dict[str, float]
 """Parameters of an effect, and values of the rig that go with them."""
 STIFFNESS, INERTIA, DAMPING = "spring.stiffness", "rotor.reflected_inertia", "rotor.reflected_damping"
 _GAPS = (0.1, 0.3, 0.6)
+_GAPS_OF_JOINTS = (1e-3, 3e-3, 0.01, 0.03)
+"""rad: from a good gear's to a toy servo's; the residual has a minimum of its own about each."""
 _LIMITS = (0.95, 0.85, 0.7, 0.5)
 _SHOWN = 0.3
 """Of a command: what the measured torque shows less of has not come through."""
@@ -37,7 +39,7 @@ _SEGMENT = 1024
 _APART = 12
 
 
-class Seen(NamedTuple):
+class ResidualView(NamedTuple):
     """What there is to see: a case, the rig as it is fitted so far, and what that gives for each channel."""
 
     case: Case
@@ -49,16 +51,18 @@ class Seen(NamedTuple):
         return residual_of(self.case, self.outputs, channel)
 
 
-def starts_of(effect: Effect, seen: Seen) -> list[Start]:
+def initial_guesses(effect: Effect, seen: ResidualView) -> list[InitialGuess]:
     """Return from where fits of an effect begin; none where it has nothing to act on."""
     own = _own_starts(effect)
+    if seen.rig.loop is not None and effect.main.unit == "N m" and not _has("cycles_per_revolution")(effect):
+        return joint_starts(effect, torque_scale(seen.case, seen.rig))
     for answers, starts in _RULES:
         if answers(effect):
             return starts(effect, own, seen)
     return own
 
 
-def _own_starts(effect: Effect) -> list[Start]:
+def _own_starts(effect: Effect) -> list[InitialGuess]:
     """Return the typical values, then each parameter's others beside them, of both signs if there are two."""
     starts = [dict(effect.typical)]
     for p in effect.parameters:
@@ -68,17 +72,17 @@ def _own_starts(effect: Effect) -> list[Start]:
     return starts
 
 
-def _ripple(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _ripple(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at what repeats with the rotor's angle; without that there is no ripple."""
     return [{**effect.typical, **hint} for hint in ripples(seen.case, seen.rig, seen.outputs)]
 
 
-def _eccentric(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _eccentric(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at what of the measured angle's error repeats with the rotor's angle."""
     return [{**effect.typical, **hint} for hint in angle_errors(seen.case, seen.rig, seen.outputs)]
 
 
-def _zone(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _zone(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at the largest command that the measured torque does not show, N m, and at those with less."""
     case = seen.case
     if not isinstance(case.drive, Drive) or "motor_torque" not in case.measured:
@@ -90,8 +94,13 @@ def _zone(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return [{**effect.typical, "width": width, "jump": jump} for jump in (0.0, 1.0)] if width else own
 
 
-def _play(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
-    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then."""
+def _play(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
+    """Begin also at shares of the travel, rad; a spring that is nearly unknown is as much stiffer then.
+
+    A joint travels far beside its play, whose size no travel shows.
+    """
+    if seen.rig.loop is not None:
+        return [{**effect.typical, "gap": gap} for gap in _GAPS_OF_JOINTS]
     if "position" not in seen.case.measured:
         return own
     travel, rig = float(np.ptp(seen.case.measured["position"])), seen.rig
@@ -101,7 +110,7 @@ def _play(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return own + [{**effect.typical, **hint} for hint in hints]
 
 
-def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _limit(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at the largest torque measured, and at shares of what is asked, N m."""
     if not isinstance(seen.case.drive, Drive):
         return own
@@ -112,7 +121,7 @@ def _limit(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return [{**effect.typical, "limit": limit} for limit in limits]
 
 
-def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _mode(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin with a part on a spring of its own, its mode at the highest peak of each channel.
 
     The rig's spring is stiffer then: both in series are what the fit without the effect knows.
@@ -135,7 +144,7 @@ def _mode(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     ] or own
 
 
-def _train(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _train(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin with less inertia and damping where a gear train gives between rotor and spring.
 
     The rotor moves 1 + K_s / stiffness as far as the spring: the fit without it takes that for more of both.
@@ -147,7 +156,7 @@ def _train(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return starts
 
 
-def _torque_constant(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _torque_constant(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at the torque constant, relative to the believed one, that the measured torque tells.
 
     The motion is the same when all that the motor works against is as much larger.
@@ -163,7 +172,7 @@ def _torque_constant(effect: Effect, own: list[Start], seen: Seen) -> list[Start
     return [{**effect.typical, effect.main.name: gain, **{n: gain * seen.rig[n] for n in seen.rig.free()}}]
 
 
-def _line(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
+def _line(effect: Effect, own: list[InitialGuess], seen: ResidualView) -> list[InitialGuess]:
     """Begin at lines in the spectrum of the channel that an effect claims, a sine with its size and phase."""
     channel = effect.claims.channel if effect.claims.channel in seen.outputs else next(iter(seen.outputs))
     names = {p.name for p in effect.parameters}
@@ -176,7 +185,7 @@ def _line(effect: Effect, own: list[Start], seen: Seen) -> list[Start]:
     return starts or own
 
 
-def _lines(seen: Seen, channel: str, sine: bool) -> list[float]:
+def _lines(seen: ResidualView, channel: str, sine: bool) -> list[float]:
     """Return the highest peaks of a channel's residual, Hz. sine: as sharp as the record is long."""
     t, residual = seen.case.t[channel], seen.residual(channel)
     rate = 1.0 / float(np.median(np.diff(t)))
@@ -194,7 +203,10 @@ def _has(*names: str) -> Callable[[Effect], bool]:
     return lambda effect: set(names) <= {p.name for p in effect.parameters}
 
 
-_RULES: tuple[tuple[Callable[[Effect], bool], Callable[[Effect, list[Start], Seen], list[Start]]], ...] = (
+_RULES: tuple[
+    tuple[Callable[[Effect], bool], Callable[[Effect, list[InitialGuess], ResidualView], list[InitialGuess]]],
+    ...,
+] = (
     (lambda effect: effect.port is Port.SENSOR and _has("cycles_per_revolution")(effect), _eccentric),
     (_has("cycles_per_revolution"), _ripple),
     (_has("width"), _zone),

@@ -1,6 +1,6 @@
 """The next experiment: the cheapest run that would tell rivals apart, found by simulating them.
 
-Each candidate excitation is played to the accepted model; the rival, with all that it may move, is fitted to
+Each option excitation is played to the accepted model; the rival, with all that it may move, is fitted to
 that (one linearised step), and what it cannot follow is held against the sensors' noise.
 """
 
@@ -29,7 +29,7 @@ _ENOUGH = 0.5
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ExcitationOption:
     """An excitation that could be run: kind, amplitude relative to the present one, band."""
 
     kind: str
@@ -43,8 +43,8 @@ class Candidate:
         return self.relative * (1.0 + 0.1 * math.log10(self.high / self.low))
 
 
-CANDIDATES = tuple(
-    Candidate(kind, relative, low, high)
+EXCITATIONS = tuple(
+    ExcitationOption(kind, relative, low, high)
     for relative in (0.25, 0.5, 1.0, 1.5)
     for kind, low, high in (
         ("steps", 0.1, 10.0),
@@ -59,24 +59,24 @@ CANDIDATES = tuple(
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
     """Return the cheapest run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
-    names = listed([r.problem.rig.effects[-1].name for r in rivals])
-    cause = accepted.problem.rig.effects[-1].name
+    names = listed([r.problem.added[-1] for r in rivals])
+    cause = accepted.problem.added[-1]
     if not isinstance(case.drive, Drive):
         return Experiment(
             f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {}
         )
     present = float(np.max(np.abs(case.drive.command)))
     tried = []
-    for candidate in sorted(CANDIDATES, key=lambda c: c.cost):
-        told = min(_separation(accepted, rival, candidate, present, rate) for rival in rivals)
-        tried.append((told, candidate))
+    for option in sorted(EXCITATIONS, key=lambda c: c.cost):
+        told = min(_separation(accepted, rival, option, present, rate) for rival in rivals)
+        tried.append((told, option))
         if told > _ENOUGH:
             break
     told, best = max(tried, key=lambda item: item[0])
     return _worded(cause, names, told, best, present)
 
 
-def _worded(cause: str, names: str, told: float, best: Candidate, present: float) -> Experiment:
+def _worded(cause: str, names: str, told: float, best: ExcitationOption, present: float) -> Experiment:
     run: dict[str, float | str] = {
         "kind": best.kind,
         "amplitude": round(best.relative * present, 3),
@@ -101,30 +101,30 @@ def _worded(cause: str, names: str, told: float, best: Candidate, present: float
 
 
 def _separation(
-    accepted: Solution, rival: Solution, candidate: Candidate, present: float, rate: float
+    accepted: Solution, rival: Solution, option: ExcitationOption, present: float, rate: float
 ) -> float:
     """Return what a rival cannot follow of the accepted model under an excitation, over the noise."""
     try:
-        case = _played(accepted, candidate, candidate.relative * present, rate)
+        case = _played(accepted, option, option.relative * present, rate)
     except RseaError:
         return 0.0
     problem = replace(rival.problem, cases=(case,))
     return _left_over(problem, rival.theta)
 
 
-def _played(accepted: Solution, candidate: Candidate, amplitude: float, rate: float) -> Case:
+def _played(accepted: Solution, option: ExcitationOption, amplitude: float, rate: float) -> Case:
     """Return a case whose measurements are the accepted model's own, without noise."""
     settings = Settings(
         rate=rate,
         duration=_DURATION,
         amplitude=0.5 * amplitude,
         noise=0.2 * amplitude,
-        low=candidate.low,
-        high=min(candidate.high, 0.45 * rate),
+        low=option.low,
+        high=min(option.high, 0.45 * rate),
         period=4.0,
         seed=7,
     )
-    values = excitation(candidate.kind, settings)
+    values = excitation(option.kind, settings)
     values = values * min(1.0, amplitude / float(np.max(np.abs(values))))
     t = np.arange(len(values)) / rate
     old = accepted.problem.cases[0]

@@ -24,7 +24,7 @@ _STEPS = 2
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class ScreenedEffect:
     """An effect beside the present model, with where a full fit would begin and the cost already reached."""
 
     effect: Effect
@@ -38,19 +38,19 @@ class Hypothesis:
         return self.effect.name
 
 
-def reduced(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
+def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
     """Return a problem without one of its effects, and theta without its parameters."""
     keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
     return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
 
 
-def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> Hypothesis | None:
+def screen(present: Solution, effect: Effect, starts: Sequence[dict[str, float]]) -> ScreenedEffect | None:
     """Return the best of an effect's starts after two cheap steps; None for an effect the rig cannot have.
 
     A start may also name values of the rig, which begin there then: no longer where the derivatives are.
     """
-    best: Hypothesis | None = None
+    best: ScreenedEffect | None = None
     for start in starts:
         own = {name: value for name, value in start.items() if "." not in name}
         there = moved(present, {name: value for name, value in start.items() if "." in name})
@@ -78,13 +78,13 @@ def is_mode(effect: Effect) -> bool:
     return any(p.name == "damping_ratio" for p in effect.parameters)
 
 
-def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis:
+def _with_new_derivatives(present: Solution, effect: Effect, start: dict[str, float]) -> ScreenedEffect:
     solution = solve(*extended(present.problem, present.theta, effect, start), iterations=_STEPS)
     problem = solution.problem
-    return Hypothesis(effect, problem, solution.theta, solution.cost)
+    return ScreenedEffect(effect, problem, solution.theta, solution.cost)
 
 
-def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> Hypothesis | None:
+def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that no channel shows there, or that runs away."""
     problem, theta = extended(present.problem, present.theta, effect, start)
     n = len(present.theta)
@@ -100,7 +100,7 @@ def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> H
     normal = matrix.T @ matrix + np.diag(prior**2)
     normal += np.diag(1e-6 * np.diag(normal) + 1e-12)
     cost = power(residual) + float(np.sum((prior * (theta - centre)) ** 2))
-    best = Hypothesis(effect, problem, theta, cost)
+    best = ScreenedEffect(effect, problem, theta, cost)
     for _ in range(_STEPS):
         slope = matrix.T @ residual + prior**2 * (theta - centre)
         aim = bounded_step(problem, theta, normal, slope)
@@ -113,5 +113,5 @@ def _from_start(present: Solution, effect: Effect, start: dict[str, float]) -> H
         else:
             break
         theta, residual = trial, trial_residual
-        best = Hypothesis(effect, problem, theta, cost)
+        best = ScreenedEffect(effect, problem, theta, cost)
     return best

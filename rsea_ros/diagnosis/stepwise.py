@@ -1,77 +1,61 @@
-"""The search: from the re-fitted nominal model, cause after cause, to the noise floor or until nothing helps.
+"""Stepwise selection: from the re-fitted nominal model, cause after cause, until only noise is left or no
+effect helps.
 
-A model is fitted on FIT blocks and chosen on CHOOSE blocks; JUDGE blocks are not looked at here.
+Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
-from rsea_ros.diagnosis.candidate import Model, at_floor, fitted, reestimated, refitted, rescored
-from rsea_ros.diagnosis.exchange import exchanged
-from rsea_ros.diagnosis.forward_step import NOTHING, Round
-from rsea_ros.diagnosis.trial import Trial
-from rsea_ros.diagnosis.workers import Workers
+from rsea_ros.diagnosis.candidate import (
+    Candidate,
+    FitSetup,
+    fit_candidate,
+    leaves_only_noise,
+    refit,
+    scored_against,
+    with_noise_reestimated,
+)
+from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep
+from rsea_ros.diagnosis.replacement import replacement_step
+from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.workers import Pools
 from rsea_ros.progress import Progress
 
-_FIRST_ITERATIONS = 25
-_MOST_EXCHANGES = 2
 
-
-@dataclass(frozen=True)
-class Search:
-    """All cases (every sample), the accepted models from the nominal one on, and what else was tried.
-
-    rivals: by accepted cause, the models that do as well with another in its place.
-    """
-
-    cases: tuple[Case, ...]
-    models: tuple[Model, ...]
-    trials: tuple[Trial, ...] = ()
-    rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
-
-    def rivals_of(self, cause: str) -> tuple[Model, ...]:
-        """Return the models that do as well with another in a cause's place, which is no cause beside it."""
-        return tuple(m for m in self.rivals.get(cause, ()) if m.causes[-1] not in self.last.causes)
-
-    @property
-    def last(self) -> Model:
-        """The model with all accepted causes."""
-        return self.models[-1]
-
-
-def search(
-    cases: tuple[Case, ...],
-    nominal: Problem,
-    effects: Sequence[Effect],
-    at_work: Workers,
-    tell: Progress,
-    max_causes: int,
-) -> Search:
-    """Find up to max_causes causes among some effects, most telling first."""
-    models = [fitted(cases, nominal, None, iterations=_FIRST_ITERATIONS, run=at_work.run)]
-    cases = reestimated(cases, models[0])
-    models = [refitted(cases, models[0], at_work.run)]
+def select_stepwise(
+    nominal: Problem, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings
+) -> Selection:
+    """Select up to max_causes causes among some effects, the one that explains most first."""
+    setup = FitSetup(nominal.cases, settings.fits, pools.run)
+    first = fit_candidate(FitSetup(nominal.cases, settings.fits, pools.run,
+                                   iterations=settings.fits.first_iterations), nominal)  # fmt: skip
+    models = [refit(with_noise_reestimated(first), setup)]
     trials: list[Trial] = []
-    equals: dict[str, tuple[Model, ...]] = {}
-    for number in range(max_causes + _MOST_EXCHANGES):
-        present, played = models[-1], NOTHING
-        if at_floor(present, cases) and not any(c.coloured for c in cases):
-            break  # coloured noise may hide a cause that a fit still finds
-        if len(present.causes) < max_causes:
-            played = Round(cases, effects, present, number, at_work, tell).play()
-            trials += played.trials
-        if played.accepted is None:
-            played = exchanged(cases, effects, present, number, at_work, tell)
-        accepted = played.accepted
-        if accepted is None:
+    rivals: dict[str, tuple[Candidate, ...]] = {}
+    for number in range(settings.max_causes + settings.forward.replacements):
+        present, step = models[-1], NO_STEP
+        if _is_finished(present, settings):
             break
-        equals[accepted.causes[-1]] = played.equals
-        quieter = reestimated(cases, accepted)
-        accepted = refitted(quieter, accepted, at_work.run)
-        models = [*(rescored(quieter, m) for m in models), accepted]
-        cases = quieter
-    return Search(cases, tuple(models), tuple(trials), equals)
+        forward = ForwardStep(present, effects, number, pools, tell, settings)
+        if len(present.causes) < settings.max_causes:
+            step = forward.run()
+            trials += step.trials
+        if step.accepted is None:
+            step = replacement_step(forward)
+        if step.accepted is None:
+            break
+        rivals[step.accepted.newest] = step.equals
+        models.append(refit(with_noise_reestimated(step.accepted), setup))
+    cases = models[-1].cases
+    return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+
+
+def _is_finished(model: Candidate, settings: DiagnosisSettings) -> bool:
+    """Tell whether only noise is left; coloured noise may hide a cause that a fit still finds."""
+    is_coloured = any(case.coloured for case in model.cases)
+    return leaves_only_noise(model, settings.floor.only_noise) and not is_coloured

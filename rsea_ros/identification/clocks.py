@@ -10,6 +10,7 @@ asked for is taken as right: free, it takes the place of damping, for a late F/T
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,8 +19,9 @@ import numpy as np
 from rsea_ros.identification.confidence import BLOCK, sample_blocks
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.solver import Map, Solution, clock_columns, serial
-from rsea_ros.identification.unknowns import CLOCK_DOUBT, Unknown, clock_rates, clocks
+from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.signals import FloatArray, IntArray
 
 ASKED = 3.5
@@ -58,7 +60,7 @@ def asked_of(solution: Solution, run: Map = serial) -> Asked:
     if is_inverse(problem.rig):
         return Asked()
     channels = sorted({n for case in problem.cases for n in problem.present(case)})
-    left = [*clocks(channels), *clock_rates(channels)]
+    left = [*clocks(channels, problem.rig), *clock_rates(channels)]
     columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, BLOCK)
     taken: list[int] = []
     for _ in left:
@@ -105,11 +107,11 @@ def _score(
     clocked = base[:, solution.jacobian.shape[1] :]
     slope = np.concatenate([np.zeros(solution.jacobian.shape[1]), clocked.T @ solution.residual])
     residual = solution.residual - base @ np.linalg.lstsq(normal, slope, rcond=None)[0]
-    slope, information = float(column @ residual), float(column @ column)
+    total, information = float(column @ residual), float(column @ column)
     if information == 0.0:
         return 0.0
-    scores = np.bincount(blocks, column * (residual - column * slope / information))
-    return abs(slope) / float(np.sqrt(max(scores @ scores, information)))
+    scores = np.bincount(blocks, column * (residual - column * total / information))
+    return abs(total) / math.sqrt(max(float(scores @ scores), information))
 
 
 def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:

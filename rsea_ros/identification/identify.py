@@ -20,6 +20,7 @@ from rsea_ros.identification.confidence import (
     what_is_not_told,
 )
 from rsea_ros.identification.even_stamps import Evened, evened
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -45,11 +46,12 @@ from rsea_ros.identification.unknowns import (
 )
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
-CHANNELS = ("ft", "position", "velocity", "motor_torque")
+CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1
@@ -63,6 +65,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
+    records = [commanded(record, rig) for record in records]
     for record in records:
         check_usable(record)
     records = [bounded(record) for record in records]
@@ -72,13 +75,10 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        solution, cases, asked = fit(
-            cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
-        )
+        solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
-        if misfits:
-            steady = evened(records, rig, solution)
-        if steady.scatter:
+        while misfits and (more := evened(steady.records, rig, solution)).scatter:
+            steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
             solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)
@@ -92,6 +92,13 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         statements=(*steady.sentences, *result.statements),
         notes=(*result.notes, *asked.sentences),
     )
+
+
+def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
+    """Return where a fit may begin beside the rig's own values."""
+    if is_inverse(rig):
+        return None
+    return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
@@ -196,7 +203,7 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),
-        *(clocks(channels) if not is_inverse(rig) else ()),
+        *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
 
 

@@ -12,10 +12,11 @@ import numpy as np
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
 from rsea_ros.identification.unknowns import Clocks, Unknown, apply
-from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig, Sensor
-from rsea_ros.model.simulation import simulate_drives
+from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import BoolArray, FloatArray, Record
 
@@ -67,16 +68,16 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     """
     if is_inverse(rig):
         return _inverse_case(record, rig)
+    record = commanded(record, rig)
     channels = _channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
-    in_loop = rig.controller is not None and "reference" in record
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
     sensors = {n: rig.sensors.get(n, Sensor()) for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SETTLE
     return Case(
-        drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating, hold=rig.hold),
+        drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
         noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
@@ -95,10 +96,11 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     A sensor that holds one value throughout is dead or unplugged: it has no noise to weigh it by.
     Raises IdentificationError when none of them shows the motion.
     """
-    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
+    channels = [n for n in OUTPUTS if n in record and rig.measures(n)]
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
-            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+            f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
+            "expected one"
         )
     start = float(record["command"].t[0]) + SETTLE
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
@@ -109,8 +111,8 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
         f"{n} {'holds one value' if record[n].is_still else f'has {counts[n]} samples'}" for n in channels
     )
     raise IdentificationError(
-        f"{record.source}: {have}; expected ft, position or velocity with motion in it and {FEWEST} samples "
-        f"or more later than {SETTLE:g} s after the first command"
+        f"{record.source}: {have}; expected ft, deflection, position or velocity with motion in it and "
+        f"{FEWEST} samples or more later than {SETTLE:g} s after the first command"
     )
 
 
@@ -184,13 +186,27 @@ def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[s
 
 @dataclass(frozen=True)
 class Problem:
-    """Records, the rig, and what may move. channels: what the residual is made of."""
+    """Records, the rig, and what may move. channels: what the residual is made of.
+
+    stated: names of the effects that belong to the nominal rig; a search adds others beside them.
+    """
 
     cases: tuple[Case, ...]
     rig: Rig
     unknowns: tuple[Unknown, ...]
     channels: tuple[str, ...]
     ride: bool = False
+    stated: frozenset[str] = frozenset()
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Return the names of all effects of the rig."""
+        return tuple(e.name for e in self.rig.effects)
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Return the names of the effects that a search has added, in the order in which it did."""
+        return tuple(name for name in self.acting if name not in self.stated)
 
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""

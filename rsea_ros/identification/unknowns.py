@@ -14,8 +14,6 @@ from rsea_ros.model.rig import FIELDS, EffectSetting, Rig
 from rsea_ros.signals import FloatArray
 
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
-CLOCK_DOUBT = 1e-4
-"""s, one sigma. How far the stamps of a sensor may lie from the instant at which it measured."""
 RATE_DOUBT, FASTEST = 50.0, 500.0
 """ppm, one sigma and bound. How much faster the clock of a sensor may run: cheap crystals differ by 100."""
 
@@ -144,15 +142,13 @@ def _effect_unknown(effect: Effect, p: Parameter, start: float) -> Unknown:
     return Unknown(f"{effect.name}.{p.name}", start, p.unit, p.low, p.high, p.logarithmic, math.inf, scale)
 
 
-def clocks(channels: Iterable[str]) -> tuple[Unknown, ...]:
+def clocks(channels: Iterable[str], rig: Rig) -> tuple[Unknown, ...]:
     """Return the clock errors of sensors, s: measured later than stamped when positive."""
-    return tuple(
-        Unknown(
-            f"{CLOCK}.{c}", 0.0, "s", -3.0 * CLOCK_DOUBT, 3.0 * CLOCK_DOUBT, False, CLOCK_DOUBT, CLOCK_DOUBT
-        )
-        for c in channels
-        if c != "motor_torque"
-    )
+    return tuple(_clock(c, rig.clock_doubt(c)) for c in channels if c != "motor_torque")
+
+
+def _clock(channel: str, doubt: float) -> Unknown:
+    return Unknown(f"{CLOCK}.{channel}", 0.0, "s", -3.0 * doubt, 3.0 * doubt, False, doubt, doubt)
 
 
 def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:

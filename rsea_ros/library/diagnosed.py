@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
 
@@ -96,9 +97,9 @@ def diagnose(
     """
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
-    from rsea_ros.library.inputs import checked, records_of, rig_of
+    from rsea_ros.library.inputs import checked, records_of
 
-    rig, records = rig_of(rig), records_of(data)
+    rig, records = load_rig(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     carrying = [checked(record, rig, masks=True) for record in records]

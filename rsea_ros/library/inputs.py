@@ -1,4 +1,4 @@
-"""Arguments as people pass them: one record or several, a rig or its name."""
+"""Arguments as people pass them: one record or several."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
 
@@ -32,8 +31,3 @@ def checked(record: Record, rig: Rig, *, masks: bool) -> Record:
 
     require_motion(record)
     return with_faults(record, check_record(record, rig), masks=masks)
-
-
-def rig_of(rig: Rig | str) -> Rig:
-    """Return a rig given as such, by file or by name."""
-    return rig if isinstance(rig, Rig) else load_rig(rig)

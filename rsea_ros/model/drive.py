@@ -22,6 +22,9 @@ from rsea_ros.signals import Channel, FloatArray, Record
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
 
+LONGEST_OF_JOINTS = 1e-3
+"""s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
+
 ON_GRID = 1e-3
 """Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
 
@@ -35,8 +38,9 @@ class Drive:
     """The command on the step grid and the instants at which channels are wanted.
 
     step: s. start: record time of the first step, s. command: mean over each step of the held command,
-    N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
-    each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
+    N m, or of the held target of a position loop, rad, shape (steps,). reference: rad, shape (steps,) or
+    empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
+    sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
@@ -83,13 +87,15 @@ def drive_from(
     refine: int = 1,
     closed_loop: bool = False,
     from_rest: bool = False,
+    targeted: bool = False,
     hold: Hold = "zero",
 ) -> Drive:
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
     the bag's command has beside the measured motor torque, where there is one, is an outside disturbance.
-    from_rest: the bench began at zero, whatever the first samples say. hold: what acts between two stamps,
+    from_rest: the bench began at zero, whatever the first samples say. targeted: the commands are targets
+    of a position loop, rad: it began where the first sample is. hold: what acts between two stamps,
     the command of the first (zero), a straight line (first), or for an analogue command that was filtered and
     sampled the curve without a frequency above half the rate (band).
     """
@@ -99,7 +105,7 @@ def drive_from(
             f"{record.source}: command has {len(command)} samples, expected at least 10"
         )
     period = _period(command.t)
-    steps = steps_per_sample(period) * refine
+    steps = steps_per_sample(period, LONGEST_OF_JOINTS if targeted else LONGEST_STEP) * refine
     step = period / steps
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
@@ -123,7 +129,7 @@ def drive_from(
         impulse=MappingProxyType({n: step * b for n, b in beside.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=_angle(record, ends),
-        initial=(0.0, 0.0) if from_rest else _initial(record),
+        initial=(0.0, 0.0) if from_rest else _first(record) if targeted else _initial(record),
         hold=steps,
         jumps=jumps,
     )
@@ -172,6 +178,12 @@ def _period(t: FloatArray) -> float:
 
 def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
     return channel.t, channel.y
+
+
+def _first(record: Record) -> tuple[float, float]:
+    """Return the first position and velocity, zero where there is none."""
+    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
+    return float(position[0]), float(velocity[0])
 
 
 def _initial(record: Record) -> tuple[float, float]:

@@ -65,8 +65,8 @@ class Motion:
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Tell whether a rig is judged by torque: no spring holds it, so it drifts."""
-    return rig.rigid_spring
+    """Tell whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
+    return rig.rigid_spring and rig.loop is None
 
 
 def motion_from(record: Record) -> Motion:
@@ -138,7 +138,7 @@ def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     period = float(motion.t[1] - motion.t[0])
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
     motion = _as_moved(machine, motion, period)
-    gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q)
+    gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q + rig_as_is["spring_end.gravity_angle"])
     torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q + gravity
     load = gravity + sum(
         rig_as_is[f"spring_end.{name}"] * values

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
@@ -53,7 +54,7 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
     A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
     whose zero is unknown by its changes. Raises IdentificationError for a record with nothing to compare.
     """
-    record = bounded(record)
+    record = bounded(commanded(record, rig))
     check_command(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):

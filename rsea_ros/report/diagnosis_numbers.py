@@ -48,11 +48,17 @@ def rms_change(diagnosis: Diagnosis, channel: str) -> str:
 
 
 def estimate(estimate: Estimate) -> tuple[str, str, str]:
-    """Return value, half-width of the 95 % interval and unit: ("4.0045", "0.0029", "mrad")."""
+    """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
     factor, prefix = _prefix(estimate)
     low, high = estimate.ci95
-    value, half = words.with_interval(estimate.value * factor, low * factor, high * factor)
-    return value, half, prefix + words.unit(estimate.unit)
+    value, doubt = words.with_doubt(estimate.value * factor, low * factor, high * factor)
+    return value, doubt, prefix + words.unit(estimate.unit)
+
+
+def model_half_width(estimate: Estimate) -> tuple[str, str]:
+    """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
+    factor, prefix = _prefix(estimate)
+    return words.number(1.96 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
 
 
 def _prefix(estimate: Estimate) -> tuple[float, str]:

@@ -50,14 +50,14 @@ def test_a_motor_away_when_its_fault_is_cleared_is_there_the_next_time(loop):
 
 
 def test_a_dead_supervisor_is_a_fault_and_clear_fault_starts_another(loop):
-    process = loop.device._motor._supervisor._end._process
+    process = loop.device.protection._supervisor._end._process
     process.kill()
     process.wait()
     loop.until_fault(10.0)
     assert loop.guarded.fault.cause == "supervisorlost"
     loop.guarded.clear()
     loop.cycles(40, 10.0)
-    assert loop.guarded.fault is None and loop.device._motor._supervisor.alive()
+    assert loop.guarded.fault is None and loop.device.protection._supervisor.alive()
 
 
 @pytest.fixture

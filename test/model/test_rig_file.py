@@ -128,6 +128,12 @@ NONSENSE = [
         DELETE,
         "spring.stiffness is missing, expected a value in N m/rad or `rigid: true`",
     ),
+    (
+        ("spring", "stiffness", "value"),
+        float("inf"),
+        "spring.stiffness = inf, expected a value in N m/rad or `rigid: true`",
+    ),
+    (("rotor", "reflected_inertia", "value"), float("inf"), "= inf kg m^2, expected a finite value > 0"),
     (("spring", "rigid"), "yes", "spring.rigid = 'yes', expected true or false"),
     (("spring", "rigid"), True, "spring rigid and spring_end clamped, expected one of them"),
     (("spring_end", "clamped"), 1, "spring_end.clamped = 1, expected true or false"),

@@ -10,6 +10,7 @@ from rclpy.lifecycle import LifecycleNode
 from msg_adapters.ros import JointState, Trigger, torque_command_message
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 
@@ -90,6 +91,8 @@ def test_a_signal_closes_the_device_at_zero_torque(remote):
 
 class Spy:
     """A device that keeps what is written to it; `fault` is raised by the next reading."""
+
+    protection = Protection(PROCESS)
 
     def __init__(self):
         self.written, self.opened, self.fault = [], False, None

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.candidate import quicker
-from rsea_ros.diagnosis.windows import windows_of
+from rsea_ros.diagnosis.candidate import with_doubled_step
+from rsea_ros.diagnosis.short_pieces import short_pieces_of
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.identify import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
@@ -28,7 +28,7 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
     record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
     case = case_from(record, rig)
     problem = Problem((case,), rig, (), CHANNELS)
-    pieces = windows_of(case, problem.outputs(np.zeros(0))[0])
+    pieces = short_pieces_of(case, problem.outputs(np.zeros(0))[0])
     assert len(pieces) > 5
     for piece in pieces:
         (out,) = Problem((piece,), rig, (), CHANNELS).outputs(np.zeros(0))
@@ -52,8 +52,11 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
     sensors = {n: rig.sensors[n] for n in case.noise}
     noise = {n: math.hypot(s.noise, s.quantum / math.sqrt(12.0)) for n, s in sensors.items()}
     case = replace(case, noise=noise)
-    pieces = windows_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
+    pieces = short_pieces_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
     assert len(pieces) > 5
-    for problem in (Problem(pieces, rig, (), CHANNELS), quicker(Problem(pieces, rig, (), CHANNELS))):
+    for problem in (
+        Problem(pieces, rig, (), CHANNELS),
+        with_doubled_step(Problem(pieces, rig, (), CHANNELS)),
+    ):
         residual = problem.residual(np.zeros(0))
         assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)

@@ -1,4 +1,4 @@
-"""Workers: fits side by side, and the derivatives within each, on two cores.
+"""Pools: fits side by side, and the derivatives within each, on two cores.
 
 Two pools, for a fit waits for its derivatives: a single pool full of fits would wait for itself.
 """
@@ -17,7 +17,7 @@ _CORES = 2
 
 
 @dataclass(frozen=True)
-class Workers:
+class Pools:
     """Where fits run, and how one makes its derivatives."""
 
     fits: Executor
@@ -25,7 +25,7 @@ class Workers:
 
 
 @contextmanager
-def workers() -> Iterator[Workers]:
+def worker_pools() -> Iterator[Pools]:
     """Hold both pools within a with statement; linear algebra keeps to one thread meanwhile."""
     with one_blas_thread(), ThreadPoolExecutor(_CORES) as fits, ThreadPoolExecutor(_CORES) as derivatives:
-        yield Workers(fits, in_pool(derivatives))
+        yield Pools(fits, in_pool(derivatives))

@@ -1,4 +1,4 @@
-"""A few short pieces of a record, spread over it: enough to tell promising hypotheses from hopeless ones."""
+"""A few short pieces of a record, spread over it: enough to tell promising effects from hopeless ones."""
 
 from __future__ import annotations
 
@@ -8,36 +8,34 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.data_split import FIT, block_length, fit_starts, part
+from rsea_ros.diagnosis.data_split import TRAIN, block_length, part, train_starts
+from rsea_ros.diagnosis.settings import DEFAULT, PieceSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
-_RUN_UP = 0.5
-"""s before a piece that are simulated and not compared: the state there is the measured one."""
-_ENOUGH = 14.0
-"""s of data in all pieces together."""
 
-
-def windows_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Case, ...]:
-    """Return pieces of a case, each a run-up and the FIT blocks after it, about 14 s of data in all.
+def short_pieces_of(
+    case: Case, outputs: Mapping[str, FloatArray], rule: PieceSettings = DEFAULT.pieces
+) -> tuple[Case, ...]:
+    """Return pieces of a case, each a run-up and a pair of training blocks, about 14 s of data in all.
 
     Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
-    fit = part(case, FIT)
+    fit = part(case, TRAIN)
     drive = case.drive
-    if not isinstance(drive, Drive) or drive.duration < 2.0 * _ENOUGH:
+    if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
         return (fit,)
     length = 2.0 * block_length(case)
-    starts = fit_starts(case)[1:]
-    half = round(0.5 * _ENOUGH / length)
+    starts = train_starts(case)[1:]
+    half = round(0.5 * rule.enough / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
     misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    return tuple(_piece(fit, drive, float(t) - _RUN_UP, float(t) + length) for t in chosen)
+    return tuple(_piece(fit, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
 
 
 def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
@@ -51,11 +49,11 @@ def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length:
     return total
 
 
-def _piece(case: Case, drive: Drive, begin: float, end: float) -> Case:
-    """Return the part of a case between two times since its start, s; it begins with a whole hold."""
-    first, last = int(begin / drive.step) // drive.hold * drive.hold, math.ceil(end / drive.step)
+def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) -> Case:
+    """Return the part of a case between two times since its start, s; its run-up begins with a whole hold."""
+    first, last = int((begin - run_up) / drive.step) // drive.hold * drive.hold, math.ceil(end / drive.step)
     start = drive.start + first * drive.step
-    compared = start + _RUN_UP
+    compared = start + run_up
     inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
     cut = replace(
         drive,
