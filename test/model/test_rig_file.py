@@ -152,7 +152,7 @@ NONSENSE = [
     (("sensors", "ft", "unit"), "lbf ft", "sensors.ft.unit = 'lbf ft', expected 'N m'"),
     (("sensors", "ft", "noise"), -1, "sensors.ft = -1, 0 N m, expected finite values >= 0"),
     (("sensors", "ft", "noise"), "low", "sensors.ft.noise = 'low', expected a number (N m)"),
-    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, noise"),
+    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, clock_rate"),
     (("controller",), 3, "controller = 3, expected a mapping"),
     (("controller",), {"k_v": 1.0}, "controller.k_p = None, expected a number (1/s)"),
     (
