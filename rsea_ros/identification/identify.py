@@ -43,6 +43,7 @@ from rsea_ros.identification.unknowns import (
     start_vector,
     unknowns_of_effect,
     unknowns_of_rig,
+    vector_of,
 )
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
@@ -191,8 +192,7 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
     own = start_vector(problem.unknowns)
     if start is None:
         return own
-    values = start.values()
-    other = np.array([u.inner(values.get(u.name, u.start)) for u in problem.unknowns])
+    other = vector_of(problem.unknowns, start)
     costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
     return other if costs[1] < costs[0] else own
 

@@ -183,6 +183,12 @@ def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
     return np.array([u.inner(u.start) for u in unknowns])
 
 
+def vector_of(unknowns: Sequence[Unknown], rig: Rig) -> FloatArray:
+    """Return the coordinates of a rig's values, of what it does not state where the fit begins."""
+    values = rig.values()
+    return np.array([u.inner(values.get(u.name, u.start)) for u in unknowns])
+
+
 def with_effect(rig: Rig, name: str, parameters: Mapping[str, float]) -> Rig:
     """Return the rig with one more effect acting."""
     effect_named(name).vector(parameters)

@@ -28,7 +28,7 @@ from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
-_AFTER_DELAY = 5
+_AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
 _SENSORS = 1
 """Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
