@@ -23,6 +23,7 @@ from rsea_ros.diagnosis.weighing import weigh
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.steady import steadied
 from rsea_ros.identification.workers import Pools, worker_pools
@@ -58,7 +59,7 @@ def diagnose(
     nominal = nominal_problem(checked, rig)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
     with worker_pools() as pools:
-        selection, stages = search(nominal, tested, pools, tell, settings)
+        selection, stages = search(nominal, checked[0].record, tested, pools, tell, settings)
         tell("weighing the causes", 0.97)
         weighing = weigh(selection, stages, tested, pools, settings)
         every = [*checked, *([tested] if tested else [])]
@@ -74,11 +75,21 @@ def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
 
 
 def search(
-    nominal: Problem, holdout: Checked | None, pools: Pools, tell: Progress, settings: DiagnosisSettings
+    nominal: Problem,
+    record: Record,
+    holdout: Checked | None,
+    pools: Pools,
+    tell: Progress,
+    settings: DiagnosisSettings,
 ) -> tuple[Selection, list[Evaluated]]:
-    """Select causes beside the nominal model and evaluate every model of the selection."""
+    """Select causes beside the nominal model and evaluate every model of the selection.
+
+    record: the first one, from which a joint in its loop gets its start.
+    """
+    rig = nominal.rig
     effects = [e for name, e in catalogue().items() if name not in settings.without]
-    selection = select_stepwise(nominal, effects, pools, tell, settings)
+    start = joint_start(record, rig) if rig.loop is not None else None
+    selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
     selection = eliminate_backwards(selection, effects, pools, settings)
     tell("evaluating on the test blocks", 0.95)
