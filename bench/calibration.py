@@ -136,8 +136,11 @@ def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
             selection, stages = pickle.loads(kept.read_bytes())
         else:
             record, rig = made(plan)
-            nominal = nominal_problem([check(record, rig)], rig)
-            selection, stages = search(nominal, None, pools, lambda step, share: None, settings)
+            checked = check(record, rig)
+            nominal = nominal_problem([checked], rig)
+            selection, stages = search(
+                nominal, checked.record, None, pools, lambda step, share: None, settings
+            )
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps((selection, stages)))
