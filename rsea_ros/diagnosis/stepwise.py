@@ -7,6 +7,7 @@ Models are fitted to the training blocks and chosen on the validation blocks; th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from rsea_ros.diagnosis.candidate import (
     Candidate,
@@ -42,20 +43,16 @@ def select_stepwise(
     start: a rig whose values the first fit begins with.
     """
     setup = FitSetup(nominal.cases, settings.fits, pools.run)
-    first = fit_candidate(FitSetup(nominal.cases, settings.fits, pools.run,
-                                   iterations=settings.fits.first_iterations),
-                          nominal, vector_of(nominal.unknowns, start) if start else None)  # fmt: skip
-    models = [refit(with_noise_reestimated(first), setup)]
+    models = [_fitted_nominal(nominal, setup, start)]
     trials: list[Trial] = []
     rivals: dict[str, tuple[Candidate, ...]] = {}
     for number in range(settings.max_causes + settings.forward.replacements):
-        present, step = models[-1], NO_STEP
+        present = models[-1]
         if _is_finished(present, settings):
             break
         forward = ForwardStep(present, effects, number, pools, tell, settings)
-        if len(present.causes) < settings.max_causes:
-            step = forward.run()
-            trials += step.trials
+        step = forward.run() if len(present.causes) < settings.max_causes else NO_STEP
+        trials += step.trials
         if step.accepted is None:
             step = replacement_step(forward)
         if step.accepted is None:
@@ -65,6 +62,13 @@ def select_stepwise(
         models.append(refit(with_noise_reestimated(step.accepted), setup))
     cases = models[-1].cases
     return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+
+
+def _fitted_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
+    """Fit the nominal model, and again with the noise that its residual shows."""
+    theta = vector_of(nominal.unknowns, start) if start else None
+    first = fit_candidate(replace(setup, iterations=setup.limits.first_iterations), nominal, theta)
+    return refit(with_noise_reestimated(first), setup)
 
 
 def _is_finished(model: Candidate, settings: DiagnosisSettings) -> bool:
