@@ -24,7 +24,7 @@ def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_so(m
     command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
     spring = EffectSetting("nonlinear_spring", effect_named("nonlinear_spring").typical)
-    solution, _ = fit((case_from(record, rig),), rig.with_effects(spring))
+    solution = fit((case_from(record, rig),), rig.with_effects(spring))[0]
     names = [u.name for u in solution.problem.unknowns]
     i = names.index("nonlinear_spring.cubic")
     matrix = solution.jacobian.copy()
