@@ -74,6 +74,7 @@ RESULTS = {
     "one sample a second": ("diagnose", {"rate": 1.0, "duration": 80.0, "sensors": "zero"}),
     "velocity alone": ("diagnose", {"channels": ("velocity",)}),
     "a sample of 1e308": ("predict", {"dead": "1e308"}),
+    "a sample of 1e308 of a drive without a spring": ("predict", {"rig": "bare_drive", "dead": "1e308"}),
     "too few samples to compare": ("predict", {"dead": "few"}),
     "a sensor of 1e-300": ("identify", {"channels": ("position", "velocity"), "sensors": "left out",
                                         "dead": "velocity zero"}),
@@ -91,6 +92,9 @@ def test_what_gives_a_result(played, name):
 REFUSALS = {
     "a sample of 1e308": ("identify", {"dead": "1e308"}, "expected a finite value up to 1e+30"),
     "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N m and nothing moves"),
+    "a drive without a spring beyond all numbers": (
+        "predict", {"rig": "bare_drive", "dead": "all 1e300"}, "position has 0 samples, expected at least 64"
+    ),
     "a dead bench": ("identify", {"dead": "all still"}, "no sensor answers to the machine"),
     "too few samples": ("identify", {"dead": "few"}, "position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),

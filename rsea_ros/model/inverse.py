@@ -78,6 +78,7 @@ def motion_from(record: Record) -> Motion:
         )
     from scipy.interpolate import CubicSpline  # with its like in `smoothed`, 0.4 s that a spring saves
 
+    record = _finite(record)
     position = record["position"]
     if len(position) < FEWEST:
         raise IdentificationError(
@@ -93,6 +94,15 @@ def motion_from(record: Record) -> Motion:
     all_five = (t, q, v, np.gradient(v, step), smoothed(_torque_at(record, t), step))
     t, q, v, a, torque = (values[::finer] for values in all_five)
     return Motion(t, q, v, a, torque, commanded="motor_torque" not in record)
+
+
+def _finite(record: Record) -> Record:
+    """Return the record without the samples of motion and torque that are no numbers: one spoils a filter."""
+    kept = {n: (c, np.isfinite(c.y)) for n, c in record.channels.items() if n in ("position", "motor_torque")}
+    held = {n: Channel(c.t[good], c.y[good]) for n, (c, good) in kept.items() if not good.all()}
+    empty = {n for n, c in held.items() if not len(c)} - {"position"}
+    channels = {n: c for n, c in {**record.channels, **held}.items() if n not in empty}
+    return replace(record, channels=channels)
 
 
 def acted(record: Record) -> Channel:

@@ -126,5 +126,5 @@ def test_a_rig_that_the_record_contradicts_is_refused():
     record = recorded(true, 6)
     with pytest.raises(IdentificationError, match="no position channel, expected one"):
         identify([only(record, "ft")], load_rig("bare_drive"))
-    with pytest.raises(IdentificationError, match="no ft, position or velocity channel for rig"):
+    with pytest.raises(IdentificationError, match="no ft, deflection, position or velocity channel"):
         identify([only(record, "motor_torque")], load_rig("paper_high_impedance"))
