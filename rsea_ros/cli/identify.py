@@ -88,6 +88,6 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements):
+    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.clocks):
         print(sentence)
     print(f"report: {report}")

@@ -92,7 +92,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     return replace(
         result,
         statements=(*steady.sentences, *result.statements),
-        notes=(*result.notes, *asked.sentences),
+        clocks=asked.sentences,
     )
 
 

@@ -83,6 +83,7 @@ class Identification:
     and what would make it so. statics: of slow ramps against a locked output. alternatives: laws that would
     explain a part of the misfit; the intervals span what each makes of the values. coloured: channels whose
     residual was taken for coloured noise of the sensor. rig_option: the rig as the user named it.
+    clocks: what unknown clocks of the sensors would cost.
     """
 
     rig: Rig
@@ -103,6 +104,7 @@ class Identification:
     faults: tuple[Fault, ...] = field(default=())
     alternatives: tuple[str, ...] = ()
     coloured: tuple[str, ...] = ()
+    clocks: tuple[str, ...] = ()
     rig_option: str = ""
 
     @property

@@ -42,7 +42,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
         **({"statics": numbers(asdict(i.statics))} if i.statics else {}),
         "alternatives": list(i.alternatives),
         "statements": [*doubt_sentences(i), *i.statements],
-        "notes": list(i.notes),
+        "notes": [*i.notes, *i.clocks],
     }  # fmt: skip
 
 

@@ -143,4 +143,10 @@ def _correlation(identification: Identification) -> str:
 def _footer(identification: Identification) -> list[str]:
     sources = f"Data: {', '.join(identification.sources)}"
     damage = [words.sentence(f"{line}.") for line in fault_lines(identification.faults)]
-    return [sources, *damage, *identification.notes, "rsea identify. All values in SI."]
+    return [
+        sources,
+        *damage,
+        *identification.notes,
+        *identification.clocks,
+        "rsea identify. All values in SI.",
+    ]

@@ -31,7 +31,7 @@ def test_right_clocks_are_left_alone_and_their_cost_is_said():
     nominal, true = bench("paper_high_impedance", 1)
     result = identify([recorded(true, 1, 20.0)], nominal)
     assert clocks(result) == {}
-    (note,) = result.notes
+    (note,) = result.clocks
     assert "taken as right" in note and "times as wide" in note
     damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
     assert (damping.ci95[1] - damping.ci95[0]) / 2 < 5e-4 * damping.value
