@@ -59,11 +59,11 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "coherence", "data_split", "residual_peaks", "screening"},
+    {"settings", "coherence", "data_split", "residual_peaks", "screening", "joint_scale"},
     {"result", "score", "short_pieces", "initial_guess"},
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences"},
     {"selection", "step_fits"},
-    {"forward_step", "backward_elimination", "evaluation"},
+    {"forward_step", "backward_elimination", "evaluation", "joint_play"},
     {"replacement", "conclusion"},
     {"stepwise"},
     {"diagnose"},

@@ -15,6 +15,7 @@ from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.conclusion import diagnosis_of
 from rsea_ros.diagnosis.evaluation import evaluate
+from rsea_ros.diagnosis.joint_play import play_not_told
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
@@ -68,7 +69,8 @@ def diagnose(
         stages = [evaluate(selection, m, tested, pools, settings) for m in selection.models]
         every = [*checked, *([tested] if tested else [])]
         result = diagnosis_of(selection, stages, every, records, rig, pools, settings)
-    return replace(result, statements=(*sentences, *torque_scale(nominal), *result.statements))
+    told = (*sentences, *torque_scale(nominal), *play_not_told(selection, result))
+    return replace(result, statements=(*told, *result.statements))
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[str, ...]]:
