@@ -1,29 +1,35 @@
 """The torque controller: prediction, feed-forward, feedback, compensation and limits, one sample at a time.
 
     r      = where the desired torque will be when the command acts        prediction.py
-    u_ff   = inverse of the model, which runs one hold ahead               feedforward.py
-    u_fb   = PD on (torque of the model - ft), disturbance observer        law.py
+    u_ff   = inverse of the held actuator, which runs one hold ahead, and  feedforward.py, reference.py
+             what its load takes more, as far as it has been learned       learning.py
+    u_fb   = PID on (torque of the model - ft), damping of the gear's
+             speed about the model's, disturbance observer                 law.py
     u_c    = friction, ripple, backlash, from the model's own motion       compensation.py
     u      = u_ff + u_fb + u_c within the limits
 
-What the limits take away is taken from the model too. So the torque that feedback asks for is always one
-that the motor can make, nothing winds up, and the bench comes back to the desired torque as fast as the
-limits let it.
+It needs no load: a rig's ends are not looked at. What the limits take away from the model's torque is taken
+from the model too, and integration stops at a limit. So nothing winds up, and the bench comes back to the
+desired torque as fast as the limits let it. A reading that is off its place in the grid of
+samples is compared with the model at its own instant.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.control.compensation import COMPENSATED, Compensation, compensation
 from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
+from rsea_ros.control.learning import Learning
+from rsea_ros.control.loads import lightest, load_range, locked
 from rsea_ros.control.prediction import Prediction
 from rsea_ros.control.reference import Reference
-from rsea_ros.control.sampled import FT, POSITION, VELOCITY, sampled
+from rsea_ros.control.sampled import sampled
+from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -68,15 +74,18 @@ class Share:
 class TorqueController:
     """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
 
-    def __init__(self, rig: Rig, rate: float, gains: Gains, *, limits: Limits | None = None,
+    def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
                  compensate: Iterable[str] = COMPENSATED, preview: bool = False,
                  corner: float = CORNER) -> None:  # fmt: skip
-        """rate: Hz. preview: desired torques are those of two samples later, known ahead: no prediction.
+        """rate: Hz. gains: by default those of `synthesis.design`, which takes some seconds.
 
-        corner: of the prediction, Hz.
+        preview: desired torques are those of two samples later, known ahead: no prediction. corner: of the
+        prediction, Hz. Raises ParameterError for a rig whose torque cannot be controlled.
         """
+        gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: Law = law_of(rig, rate, gains)
-        self._reference = Reference(sampled(rig, rate))
+        self.learned = Learning(rig, self._law)
+        self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction = Prediction(corner, 1.0 / rate)
         self._preview, self._limits = preview, limits or Limits()
@@ -86,39 +95,55 @@ class TorqueController:
         """Begin anew with the bench as it is, from the torque that the motor makes now: nothing jumps."""
         torque = reading.motor_torque if math.isfinite(reading.motor_torque) else 0.0
         self._reference.start(reading.ft, reading.velocity, desired)
+        self.learned.start(reading.ft, reading.velocity)
         self._prediction.start(desired)
         self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
         self._begin = self._sent = torque
-        self._known = (0.0, 0.0)
-        self._age, self._desired = 0, desired
+        self._known = self._learned = (0.0, 0.0)
+        self._age, self._crossed = 0, 0.0
         self.share = Share()
 
     def step(
-        self, reading: Reading, desired: float, missed: int = 0, *, late: bool = False, trust: float = 1.0
+        self,
+        reading: Reading,
+        desired: float,
+        missed: int = 0,
+        *,
+        late: bool = False,
+        trust: float = 1.0,
+        offset: float = 0.0,
     ) -> float:
         """Return the torque (N m) that acts from the next sample on.
 
-        desired: N m, at this sample, or two samples later with preview. missed: samples lost before it.
+        desired: N m, at this sample's place in the grid, or two samples later with preview. missed: samples
+        lost before it. offset: samples by which the reading was taken after its place in the grid.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
         trust: part of the feedback that counts, as lateness.py has it.
         """
-        for wanted in np.linspace(self._desired, desired, missed + 2)[1:-1]:
-            self._coast(float(wanted))
+        for wanted in self._prediction.between(desired, missed):
+            self._coast(wanted)
         ahead, model = self._ahead(desired), self._reference
-        forward, reference = model.torque(ahead), float(model.now[FT])
-        self._hear(reading, missed, reference - reading.ft)
-        back, state = feedback(self._law, self._state, reference - reading.ft, reading.ft, reading.velocity)
+        low, high = self._allowed()
+        forward = min(max(model.torque(ahead), low), high)
+        more, learned = model.more(forward)
+        more = min(max(more, low - forward), high - forward)
+        error, slowness, reading = self._compare(reading, offset)
+        self._hear(reading, missed, error, slowness, sure=trust == 1.0 and not late)
+        back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
-        known, crossing = self._compensated(reading, forward), self._crossing(ahead)
-        asked = forward + back + known + crossing
-        torque = self._within(asked)
-        self._remember(hold(state, torque - known), torque, known)
-        model.advance(forward + torque - asked, float(ahead[0]))
-        self.share = Share(reference, forward, back, known + crossing, torque, torque != asked)
+        known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
+        asked = forward + more + back + known + crossing
+        torque = min(max(asked, low), high)
+        if (asked - torque) * error > 0.0:
+            state = state._replace(slow=self._state.slow, integral=self._state.integral)
+        self._remember(hold(state, torque - known), torque, known, learned)
+        self.share = Share(
+            float(model.now[0]), forward + more, back, known + crossing, torque, torque != asked
+        )
+        model.advance(forward, float(ahead[0]))
         return torque
 
     def _ahead(self, desired: float) -> FloatArray:
-        self._desired = desired
         samples = self._reference.samples
         return np.full(samples, desired) if self._preview else self._prediction.ahead(desired, samples)
 
@@ -126,21 +151,43 @@ class TorqueController:
         """Pass over a sample that did not come: the last torque goes on acting."""
         ahead = self._ahead(desired)
         self._reference.advance(self._reference.torque(ahead), float(ahead[0]))
-        self._remember(hold(self._state, self._state.newest), self._sent, self._known[1])
+        self._remember(hold(self._state, self._state.newest), self._sent, self._known[1], self._learned[1])
 
-    def _remember(self, state: State, torque: float, known: float) -> None:
+    def _remember(self, state: State, torque: float, known: float, learned: float) -> None:
         self._state = state
         self._sent, self._known = torque, (self._known[1], known)
+        self._learned = self._learned[1], learned
         self._age += 1
 
-    def _hear(self, reading: Reading, missed: int, error: float) -> None:
-        """Take the measured motor torque for the one that acted; after lost samples, read those between."""
-        s, share = self._state, missed / (missed + 1)
+    def _compare(self, reading: Reading, offset: float) -> tuple[float, float, Reading]:
+        """Return how far the model is ahead in torque (N m) and speed (rad/s), and the reading at its place.
+
+        What is compared is of one instant, that of the reading.
+        """
+        model = self._reference
+        (torque, speed), (ft, velocity) = model.at(offset), model.at(0.0)
+        speed += self._crossed
+        velocity += self._crossed
+        placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
+        return torque - reading.ft, speed - reading.velocity, placed
+
+    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, sure: bool) -> None:
+        """Learn from a sample, and take the measured motor torque for the one that acted.
+
+        After lost samples, those between are read on a straight line.
+        """
+        s, turned = self._state, reading.velocity - self._state.velocity
+        for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist():
+            ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
+            torque = s.applied + self._learned[0]
+            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
+        share = missed / (missed + 1)
         acted = reading.motor_torque - self._known[0]
         self._state = s._replace(
             error=s.error + share * (error - s.error),
+            slowness=s.slowness + share * (slowness - s.slowness),
             ft=s.ft + share * (reading.ft - s.ft),
-            velocity=s.velocity + share * (reading.velocity - s.velocity),
+            velocity=s.velocity + share * turned,
             applied=acted if math.isfinite(acted) else s.applied,
         )
 
@@ -149,10 +196,9 @@ class TorqueController:
         c, model = self._compensation, self._reference
         if not (c.frictions or c.ripples):
             return 0.0
-        begin, end = model.next, model.after(forward)
-        off = reading.position - float(model.now[POSITION])
-        friction = c.friction(float(begin[VELOCITY]), float(end[VELOCITY]))
-        return friction + c.ripple(off + float(begin[POSITION]), off + float(end[POSITION]))
+        speeds, angles = model.motion(forward)
+        off = reading.position - model.angle
+        return c.friction(*speeds) + c.ripple(off + angles[0], off + angles[1])
 
     def _crossing(self, ahead: FloatArray) -> float:
         """Return J w' + b w of the way across the gap, N m, mean over the hold, by central differences."""
@@ -161,11 +207,13 @@ class TorqueController:
             return 0.0
         way = [c.way(float(torque)) for torque in (*self._reference.promised, ahead[0], ahead[1])]
         start, stop = 0.5 * (way[2] - way[0]) / h, 0.5 * (way[3] - way[1]) / h
+        self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
-    def _within(self, torque: float) -> float:
+    def _allowed(self) -> tuple[float, float]:
+        """Return the least and the largest torque that the limits let through now, N m."""
         limits, before, h = self._limits, self._sent, self._law.period
         grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
-        torque = min(max(torque, before - limits.slew * h), before + limits.slew * h)
         largest = min(limits.torque, max(abs(self._begin), limits.torque * grown))
-        return min(max(torque, -largest), largest)
+        low, high = before - limits.slew * h, before + limits.slew * h
+        return min(max(low, -largest), largest), min(max(high, -largest), largest)

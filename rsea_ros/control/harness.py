@@ -7,9 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.grid import Grid
+from rsea_ros.control.lateness import Lateness
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Plant, Sample
 from rsea_ros.signals import FloatArray
+
+PARTS = 10
+"""Of a period, between which the simulation tells instants apart."""
+LONG_AGO = 10**12
+"""ns, stamp of the first measurement."""
 
 
 @dataclass(frozen=True)
@@ -38,22 +45,74 @@ def closed_loop(
     noise: bool = True,
     seed: int = 0,
     ahead: int = 0,
+    late: int = 0,
 ) -> Trace:
     """Run a controller on a simulated rig from rest. desired: N m at the samples, shape (n,).
 
-    A command that is computed at a sample acts from the next one on: one sample of delay. ahead: samples by
-    which the controller knows the desired torque before it is due.
+    A command that is computed at a sample acts from the next one on: one sample of delay. late: samples
+    more. ahead: samples by which the controller knows the desired torque before it is due.
     """
     plant = Plant(rig, rate, seed=seed, noise=noise)
     sample = plant.step(0.0)
-    pending, rows = 0.0, np.empty((len(desired), 3))
+    pending, rows = [0.0] * (1 + late), np.empty((len(desired), 3))
     controller.start(_reading(sample), float(desired[0]))
     for k, wanted in enumerate(np.append(desired[ahead:], np.full(ahead, desired[-1]))):
         command = controller.step(_reading(sample), float(wanted))
         rows[k] = sample.ft, command, sample.velocity
-        sample = plant.step(pending)
-        pending = command
+        sample = plant.step(pending.pop(0))
+        pending.append(command)
     return Trace(np.arange(len(desired)) / rate, np.asarray(desired), rows[:, 0], rows[:, 1], rows[:, 2])
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """When measurements are taken and commands act, of n samples, in periods.
+
+    taken: by how much each measurement is taken after its place; nan for one that is lost. acting: by how
+    much the command that it leads to acts after the sample that it is meant for. Both shape (n,).
+    """
+
+    taken: FloatArray
+    acting: FloatArray
+
+
+def irregular(
+    rig: Rig,
+    rate: float,
+    controller: TorqueController,
+    desired: FloatArray,
+    arrivals: Arrivals,
+    *,
+    seed: int = 0,
+) -> Trace:
+    """Run a controller on a simulated rig with measurements and commands that come when they come.
+
+    As the node does it: a grid gives each stamp its place, lateness fades the feedback. Held to a part
+    PARTS of a period.
+    """
+    plant, grid, lateness = Plant(rig, rate * PARTS, seed=seed), Grid(1e9 / rate), Lateness(rate)
+    due = {round((k + off) * PARTS): k for k, off in enumerate(arrivals.taken) if np.isfinite(off)}
+    acting: dict[int, float] = {}
+    rows, torque, command, numbers = [], 0.0, 0.0, np.arange(len(desired))
+    sample = plant.step(0.0)
+    controller.start(_reading(sample), float(desired[0]))
+    for part in range(len(desired) * PARTS):
+        if part in due:
+            periods = grid.place(round(part / PARTS / rate * 1e9 + LONG_AGO))
+            late = float(arrivals.acting[due[part]])
+            trust = lateness.take(max(late, periods - 1), max(1, periods))
+            if periods:
+                wanted = float(np.interp((grid.at - LONG_AGO) * 1e-9 * rate, numbers, desired))
+                command = controller.step(
+                    _reading(sample), wanted, periods - 1, trust=trust, offset=grid.offset
+                )
+                acting[part + round((1.0 + late) * PARTS)] = command
+        if part % PARTS == 0:
+            rows.append((sample.ft, command, sample.velocity))
+        torque = acting.pop(part, torque)
+        sample = plant.step(torque)
+    n = np.array(rows)
+    return Trace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
 
 
 def _reading(sample: Sample) -> Reading:

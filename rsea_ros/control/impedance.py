@@ -1,10 +1,10 @@
 """Output impedance: the torque that a motion of the distal side makes, which a torque source should not feel.
 
-    T = P u + H_T w_d,   w = P_w u + H_w w_d,   u = -(a T + b w)
-    T / w_d = H_T - P (a H_T + b H_w) / (1 + L)
+    T = P u + H_T w_d,   w = P_w u + H_w w_d,   u = -(a T + b w) / N
+    T / w_d = H_T - P (a H_T + b H_w) / D
 
-w_d is the speed of the distal side, w that of the gear, a and b the law's actions (loop.py). H is the bench
-without motor torque. A motor that stands still leaves the spring: K_s / s + b_s.
+w_d is the speed of the distal side, w that of the gear, a and b the law's actions, N and D as in loop.py. H
+is the bench without motor torque. A motor that stands still leaves the spring: Z_s = K_s / s + b_s.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.law import Gains, law_of
+from rsea_ros.control.law import Gains, Law, law_of
 from rsea_ros.control.loads import locked
-from rsea_ros.control.loop import actions
-from rsea_ros.control.sampled import FT, VELOCITY, responses, sampled
+from rsea_ros.control.loop import actions, returns
+from rsea_ros.control.sampled import FT, responses, sampled, z_of
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -35,15 +35,42 @@ class Impedance:
     spring: ComplexArray
 
 
+@dataclass(frozen=True)
+class Moved:
+    """The locked rig's answer to the motor, shape (3, n), and without it to a moved distal side: torque and
+    speed of the gear, per rad/s; the spring's impedance; all at hz."""
+
+    hz: FloatArray
+    plant: ComplexArray
+    torque: ComplexArray
+    speed: ComplexArray
+    spring: ComplexArray
+
+    def impedance(self, law: Law) -> ComplexArray:
+        """Return T / w_d under a law, N m s/rad, shape (n,)."""
+        on_ft, on_velocity, _ = actions(law, self.hz)
+        _, whole = returns(law, self.plant, self.hz)
+        asked = (on_ft * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
+        felt: ComplexArray = self.torque - self.plant[FT] * asked / whole
+        return felt
+
+    def ratio(self, law: Law) -> FloatArray:
+        """Return |T / w_d| over that of the bare spring."""
+        return np.abs(self.impedance(law) / self.spring)
+
+
+def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
+    """Return what moving the distal side of a rig does, its housing clamped. hz: below half the rate."""
+    s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
+    torque, speed = _without_motor(rig, hz, s)
+    spring = -(rig["spring.stiffness"] / s + rig["spring.damping"])
+    return Moved(hz, responses(sampled(locked(rig), rate), hz), torque, speed, spring)
+
+
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> Impedance:
     """Return the impedance of the distal side against a clamped housing. hz: below half the rate."""
-    s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
-    plant = responses(sampled(locked(rig), rate), hz)
-    torque, speed = _without_motor(rig, hz, s)
-    on_ft, on_velocity = actions(law_of(rig, rate, gains), hz)
-    loop = on_ft * plant[FT] + on_velocity * plant[VELOCITY]
-    controlled = torque - plant[FT] * (on_ft * torque + on_velocity * speed) / (1.0 + loop)
-    return Impedance(hz, controlled, torque, -(rig["spring.stiffness"] / s + rig["spring.damping"]))
+    felt = moved(rig, rate, hz)
+    return Impedance(hz, felt.impedance(law_of(rig, rate, gains)), felt.torque, felt.spring)
 
 
 def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -51,9 +78,9 @@ def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexAr
 
     Any inertia may be moved there: what moves it cancels.
     """
-    moved = replace(rig.with_values({"spring_end.inertia": 1.0}), clamped=frozenset({"housing_end"}))
+    free = replace(rig.with_values({"spring_end.inertia": 1.0}), clamped=frozenset({"housing_end"}))
     distal = Output(np.zeros((3, COORDINATES)), np.zeros_like(outputs.position().d))
     distal.c[0, D] = 1.0
-    asked = (outputs.end_torque(moved, "spring_end"), outputs.position(), distal)
-    torque, angle, turned = (frequency_response(moved, output, hz, "distal") for output in asked)
+    asked = (outputs.end_torque(free, "spring_end"), outputs.position(), distal)
+    torque, angle, turned = (frequency_response(free, output, hz, "distal") for output in asked)
     return torque / (s * turned), angle / turned

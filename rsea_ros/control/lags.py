@@ -1,6 +1,7 @@
 """Delays, lags and gains that an extended model has on its way from command to torque and in its sensor.
 
-    on the torque: gain exp(-delay s) / (time_constant s + 1)      on ft: 1 / (time_constant s + 1)
+    on the path to the current: exp(-delay s) / (time_constant s + 1)
+    on the torque: gain                      on ft: gain / (time_constant s + 1)
 
 The law does not know them; the margins do.
 """
@@ -14,19 +15,24 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
-ON_TORQUE = ("command_delay", "current_loop_lag", "torque_constant_error")
+ON_PATH = ("command_delay", "current_loop_lag")
+ON_TORQUE = ("torque_constant_error",)
 ON_FT = ("ft_sensor_lag", "ft_gain_error")
 
 
-def lagging(rig: Rig, plant: Sampled, hz: FloatArray) -> ComplexArray:
-    """Return the response of a sampled rig with those of its effects that lag, shape (3, n)."""
-    response = responses(plant, hz)
+def lagging(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return the response of a sampled rig, shape (3, n), and of the path from command to current, (n,)."""
+    response, path = responses(plant, hz), np.ones(len(hz), dtype=np.complex128)
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     for setting in rig.effects:
-        if setting.name in (*ON_TORQUE, *ON_FT):
+        if setting.name in (*ON_PATH, *ON_TORQUE, *ON_FT):
             value = effect_named(setting.name).vector(setting.parameters)[0]
-            response[slice(None) if setting.name in ON_TORQUE else FT] *= _factor(setting.name, value, s)
-    return response
+            factor = _factor(setting.name, value, s)
+            if setting.name in ON_PATH:
+                path = path * factor
+            else:
+                response[slice(None) if setting.name in ON_TORQUE else FT] *= factor
+    return response, path
 
 
 def _factor(name: str, value: float, s: ComplexArray) -> ComplexArray:

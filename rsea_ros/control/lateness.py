@@ -1,9 +1,9 @@
 """What to make of commands that act later than they should: how much of the feedback still counts.
 
-Feedback is designed for a delay of one sample and has a delay margin of one more. Beyond that it is taken
-back with the lateness, at once, and comes back slowly: feedback that each command in turn switches on and off
-swings the bench up between the limits of the torque. Without feedback the command is feed-forward alone,
-which no lateness makes unstable.
+Feedback is designed for a delay of one sample and stands one more and 2 ms (uncertainty.py). Beyond that it
+is taken back with the lateness, at once, and comes back slowly: feedback that each command in turn switches
+on and off swings the bench up between the limits of the torque. Without feedback the command is feed-forward
+alone, which no lateness makes unstable.
 """
 
 from __future__ import annotations
@@ -11,8 +11,10 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-FULL, NONE = 0.7, 2.0
-"""Samples more than the one of the design up to which all feedback counts, and from which on none does."""
+from rsea_ros.control.uncertainty import Uncertainty
+
+BEYOND = 1.3
+"""Samples beyond what the design stands after which no feedback counts."""
 MOST = 10
 """Samples of one pause that count: several pauses are lateness that persists, one is not."""
 RETURN = 0.3
@@ -33,7 +35,8 @@ class Lateness:
 
     def __init__(self, rate: float, tolerance: Tolerance | None = None) -> None:
         """rate: Hz."""
-        self._gain = 1.0 / (RETURN * rate)
+        u = Uncertainty()
+        self._full, self._gain = u.samples + u.delay * rate, 1.0 / (RETURN * rate)
         self.tolerance = tolerance or Tolerance()
         self._window = max(1, round(self.tolerance.time * rate))
         self.clear()
@@ -52,7 +55,7 @@ class Lateness:
             self._count(late > self.tolerance.late)
         if not count:
             return self.trust
-        wanted = min(max((NONE - late) / (NONE - FULL), 0.0), 1.0)
+        wanted = min(max(1.0 - (late - self._full) / BEYOND, 0.0), 1.0)
         self.trust = min(wanted, self.trust + self._gain)
         return self.trust
 

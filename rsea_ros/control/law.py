@@ -1,14 +1,18 @@
-"""The feedback law, linear, one sample at a time: PD on the torque error and a disturbance observer.
+"""The feedback law, linear, one sample at a time: PID on the torque error, damping, a disturbance observer.
 
-    u = k_p e + k_d e' + Q d,     d = u_applied - (J_m w' + b_m w + T_ft)
+    u = k_p e + k_d e' + k_i I e + k_w H (w_r - w) + Q d,       d = u_applied - (J_m w' + b_m w + T_ft)
+    I = (1 + w_i / s) / (1 + s / w_l)
 
 e is the torque error. e' comes from the spring rate: a sensor sees T = K_s phi + b_s phi', so phi' is T
 through s / (K_s + b_s s), and K_s phi' is what is fed back; a differentiator with the pole that the spring
-itself has. d is the torque on the gear that the rig does not explain (friction for the most part), mean
-over the sample that has just ended. J_m, b_m, w belong to the motor, and T_ft is the load that it feels:
-the load's own mechanics are not in it, so the observer is the same for a clamped and for a free bench. Q is
-a first-order low pass by Tustin's rule, with its zero at half the sampling rate. Disturbance observer:
-Ohnishi, Shibata, Murakami, IEEE/ASME Trans. Mechatronics 1, 1996.
+itself has. I is a gain below LEAK, and integrates below REST: with a load that turns freely the gear has to
+travel for a torque, and an integral alone would swing with it. w_r - w is how much slower the gear turns than
+the model; H, a high pass at WASH, damps its swing without holding back what the load does slowly, and no mode
+of the F/T sensor's mount is in it. d is the torque on the gear that the rig does not explain (friction for
+the most part), mean over the sample that has just ended. J_m, b_m, w belong to the motor, and T_ft is the
+load that it feels: the load's own mechanics are not in it, so the observer is the same for a clamped and for
+a free bench. Q is a first-order low pass by Tustin's rule, with its zero at half the sampling rate.
+Disturbance observer: Ohnishi, Shibata, Murakami, IEEE/ASME Trans. Mechatronics 1, 1996.
 
 A command that is computed at sample k acts from k+1 to k+2: one sample of delay.
 """
@@ -21,19 +25,34 @@ from typing import NamedTuple
 
 from rsea_ros.model.rig import Rig
 
+WASH = 2.0
+"""Hz, corner of H: at 1 Hz it softens the output by a fifth against 1 Hz, for the same largest impedance."""
+
+LEAK, REST = 1.0, 0.03
+"""Hz, of w_l and w_i. At 0.1 Hz for w_i a free load swings back by half of what an error has moved it."""
+
+MOST = 0.2
+"""N m of e / (1 + s / w_l) that is integrated: what is larger passes by itself, and would leave a tail."""
+
 
 @dataclass(frozen=True)
 class Gains:
-    """k_p: 1. k_d: s, so that k_d K_s is a damping in N m s/rad. q_frequency: of Q, Hz."""
+    """k_p, k_i: 1. k_d: s, so that k_d K_s is a damping in N m s/rad. q_frequency: of Q, Hz.
+
+    k_w: N m s/rad.
+    """
 
     k_p: float
     k_d: float
+    k_i: float
     q_frequency: float
+    k_w: float
 
 
 @dataclass(frozen=True)
 class Law:
-    """Coefficients of the difference equations. rate: of the spring's rate; q: of Q."""
+    """Coefficients of the difference equations. rate: of the spring's rate; q: of Q; wash: of H; leak, rest:
+    of I."""
 
     gains: Gains
     inertia: float
@@ -42,15 +61,24 @@ class Law:
     rate_pole: float
     q_pole: float
     q_gain: float
+    wash_pole: float
+    leak_pole: float
+    leak_gain: float
+    rest_gain: float
 
 
 class State(NamedTuple):
-    """What the law remembers: the last error, spring rate, ft, velocity, d, Q d; the last two torques."""
+    """What the law remembers: the last error, spring rate, e / (1 + s / w_l) and its integral, ft, velocity,
+    w_r - w, H of that, d, Q d; the last two torques."""
 
     error: float = 0.0
     rate: float = 0.0
+    slow: float = 0.0
+    integral: float = 0.0
     ft: float = 0.0
     velocity: float = 0.0
+    slowness: float = 0.0
+    swing: float = 0.0
     unexplained: float = 0.0
     disturbance: float = 0.0
     newest: float = 0.0
@@ -69,16 +97,25 @@ def law_of(rig: Rig, rate: float, gains: Gains) -> Law:
         rate_pole=math.exp(-period * rig["spring.stiffness"] / b_s) if b_s > 0.0 else 0.0,
         q_pole=(1.0 - warped) / (1.0 + warped),
         q_gain=warped / (1.0 + warped),
+        wash_pole=math.exp(-2.0 * math.pi * WASH * period),
+        leak_pole=math.exp(-2.0 * math.pi * LEAK * period),
+        leak_gain=0.5 * (1.0 - math.exp(-2.0 * math.pi * LEAK * period)),
+        rest_gain=math.pi * REST * period,
     )
 
 
-def feedback(law: Law, s: State, error: float, ft: float, velocity: float) -> tuple[float, State]:
+def feedback(
+    law: Law, s: State, error: float, slowness: float, ft: float, velocity: float
+) -> tuple[float, State]:
     """Return the torque, N m, that a sample asks for, and the new state; `hold` has to follow.
 
-    error: N m. ft: N m. velocity: rad/s, of the gear output against the housing.
+    error: N m. slowness: w_r - w, rad/s. ft: N m. velocity: w, rad/s, of the gear output against the housing.
     """
-    h = law.period
+    h, g = law.period, law.gains
     rate = law.rate_pole * s.rate + (1.0 - law.rate_pole) * (error - s.error) / h
+    slow = law.leak_pole * s.slow + law.leak_gain * (error + s.error)
+    integral = s.integral + law.rest_gain * min(max(slow + s.slow, -2.0 * MOST), 2.0 * MOST)
+    swing = law.wash_pole * s.swing + 0.5 * (1.0 + law.wash_pole) * (slowness - s.slowness)
     explained = (
         law.inertia * (velocity - s.velocity) / h
         + 0.5 * law.damping * (velocity + s.velocity)
@@ -86,8 +123,10 @@ def feedback(law: Law, s: State, error: float, ft: float, velocity: float) -> tu
     )
     unexplained = s.applied - explained
     disturbance = law.q_pole * s.disturbance + law.q_gain * (unexplained + s.unexplained)
-    torque = law.gains.k_p * error + law.gains.k_d * rate + disturbance
-    return torque, State(error, rate, ft, velocity, unexplained, disturbance, s.newest, s.applied)
+    torque = g.k_p * error + g.k_d * rate + g.k_i * (slow + integral) + g.k_w * swing + disturbance
+    after = State(error, rate, slow, integral, ft, velocity, slowness, swing, unexplained, disturbance,
+                  s.newest, s.applied)  # fmt: skip
+    return torque, after
 
 
 def hold(s: State, torque: float) -> State:

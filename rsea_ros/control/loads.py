@@ -12,12 +12,12 @@ from rsea_ros.model.rig_file import load_rig
 
 LIGHTEST = "paper_moving_output"
 LOCKED = "locked"
-MULTIPLES = (1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
+MULTIPLES = (0.5, 1.0, 2.0, 4.0, 10.0, 30.0, 100.0)
 """Of the free ends' inertia. At 100 times the paper's load hardly moves at the frequencies of control."""
 
 
 def load_range(rig: Rig, free: Rig | None = None) -> Mapping[str, Rig]:
-    """Return the rig by load: `locked`, and the free ends of `free` with 1 to 100 times their inertia.
+    """Return the rig by load: `locked`, and the free ends of `free` with 0.5 to 100 times their inertia.
 
     free: a bench whose ends are the lightest load; by default the rig itself. The actuator is the rig's in
     all. Raises ParameterError where `free` has no free end, or nothing can be controlled.

@@ -9,25 +9,46 @@ from rsea_ros.control.sampled import FT, VELOCITY, Sampled, z_of
 from rsea_ros.signals import ComplexArray, FloatArray
 
 
-def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return what the law makes of ft (1) and of the velocity (N m s/rad), its own memory and delay included.
+def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Return what the law makes of ft (1), of the velocity (N m s/rad) and of the torque applied (1).
 
-    (C / z, Q (J (1 - 1/z)/T + b (1 + 1/z)/2) / z), over 1 - Q / z^2, with C = k_p + k_d D + Q (1 + 1/z)/2.
+    C + Q (1 + 1/z)/2,   k_w H + Q (J (1 - 1/z)/T + b (1 + 1/z)/2),   Q / z,   C = k_p + k_d D + k_i I
     """
-    back = 1.0 / z_of(law.period, hz)
+    g, back = law.gains, 1.0 / z_of(law.period, hz)
     rate = (1.0 - law.rate_pole) / law.period * (1.0 - back) / (1.0 - law.rate_pole * back)
+    slow = law.leak_gain * (1.0 + back) / (1.0 - law.leak_pole * back)
+    slow = slow * (1.0 + law.rest_gain * (1.0 + back) / (1.0 - back))
+    wash = 0.5 * (1.0 + law.wash_pole) * (1.0 - back) / (1.0 - law.wash_pole * back)
     q = law.q_gain * (1.0 + back) / (1.0 - law.q_pole * back)
-    on_ft = law.gains.k_p + law.gains.k_d * rate + 0.5 * q * (1.0 + back)
-    on_velocity = q * (law.inertia * (1.0 - back) / law.period + 0.5 * law.damping * (1.0 + back))
-    memory = back / (1.0 - q * back**2)
-    return on_ft * memory, on_velocity * memory
+    on_ft = g.k_p + g.k_d * rate + g.k_i * slow + 0.5 * q * (1.0 + back)
+    explained = law.inertia * (1.0 - back) / law.period + 0.5 * law.damping * (1.0 + back)
+    return on_ft, g.k_w * wash + q * explained, q * back
+
+
+def returns(
+    law: Law,
+    plant: ComplexArray,
+    hz: FloatArray,
+    path: ComplexArray | float = 1.0,
+    current: ComplexArray | float = 1.0,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the loop's memory N and D = N + the rest of the loop, shape (…, n): L = D / N - 1.
+
+    plant: of `responses`, without the path; shape (3, …, n). path, current: from a command to the motor
+    torque and to its measurement, more than the one sample that is always there. N is 1 less the torque
+    that is fed back; N / D is the sensitivity to a torque on the gear, 1 / D that to one on the command.
+    """
+    on_ft, on_velocity, memory = actions(law, hz)
+    back = 1.0 / z_of(law.period, hz)
+    own = 1.0 - back * current * memory
+    whole = own + back * path * (on_ft * plant[FT] + on_velocity * plant[VELOCITY])
+    return np.broadcast_to(own, whole.shape), whole
 
 
 def open_loop(law: Law, plant: ComplexArray, hz: FloatArray) -> ComplexArray:
-    """Return L, the loop broken at the motor torque behind its current, shape (n,). plant: of `responses`."""
-    on_ft, on_velocity = actions(law, hz)
-    loop: ComplexArray = on_ft * plant[FT] + on_velocity * plant[VELOCITY]
-    return loop
+    """Return L, the loop broken at the motor torque behind its current, shape (…, n)."""
+    own, whole = returns(law, plant, hz)
+    return whole / own - 1.0
 
 
 def closed_loop_matrix(law: Law, plant: Sampled, share: float = 1.0) -> FloatArray:
@@ -47,5 +68,6 @@ def largest_pole(law: Law, plant: Sampled, share: float = 1.0) -> float:
 
 def _step(law: Law, plant: Sampled, x: FloatArray, s: State, share: float) -> FloatArray:
     y = plant.c @ x
-    torque, after = feedback(law, s, -float(y[FT]), float(y[FT]), float(y[VELOCITY]))
+    ft, velocity = float(y[FT]), float(y[VELOCITY])
+    torque, after = feedback(law, s, -ft, -velocity, ft, velocity)
     return np.concatenate([plant.a @ x + plant.b * s.newest, hold(after, share * torque)])

@@ -39,6 +39,24 @@ def margins(loop: ComplexArray, hz: FloatArray, period: float) -> Margins:
     )
 
 
+def least(several: list[Margins]) -> Margins:
+    """Return the worst of each margin; crossover: the highest."""
+    return Margins(
+        max(m.crossover for m in several),
+        min(m.phase for m in several),
+        min(m.gain for m in several),
+        min(m.delay for m in several),
+        max(m.sensitivity for m in several),
+    )
+
+
+def encirclements(around: ComplexArray) -> FloatArray:
+    """Return how often each row of 1 + L, shape (…, n), turns about zero beyond what its ends show."""
+    turned = np.unwrap(np.angle(around), axis=-1)
+    straight = np.angle(around[..., -1]) - np.angle(around[..., 0])
+    return np.abs(np.round((turned[..., -1] - turned[..., 0] - straight) / (2.0 * np.pi)))
+
+
 def _crossings(sign: FloatArray, loop: ComplexArray, hz: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Return the loop and the frequency where `sign` passes zero."""
     i = np.nonzero(sign[:-1] * sign[1:] < 0.0)[0]

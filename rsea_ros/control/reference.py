@@ -1,26 +1,40 @@
 """The model of the bench that runs one hold ahead of it: what the torque should be, and the command for that.
 
-At sample k the model is where the bench will be at k+1, when the command of this sample begins to act. What
-limits take away from a command is taken from the model too.
+At sample k the model is where the bench will be at k+1, when the command of this sample begins to act. Its
+torque is that of the actuator with both ends held, whatever load there is: the closed loop's nominal torque.
+What the load takes more of motion is added by what has been learned of it (learning.py). What limits take
+away from a command is taken from the model too, and from what the load takes in the same part.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
 from rsea_ros.control.feedforward import inverse
-from rsea_ros.control.sampled import FT, VELOCITY, Sampled
+from rsea_ros.control.law import Law
+from rsea_ros.control.learning import CREEP, Learning
+from rsea_ros.control.motion import Yielding
+from rsea_ros.control.sampled import FT, POSITION, VELOCITY, Sampled
+from rsea_ros.effects._friction import mean_tanh
 from rsea_ros.signals import FloatArray
+
+_mean_tanh: Callable[[float, float, float], tuple[float, float]] = mean_tanh.py_func
 
 
 class Reference:
     """now, next: ft, velocity, position of the model at this sample and at the next one, shape (3,).
 
-    promised: the desired torques (N m) that the model was steered to at these two.
+    promised: the desired torques (N m) that the model was steered to at these two. turning: the speed that
+    the gear should have at this sample with its load, rad/s.
     """
 
-    def __init__(self, plant: Sampled) -> None:
-        self._plant, self._inverse = plant, inverse(plant)
+    def __init__(self, plant: Sampled, law: Law, learned: Learning) -> None:
+        """plant: the rig with both ends clamped."""
+        self._plant, self._inverse, self._law = plant, inverse(plant), law
+        self._learned, self._yielding = learned, Yielding(plant.period)
         self.samples = max(self._inverse.moves, 2)
         self.start(0.0, 0.0, 0.0)
 
@@ -30,19 +44,63 @@ class Reference:
         self._x: FloatArray = np.linalg.lstsq(seen, np.array([ft, velocity]), rcond=None)[0]
         self.now = self.next = self._plant.c @ self._x
         self.promised = (desired, desired)
+        self._yielding.start(ft)
+        self._parts = np.zeros(2)
+        self.turning = self._turning = velocity
+        self._angles = np.zeros(2)
 
     def torque(self, desired: FloatArray) -> float:
-        """Return the command, N m, that leads to the desired torques from k+2 on, shape (samples,)."""
+        """Return the command, N m, that leads the held actuator to desired torques from k+2 on."""
         off = float(self.next[FT]) - self.promised[1]
         return self._inverse.torque(self._x, desired[: self._inverse.moves], off)
 
-    def after(self, torque: float) -> FloatArray:
-        """Return ft, velocity and position at the end of the hold of a torque (N m)."""
-        end: FloatArray = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
-        return end
+    def motion(self, torque: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return speeds (rad/s) and angles (rad) at the two ends of the hold of a torque, with the load."""
+        after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
+        parts = self._yielding.after(0.5 * (float(self.next[FT]) + float(after[FT])))
+        speeds = self._speed(self.next, self._parts), self._speed(after, parts)
+        begin = float(self.next[POSITION]) + float(self._angles[1])
+        return speeds, (begin, begin + 0.5 * self._law.period * sum(speeds))
+
+    def more(self, torque: float) -> tuple[float, float]:
+        """Return what the load takes more than the held rig, and what the learned drive takes more than the
+        rig's for all of the motion: N m, means over the hold."""
+        after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
+        (start, stop), _ = self.motion(torque)
+        rise, mean = (stop - start) / self._law.period, 0.5 * (stop + start)
+        held_rise = float(after[VELOCITY] - self.next[VELOCITY]) / self._law.period
+        held_mean = 0.5 * float(after[VELOCITY] + self.next[VELOCITY])
+        inertia, damping = self._law.inertia, self._law.damping
+        j, b, c = (float(value) for value in self._learned.drive)
+        learned = (j - inertia) * rise + (b - damping) * mean + c * mean_friction(start / CREEP, stop / CREEP)
+        return inertia * (rise - held_rise) + damping * (mean - held_mean), learned
 
     def advance(self, torque: float, promised: float) -> None:
         """Go on by a sample with a torque (N m) that was to lead to the promised one."""
+        speeds, _ = self.motion(torque)
         self._x = self._plant.a @ self._x + self._plant.b * torque
         self.now, self.next = self.next, self._plant.c @ self._x
+        self._parts = self._yielding.advance(0.5 * (float(self.now[FT]) + float(self.next[FT])))
+        self.turning, self._turning = self._turning, speeds[1]
+        step = 0.5 * self._law.period * sum(speeds) - float(self.next[POSITION] - self.now[POSITION])
+        self._angles = np.array([self._angles[1], self._angles[1] + step])
         self.promised = (self.promised[1], promised)
+
+    def at(self, part: float) -> tuple[float, float]:
+        """Return torque (N m) and speed (rad/s) so many samples after this one, by a straight line."""
+        torque = float(self.now[FT] + part * (self.next[FT] - self.now[FT]))
+        return torque, self.turning + part * (self._turning - self.turning)
+
+    @property
+    def angle(self) -> float:
+        """The angle of the gear at this sample, rad, from where it began."""
+        return float(self.now[POSITION]) + float(self._angles[0])
+
+    def _speed(self, seen: FloatArray, parts: FloatArray) -> float:
+        theta = self._learned.load
+        return float(theta[0] * seen[VELOCITY] + theta[1:] @ parts)
+
+
+def mean_friction(start: float, end: float) -> float:
+    """Return the mean of tanh along a straight line."""
+    return _mean_tanh(start, end, math.exp(-2.0 * abs(start)))[0]

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.control.following import Following, following
 from rsea_ros.control.impedance import Impedance, impedance
 from rsea_ros.control.large_signal import Reach, reach
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
+from rsea_ros.control.robustness import Robustness, robustness
 from rsea_ros.control.synthesis import Demand, Design, design
-from rsea_ros.control.trials import Compensated, Responses, Trial, compensations, responses_of, trials
+from rsea_ros.control.trials import Compensated, Trial, compensations, hard, trials
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
@@ -32,12 +34,16 @@ class Motor:
 
 @dataclass(frozen=True)
 class AtRate:
-    """One rate: design, trials, gain of each compensation, T_d / desired, impedance."""
+    """One rate: design, the set swept, trials, gain of each compensation, impedance; T_d / desired of the
+    clamped bench, of the free one, and of the hardest of the set."""
 
     design: Design
+    swept: Robustness
     trials: tuple[Trial, ...]
     compensations: tuple[Compensated, ...]
-    responses: Responses
+    locked: Following
+    free: Following
+    hard: Following
     impedance: Impedance
 
 
@@ -77,7 +83,7 @@ def study(
     for k, rate in enumerate(rates):
         progress(f"{rate:g} Hz", k / len(rates))
         found = design(rig, loads, rate, demand)
-        done.append(_at_rate(clamped, light, found, resonance))
+        done.append(_at_rate(clamped, light, loads, found))
     reaches = {motor: tuple(_reaches(clamped, light, a, motor) for a in AMPLITUDES) for motor in motors}
     return Study(clamped, light, resonance, tuple(done), reaches)
 
@@ -88,14 +94,19 @@ def natural_frequency(rig: Rig) -> float:
     return float(np.abs(poles[np.abs(poles) > 0.0]).min()) / (2.0 * math.pi)
 
 
-def _at_rate(clamped: Rig, light: Rig, found: Design, resonance: float) -> AtRate:
-    seen = responses_of(clamped, light, found)
+def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) -> AtRate:
+    swept = robustness(clamped, loads, found, steps=3)
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
+    near = following(clamped, clamped, found)
+    far = following(hard(loads), clamped, found, late=1)
     return AtRate(
         found,
-        tuple(trials(clamped, light, found, resonance, seen)),
+        swept,
+        tuple(trials(clamped, loads, found, swept, near, far)),
         tuple(compensations(clamped, found)),
-        seen,
+        near,
+        following(light, clamped, found),
+        far,
         impedance(clamped, found.rate, found.gains, grid),
     )
 

@@ -139,7 +139,12 @@ class Guarded:
     def reboot(self) -> None:
         """Restart the actuator; the fault is forgotten, the torque is on as before, at zero."""
         self.guard.torque = 0.0
-        self._alone(self.device.reboot)
+        self._alone(self._reboot)
+
+    def _reboot(self) -> None:
+        self.device.disable()
+        self.device.protection.beat(False)
+        self.device.reboot()
 
     def _recover(self) -> None:
         self.device.recover()

@@ -105,7 +105,8 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
-    at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
+    since = {n: drive.origin + drive.step * drive.at[n] for n in channels}
+    at = {n: drive.at[n] + rig.clock(n, since[n]) / drive.step for n in channels}
     kinks = drive.kinks
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}

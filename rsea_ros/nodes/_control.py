@@ -16,19 +16,20 @@ from rsea_ros.nodes._realtime import REALTIME
 
 Values = Mapping[str, Any]
 
-GAINS = ("k_p", "k_d", "q_frequency")
+GAINS = ("k_p", "k_d", "k_i", "q_frequency", "k_w")
 TABLE = (
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a model.yaml"),
     Parameter("free", "", f"rig whose ends are the lightest load; empty: rig's, {LIGHTEST} if clamped"),
     Parameter("rate", 280.0, "measurements a second", "Hz", 50.0, 1000.0),
     AXIS,
-    Parameter("k_p", -1.0, "gain on the torque error; -1: all three gains by synthesis", "", -1.0, 1e4),
+    Parameter("k_p", -1.0, "gain on the torque error; -1: all five gains by synthesis", "", -1.0, 1e4),
     Parameter("k_d", -1.0, "gain on the rate of the torque error; -1: see k_p", "s", -1.0, 1e3),
+    Parameter("k_i", -1.0, "gain on the slow torque error; -1: see k_p", "", -1.0, 1e3),
     Parameter("q_frequency", -1.0, "of the disturbance observer's filter; -1: see k_p", "Hz", -1.0, 500.0),
-    Parameter("phase_locked", 45.0, "least phase margin with both ends clamped", "°", 5.0, 89.0),
-    Parameter("phase_free", 35.0, "least phase margin with any other load", "°", 5.0, 89.0),
-    Parameter("gain_margin", 6.0, "least gain margin", "dB", 1.0, 20.0),
-    Parameter("delay_margin", 1.0, "least delay margin", "samples", 0.0, 20.0),
+    Parameter("k_w", -1.0, "damping of the gear about the model; -1: see k_p", "N m s/rad", -1.0, 1e4),
+    Parameter("sensitivity", 2.0, "largest of the rig itself, with every load", "", 1.1, 5.0),
+    Parameter("robust", 3.0, "largest sensitivity of the whole set of benches", "", 1.1, 20.0),
+    Parameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
     Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
     Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
     Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
@@ -56,8 +57,8 @@ def design_of(values: Values) -> Design:
         return check(rig, loads, values["rate"], Gains(*stated))
     if any(value >= 0.0 for value in stated):
         given = ", ".join(f"{value:g}" for value in stated)
-        raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all three, or -1 for all")
-    names = ("phase_locked", "phase_free", "gain_margin", "delay_margin")
+        raise ParameterError(f"parameters {', '.join(GAINS)} = {given}, expected all five, or -1 for all")
+    names = ("sensitivity", "robust", "impedance")
     return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
 
 
@@ -79,7 +80,11 @@ def controller_of(values: Values, found: Design) -> TorqueController:
 def summary(found: Design) -> list[str]:
     """Return gains and margins as lines for the log."""
     g = found.gains
-    head = f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, Q {g.q_frequency:.1f} Hz at {found.rate:g} Hz"
+    head = (
+        f"k_p {g.k_p:.3f}, k_d {1e3 * g.k_d:.2f} ms, k_i {g.k_i:.2f}, Q {g.q_frequency:.1f} Hz, "
+        f"k_w {g.k_w:.1f} N m s/rad at {found.rate:g} Hz; "
+        f"largest sensitivity of the set {found.sensitivity:.2f}"
+    )
     return [head] + [
         f"{name}: crossover {m.crossover:.1f} Hz, phase margin {m.phase:.1f} deg, "
         f"gain margin {m.gain:.1f} dB, delay margin {m.delay:.2f} samples"

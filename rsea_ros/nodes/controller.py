@@ -15,10 +15,10 @@ from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, Trigger, torque_command_message
 from msg_adapters.topics import TYPES
 from rsea_ros.control.controller import Reading
+from rsea_ros.control.grid import Grid
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
-from rsea_ros.nodes._grid import Grid
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
 from rsea_ros.nodes._judge import Judge
 from rsea_ros.nodes._measurements import Measurements
@@ -94,12 +94,15 @@ class Controller:
 
     def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
-        self._desired.take(stamp + round((2.5 if self._values["preview"] else 0.5) * self._period))
+        ahead = (2.5 if self._values["preview"] else 0.5) * self._period
+        self._desired.take(round(self._grid.at + ahead))
         if not self._last or self._judge.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._judge.lateness.take(max(late, missed), max(together, int(missed > 0)))
-        torque = self._controller.step(reading, self._desired.torque, missed, trust=trust)
+        torque = self._controller.step(
+            reading, self._desired.torque, missed, trust=trust, offset=self._grid.offset
+        )
         if fault := self._judge.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
         self._torque = torque

@@ -46,8 +46,23 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
         "gains": asdict(at.design.gains),
         "margins": {n: {k: _finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
         "friction_left": at.design.friction_left,
+        "set": {
+            "cases": at.swept.cases,
+            "unstable": at.swept.unstable,
+            "sensitivity": at.swept.sensitivity,
+            "where": str(at.swept.where),
+            "margins": {k: _finite(v) for k, v in asdict(at.swept.margins).items()},
+        },
         "trials": [
-            {"what": t.what, "value": _finite(t.value), "unit": t.unit, "asked": t.asked, "met": t.met}
+            {
+                "what": t.what,
+                "value": _finite(t.value),
+                "unit": t.unit,
+                "asked": t.asked,
+                "worst": _finite(t.worst),
+                "asked_worst": t.allowed,
+                "met": t.met,
+            }
             for t in at.trials
         ],
         "compensation": [

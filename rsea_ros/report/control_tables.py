@@ -32,15 +32,23 @@ def trial_head(study: Study) -> list[str]:
 
 def asked(trial: Trial) -> str:
     """Return what is asked, in words."""
-    if trial.asked is None:
+    limits = [words.number(limit, 3) for limit in (trial.asked, trial.allowed) if limit is not None]
+    if not limits:
         return ""
-    return f"{_SIGNS[trial.least]} {words.number(trial.asked, 3)} {_unit(trial.unit)}".strip()
+    worst = f" (worst {limits[-1]})" if trial.allowed is not None and len(limits) > 1 else ""
+    return f"{_SIGNS[trial.least]} {limits[0]}{worst} {_unit(trial.unit)}".strip()
 
 
 def value(trial: Trial) -> str:
-    """Return the value with its unit, and `missed` in front of one that is not as asked."""
+    """Return the value with its unit, that of the worst case behind it, and `missed` in front of one that is
+    not as asked."""
     missed = "missed: " if trial.met is False else ""
-    return f"{missed}{words.number(trial.value, 3)} {_unit(trial.unit)}".strip()
+    worst = "" if math.isnan(trial.worst) else f" ({_number(trial.worst)})"
+    return f"{missed}{_number(trial.value)}{worst} {_unit(trial.unit)}".strip()
+
+
+def _number(value: float) -> str:
+    return "none to Nyquist" if math.isinf(value) else words.number(value, 3)
 
 
 def compensation_rows(study: Study) -> Rows:
@@ -99,8 +107,8 @@ def gains_words(study: Study) -> Sequence[str]:
     """Return the gains of each rate, a line each."""
     gains = [(at.design, at.design.gains) for at in study.rates]
     return [
-        f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, "
-        f"Q {g.q_frequency:.1f} Hz; 1 N·m of friction leaves {design.friction_left:.3f} N·m RMS"
+        f"{design.rate:g} Hz: k_p = {g.k_p:.3f}, k_d = {1e3 * g.k_d:.2f} ms, k_i = {g.k_i:.2f}, "
+        f"Q {g.q_frequency:.1f} Hz, k_w = {g.k_w:.1f} N·m·s/rad"
         for design, g in gains
     ]
 

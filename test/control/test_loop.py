@@ -18,7 +18,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import Plant
 
 RATE = 280.0
-GAINS = Gains(1.469, 0.01116, 89.2)
+GAINS = Gains(0.2575, 0.003029, 1.195, 6.99, 42.9)
 LOCKED_RIG, FREE_RIG = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
 
 
@@ -48,7 +48,7 @@ def test_a_sine_through_the_code_gives_the_formula(hz):
     turn = np.exp(2j * np.pi * hz / RATE * np.arange(4000))
     state, answers = State(), []
     for ft, velocity in zip((response[FT, 0] * turn).real, (response[VELOCITY, 0] * turn).real, strict=True):
-        torque, state = feedback(law, state, -ft, ft, velocity)
+        torque, state = feedback(law, state, -ft, -velocity, ft, velocity)
         state = hold(state, torque)
         answers.append(torque)
     late = slice(-round(20 * RATE / hz), None)
@@ -93,7 +93,7 @@ def test_poles_and_encirclements_agree(found):
 def test_what_is_unstable_with_any_load_is_refused_with_its_name():
     loads = load_range(LOCKED_RIG, FREE_RIG)
     with pytest.raises(ParameterError, match=r"unstable at 280 Hz with load 'locked'.*modulus 1\.\d+"):
-        check(LOCKED_RIG, loads, RATE, Gains(30.0, 0.1, 50.0))
+        check(LOCKED_RIG, loads, RATE, Gains(30.0, 0.1, 1.0, 50.0, 0.0))
     slow = LOCKED_RIG.with_effects(EffectSetting("command_delay", {"delay": 0.02}))
     with pytest.raises(ParameterError, match="the lags of its effects"):
         check(slow, load_range(slow, FREE_RIG), RATE, GAINS)

@@ -2,9 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from rsea_ros.control.impedance import impedance
+from rsea_ros.control.law import Gains
 from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.robustness import robustness
 from rsea_ros.control.synthesis import check, design
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.rig import EffectSetting
@@ -21,33 +25,53 @@ def found():
     return design(RIG, LOADS, RATE)
 
 
-def test_every_margin_of_the_issue_is_kept_at_280_hz(found):
-    assert found.margins[LOCKED].crossover > 3.0 * 6.365
-    assert found.margins[LOCKED].phase >= 44.9
+def test_what_is_demanded_is_kept_with_every_load(found):
+    """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the set's corners; |Z| over the spring's at most 1.2."""
     for margin in found.margins.values():
-        assert margin.phase >= 34.9 and margin.gain >= 5.95 and margin.delay >= 0.99
+        assert margin.sensitivity <= 2.02 and margin.phase >= 28.9 and margin.gain >= 5.95
+        assert margin.delay >= 1.0
+    assert found.sensitivity <= 3.1 and found.impedance <= 1.21
 
 
-def test_no_neighbour_that_keeps_the_margins_leaves_less_friction(found):
-    for name in ("k_p", "k_d", "q_frequency"):
+def test_no_neighbour_that_keeps_the_demands_is_clearly_better(found):
+    """Neither friction nor softness is had for nothing."""
+
+    def worth(design):
+        gains = design.gains
+        felt = impedance(RIG, RATE, gains, np.array([0.1, 0.3, 1.0, 3.0]))
+        return np.log(design.friction_left) + np.mean(np.log(np.abs(felt.controlled / felt.spring)))
+
+    for name in ("k_p", "k_d", "k_i", "q_frequency", "k_w"):
         for factor in (0.93, 1.07):
             gains = replace(found.gains, **{name: factor * getattr(found.gains, name)})
             other = check(RIG, LOADS, RATE, gains)
-            short = other.margins[LOCKED].phase < 44.9 or any(
-                m.phase < 34.9 or m.gain < 5.95 for m in other.margins.values()
-            )
-            assert short or other.friction_left > 0.98 * found.friction_left
+            short = other.sensitivity > 3.01 or other.impedance > 1.0 + found.impedance - 0.999
+            assert short or worth(other) > worth(found) - 0.05
+
+
+def test_the_whole_set_is_stable_and_its_worst_is_stated(found):
+    """The set between its corners: loads, K_s, b_m, a sample, 2 ms, the mode."""
+    few = {name: LOADS[name] for name in (LOCKED, "free x 0.5", "free x 10")}
+    swept = robustness(RIG, few, found, steps=3)
+    assert swept.cases == 3 * 3 * 3 * 6 * 3 and swept.unstable == 0
+    assert swept.sensitivity < 3.2 and swept.margins.delay > 1.0 and swept.margins.phase > 19.0
+
+
+def test_gains_of_the_nominal_bench_alone_are_refused_for_the_set():
+    """They had 45 degrees of phase margin locked and 35 free, and were unstable with 2 ms and the mode."""
+    eager = Gains(1.469, 0.01116, 0.0, 89.2, 0.0)
+    with pytest.raises(ParameterError, match=r"unstable at 280 Hz with load .* mode"):
+        check(RIG, LOADS, RATE, eager)
 
 
 def test_a_bench_that_lags_gets_gentler_gains(found):
-    slow = RIG.with_effects(EffectSetting("current_loop_lag", {"time_constant": 3e-3}))
+    slow = RIG.with_effects(EffectSetting("current_loop_lag", {"time_constant": 2e-3}))
     gentle = design(slow, load_range(slow, FREE), RATE)
-    assert gentle.margins[LOCKED].phase >= 44.9
-    assert gentle.friction_left > 1.3 * found.friction_left
+    assert gentle.friction_left > 1.02 * found.friction_left
 
 
 def test_loads_reach_from_locked_to_free():
-    assert list(LOADS)[:2] == [LOCKED, "free x 1"]
+    assert list(LOADS)[:2] == [LOCKED, "free x 0.5"]
     assert LOADS["free x 10"]["housing_end.inertia"] == pytest.approx(1.01)
     assert all(load["rotor.reflected_inertia"] == RIG["rotor.reflected_inertia"] for load in LOADS.values())
     with pytest.raises(ParameterError, match="both ends are clamped"):

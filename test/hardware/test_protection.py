@@ -10,11 +10,10 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits, complaint
 from rsea_ros.hardware.outside import options_of, outside_device
-from rsea_ros.hardware.protection import NONE, PROCESS, SUPERVISOR
+from rsea_ros.hardware.protection import NONE, PROCESS
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.model.rig_file import load_rig
-from test.hardware.conftest import device_on, well_behaved
 
 TOY = Path(__file__).with_name("toy_device.py")
 
@@ -82,13 +81,20 @@ def test_a_supervised_toy_that_is_driven_on_is_left_alone(toy):
     device.close()
 
 
-@pytest.mark.parametrize(("model", "kind"), [(54024, SUPERVISOR), (54025, "bus watchdog")])
-def test_motors_say_what_protects_them(benches, model, kind):
-    well_behaved(benches(model))
-    device = device_on(benches(model))
-    guarded(device).open()
-    assert device.protection.kind == kind
-    device.close()
+def test_a_reboot_that_takes_its_time_under_torque_is_no_hang(toy):
+    """The supervisor was told of no torque only by the motor itself; it stopped what was being set up."""
+    device = toy(supervised="yes", boot="0.3")
+    loop = guarded(device)
+    loop.open()
+    loop.enable()
+    for _ in range(3):
+        loop.cycle(10.0, 0.0)
+    loop.reboot()
+    loop.cycle(10.0, 0.0)
+    device.far.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        device.far.recv(5)
+    assert loop.fault is None
 
 
 def test_the_simulation_ends_with_its_process():

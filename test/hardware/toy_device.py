@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+import time
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
@@ -19,7 +20,7 @@ class Toy:
     def __init__(self, values):
         options = values["device_options"]
         self._supervised = options.get("supervised") == "yes"
-        self._watchdog = values["watchdog"]
+        self._watchdog, self._boot = values["watchdog"], float(options.get("boot", 0.0))
         self.torque, self.on, self.opened = 0.0, False, False
         self.protection = Protection(NONE)
         self.deflection_known = True
@@ -54,6 +55,7 @@ class Toy:
 
     def reboot(self):
         self.disable()
+        time.sleep(self._boot)
 
     def health(self):
         return {"toy": os.getpid()}

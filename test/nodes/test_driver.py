@@ -173,7 +173,8 @@ def test_a_fault_of_the_device_zeroes_the_torque_until_it_is_cleared(spied, list
     spy.fault = DeviceError("no answer from ID 1 within 5 ms")
     listener.until(lambda: program._guarded.fault is not None)
     listener.until(lambda: spy.written[-1] == 0.0)
-    assert program._report()[1] == "fault deviceerror: no answer from ID 1 within 5 ms"
+    told = program._report()[1].partition("; ")[0]  # what a busy machine adds, such as cycles missed
+    assert told == "fault deviceerror: no answer from ID 1 within 5 ms"
     clear = listener.node.create_client(Trigger, "/spied/spied/clear_fault")
     listener.until(clear.service_is_ready)
     assert not _called(clear, listener).success

@@ -58,7 +58,10 @@ def test_parameter_file_and_table_agree(name):
 
 
 WRONG = {
-    "controller": ({"k_p": 30.0, "k_d": 0.1, "q_frequency": 50.0}, "unstable at 280 Hz with load 'locked'"),
+    "controller": (
+        {"k_p": 30.0, "k_d": 0.1, "k_i": 1.0, "q_frequency": 50.0, "k_w": 0.0},
+        "unstable at 280 Hz with load 'locked'",
+    ),
     "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
     "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
     "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),

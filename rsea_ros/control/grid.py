@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.nodes._anchor import SECOND
+SECOND = 1_000_000_000
 
 EARLY = 0.3
 """Periods by which a measurement may come before its place. A cycle is late or in time, hardly early, so the
 rest of the period is for lateness: one late cycle and one in time are two periods, never three."""
-PULL_EARLY, PULL_LATE = 0.3, 0.02
+PULL_EARLY, PULL_LATE = 0.05, 0.02
 """Part of its error by which the grid follows a measurement that is early, and one that is late."""
 JUMP = SECOND
 """ns; stamps that jump so far, either way, are of another run or of a clock that was set."""
 
 
 class Grid:
-    """Places on a grid. period: ns."""
+    """Places on a grid. period: ns. offset: periods by which the last stamp lay behind its place."""
 
     def __init__(self, period: float) -> None:
         self._period = period
         self._at: float | None = None
+        self.offset = 0.0
 
     def forget(self) -> None:
         """Let the next measurement be the first."""
@@ -36,7 +37,7 @@ class Grid:
         The first is one period behind nothing.
         """
         if self._at is None:
-            self._at = float(stamp)
+            self._at, self.offset = float(stamp), 0.0
             return 1
         behind = (stamp - self._at) / self._period
         periods = math.floor(behind + EARLY)
@@ -45,4 +46,10 @@ class Grid:
         error = behind - periods
         pull = PULL_EARLY if error < 0.0 else PULL_LATE
         self._at += (periods + pull * error) * self._period
+        self.offset = (1.0 - pull) * error
         return periods
+
+    @property
+    def at(self) -> float:
+        """The place of the last stamp, ns."""
+        return 0.0 if self._at is None else self._at

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from rsea_ros.nodes._grid import Grid
+from rsea_ros.control.grid import Grid
 
 PERIOD = 1e9 / 280.0
 

@@ -1,0 +1,92 @@
+"""How torque follows small sines and a step: gain, phase, what the motor has to make, rise and settling.
+
+Sines are followed one frequency at a time, so that what is shown is the controller that runs, its prediction
+with its trust included, and not an impulse's: above what is predicted the torque comes two samples late.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.control.controller import Limits, TorqueController
+from rsea_ros.control.harness import closed_loop
+from rsea_ros.control.loads import locked
+from rsea_ros.control.synthesis import Design
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import ComplexArray, FloatArray
+
+UNLIMITED = Limits(torque=1e6, slew=1e12, ramp=0.0)
+SHARES = (0.007, 0.018, 0.035, 0.055, 0.075, 0.11, 0.16, 0.25, 0.45)
+"""Of the rate: the frequencies of the sines."""
+PERIODS, WAIT, BAND = 5.0, 0.7, 0.05
+STEP = 5.0
+"""N m: a step that the motor's limits hardly meet."""
+
+
+@dataclass(frozen=True)
+class Following:
+    """T_d / desired and motor torque / desired at hz, shape (n,), as complex and as magnitude."""
+
+    hz: FloatArray
+    torque: ComplexArray
+    motor: FloatArray
+
+    @property
+    def bandwidth(self) -> float:
+        """Where it leaves -3 dB, Hz; inf where it never does, to the highest frequency looked at."""
+        below = 20.0 * np.log10(np.abs(self.torque)) < -3.0
+        return float(self.hz[np.argmax(below)]) if below.any() else float("inf")
+
+    @property
+    def peak(self) -> float:
+        """The largest gain, dB."""
+        return float(20.0 * np.log10(np.abs(self.torque).max()))
+
+    def motor_at(self, hz: float) -> float:
+        """Return the motor torque per N m, between the frequencies."""
+        return float(np.interp(hz, self.hz, self.motor))
+
+
+@dataclass(frozen=True)
+class Step:
+    """rise: s, from 10 to 90 %. overshoot: part of the step. settling: s, until it stays within 5 %."""
+
+    t: FloatArray
+    ft: FloatArray
+    rise: float
+    overshoot: float
+    settling: float
+
+
+def following(true: Rig, model: Rig, design: Design, *, late: int = 0) -> Following:
+    """Follow sines on a bench without noise and limits; its load is not told to the controller."""
+    hz = design.rate * np.array(SHARES)
+    found = [_sine(true, locked(model), design, float(f), late) for f in hz]
+    return Following(hz, np.array([t for t, _ in found]), np.array([m for _, m in found]))
+
+
+def _sine(true: Rig, model: Rig, design: Design, hz: float, late: int) -> tuple[complex, float]:
+    rate = design.rate
+    n = round((WAIT + max(PERIODS / hz, 0.25)) * rate)
+    wanted = np.sin(2.0 * np.pi * hz * np.arange(n) / rate)
+    controller = TorqueController(model, rate, design.gains, limits=UNLIMITED)
+    run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
+    turn = np.exp(-2j * np.pi * hz * run.t) * (run.t >= WAIT)
+    scale = np.sum(wanted * turn)
+    return complex(np.sum(run.ft * turn) / scale), float(abs(np.sum(run.command * turn) / scale))
+
+
+def step_response(true: Rig, model: Rig, design: Design, *, late: int = 0, seconds: float = 1.5) -> Step:
+    """Return the answer to a step from rest, within the motor's limits, without noise."""
+    rate = design.rate
+    wanted = np.where(np.arange(round(seconds * rate)) < 0.3 * rate, 0.0, STEP)
+    controller = TorqueController(locked(model), rate, design.gains)
+    run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
+    begin = int(np.argmax(wanted > 0.0))
+    t, ft = run.t[begin:] - run.t[begin], run.ft[begin:] / STEP
+    outside = np.nonzero(np.abs(ft - 1.0) > BAND)[0]
+    rise = float(t[np.argmax(ft >= 0.9)] - t[np.argmax(ft >= 0.1)])
+    settling = float(t[min(outside[-1] + 1, len(t) - 1)]) if len(outside) else 0.0
+    return Step(t, ft * STEP, rise, float(max(0.0, ft.max() - 1.0)), settling)

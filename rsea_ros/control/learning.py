@@ -1,0 +1,144 @@
+"""What the bench takes to be moved, learned while it runs: its load, its inertia, its drag, its friction.
+
+    w            = theta . (stretch of the spring, two parts of what follows the load)      motion.py
+    u - T        = J w' + b w + c tanh(w / creep)
+
+Two least squares with forgetting over the same samples, every signal through the same band pass, weighed
+against what the rig says:
+
+    (R + s^2 P) x = r + s^2 P x_0,     s^2 = the larger of the floor and what the fit leaves
+
+R, r are means of the last MEMORY s in which the gear moved. What is learned shapes the feed-forward of the
+desired torque alone: it is bounded and has stable poles, so no error in it can make the loop unstable, and
+the margins of the design hold whatever has been learned. Recursive least squares with forgetting: Astrom,
+Wittenmark, Adaptive Control, 1995, ch. 2; an inverse from it: Widrow, Walach, Adaptive Inverse Control, 1996.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rsea_ros.control.law import Law
+from rsea_ros.control.motion import LOCKED, Stretch, Yielding
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+MEMORY = 0.5
+"""s; two and a half periods of 5 Hz."""
+CORNER = 25.0
+"""Hz, of the low pass, twice: above it the noise of sensors counts more than motion."""
+SLOWEST = 4.0
+"""Hz, of the high pass, twice: slower, a load that swings by itself moves the gear without any torque."""
+INDEPENDENT = 20.0
+"""Samples in the memory that are no repetition of each other: MEMORY times twice the corner, about."""
+MOVES = 5e-3
+"""rad/s: a gear that is slower teaches nothing, and what was learned is kept."""
+CREEP = 5e-3
+"""rad/s, over which the learned friction changes its sign: sharper is sharper than its estimate."""
+FLOORS = (4e-3, 0.1)
+"""rad/s, N m: the least that a fit leaves, by noise and quanta of the sensors."""
+SPREADS = (np.array([0.15, 20.0, 20.0]), np.array([0.2, 0.6, 5.0]))
+"""Standard deviations of theta (1, 1/(kg m^2), 1/(kg m^2)); of J and b, of the rig's; of c, N m."""
+EVERY = 4
+"""Samples after which each fit is solved anew: it costs more than all the rest of a step."""
+QUICK = 0.03
+"""s, in which a load is seen to have stopped: a foot that lands."""
+FOLLOWS, STOPPED = 0.1, 0.3
+"""rad/s that the load should turn by, and the part of that below which it has stopped: it is forgotten."""
+LIGHTEST = 25.0
+"""1/(kg m^2): no load is taken for lighter than 1/25 kg m^2."""
+
+
+class Learning:
+    """load: theta. drive: J (kg m^2), b (N m s/rad), c (N m)."""
+
+    def __init__(self, rig: Rig, law: Law) -> None:
+        h = law.period
+        self._stretch = Stretch(rig["spring.stiffness"], rig["spring.damping"], h)
+        self._yielding = Yielding(h)
+        self._period = h
+        self._corners = [1.0 - math.exp(-2.0 * math.pi * hz * h) for hz in (CORNER, SLOWEST)]
+        self._fresh = 1.0 - math.exp(-h / MEMORY)
+        known = np.array([law.inertia, law.damping, 0.0])
+        spreads = (SPREADS[0], SPREADS[1] * [law.inertia, law.damping, 1.0])
+        self._priors = [(LOCKED, 1.0 / spreads[0] ** 2), (known, 1.0 / spreads[1] ** 2)]
+        self._bounds = [
+            (np.array([0.8, 0.0, -LIGHTEST]), np.array([1.25, LIGHTEST, 3.0 * LIGHTEST])),
+            (np.array([0.5, -0.5, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
+        ]
+        self.load, self.drive = LOCKED, known
+        self._moments, self._turn = np.zeros((2, 4, 4)), 0
+        self.start(0.0, 0.0)
+
+    def start(self, ft: float, velocity: float) -> None:
+        """Begin at a torque (N m) and a speed (rad/s), with what was learned."""
+        self._stretch.start(ft)
+        self._yielding.start(ft)
+        self._ft, self._velocity = ft, velocity
+        self._filtered = np.zeros((4, 2, 4))
+        self._parts = np.zeros(2)
+        self._followed = self._expected = 0.0
+
+    def hear(self, ft: float, velocity: float, torque: float, *, gap: float = 0.0, sure: bool = True) -> None:
+        """Take a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
+
+        gap: rad/s, of that velocity, with which backlash is crossed: it is no load's. sure: whether that is
+        surely the torque that acted; else nothing is learned from it.
+        """
+        speed, mean = 0.5 * (velocity + self._velocity), 0.5 * (ft + self._ft)
+        parts = self._yielding.advance(mean)
+        first, second = 0.5 * (parts + self._parts)
+        rows = np.array([
+            [self._stretch.rate(ft), first, second, speed - gap],
+            [(velocity - self._velocity) / self._period, speed, math.tanh(speed / CREEP), torque - mean],
+        ])  # fmt: skip
+        self._ft, self._velocity, self._parts = ft, velocity, parts
+        seen = self._band(rows)
+        if self._stopped(seen[0]):
+            self.load, self._moments[0] = LOCKED, 0.0
+        if sure and max(abs(seen[0, 0]), abs(seen[0, 3])) > MOVES:
+            self._moments += self._fresh * (seen[:, :, None] * seen[:, None, :] - self._moments)
+            self._turn = (self._turn + 1) % EVERY
+            if self._turn == 0:
+                self.load = self._solve(0, self.load)
+            elif self._turn == EVERY // 2:
+                self.drive = self._solve(1, self.drive)
+
+    def _band(self, rows: FloatArray) -> FloatArray:
+        """Return signals between SLOWEST and CORNER."""
+        fast, slow = self._corners
+        for state in self._filtered[:2]:
+            state += fast * (rows - state)
+            rows = state
+        for state in self._filtered[2:]:
+            state += slow * (rows - state)
+            rows = rows - state
+        return rows
+
+    def _stopped(self, seen: FloatArray) -> bool:
+        """Tell whether the gear no longer turns as the torque would have its load turn."""
+        quick = self._period / QUICK
+        expected = float(self.load[1:] @ seen[1:3])
+        self._expected += quick * (expected**2 - self._expected)
+        self._followed += quick * (expected * float(seen[3] - self.load[0] * seen[0]) - self._followed)
+        return self._expected > FOLLOWS**2 and self._followed < STOPPED * self._expected
+
+    def _solve(self, which: int, before: FloatArray) -> FloatArray:
+        """Return the least squares of a fit, within its bounds."""
+        m, (known, precision) = self._moments[which], self._priors[which]
+        left = m[3, 3] - 2.0 * before @ m[:3, 3] + before @ m[:3, :3] @ before
+        weight = max(FLOORS[which] ** 2, left) / INDEPENDENT * precision
+        matrix, right = m[:3, :3] + np.diag(weight), m[:3, 3] + weight * known
+        found = np.linalg.solve(matrix, right)
+        low, high = self._bounds[which]
+        inside = np.clip(found, low, high)
+        if (inside == found).all():
+            return found
+        free = inside == found
+        rest = np.linalg.solve(
+            matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, ~free)] @ inside[~free]
+        )
+        inside[free] = np.clip(rest, low[free], high[free])
+        return inside

@@ -1,0 +1,128 @@
+"""The set of benches that a design must stand: every load, and what nobody knows to better than so much.
+
+    loads           locked, and the free ends with 0.5 to 100 times their inertia           loads.py
+    K_s             ± 10 %          b_m   ± 50 %
+    path            one sample more than the one of the design, 2 ms of delay, both
+    sensor          a mode of 33 Hz, damping ratio 0.02, 0.3 of the spring's torque in it
+
+A case is a bench of the set as frequency responses: exact for hold, delays and mode (whose aliases are left
+out, as all of those that lie above half the rate).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from rsea_ros.control.lags import lagging
+from rsea_ros.control.sampled import FT, sampled, z_of
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import ComplexArray, FloatArray
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """stiffness, damping: relative, ±. samples: more than the design's. delay: s.
+
+    mode: Hz, damping ratio, participation of a resonance of what carries the F/T sensor.
+    """
+
+    stiffness: float = 0.1
+    damping: float = 0.5
+    samples: int = 1
+    delay: float = 2e-3
+    mode: tuple[float, float, float] = (33.0, 0.02, 0.3)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One bench of the set: its load, K_s and b_m over the nominal ones, samples, delay (s), mode."""
+
+    load: str
+    stiffness: float = 1.0
+    damping: float = 1.0
+    samples: int = 0
+    delay: float = 0.0
+    participation: float = 0.0
+
+    @property
+    def nominal(self) -> bool:
+        """Whether it is the rig itself with one of the loads."""
+        return self == Case(self.load)
+
+    def __str__(self) -> str:
+        parts = [self.load, f"K_s x {self.stiffness:g}", f"b_m x {self.damping:g}"]
+        parts += ["one sample late"] * (self.samples > 0) + ["delayed"] * (self.delay > 0.0)
+        return ", ".join(parts + ["mode"] * (self.participation != 0.0))
+
+
+@dataclass(frozen=True)
+class Family:
+    """Cases with their responses at hz (n,): plant (3, m, n) as `responses` has it, the path from a command
+    to the torque and that to the current as it is measured, at the end of a sample: both (m, n)."""
+
+    cases: tuple[Case, ...]
+    hz: FloatArray
+    plant: ComplexArray
+    path: ComplexArray
+    current: ComplexArray
+
+    @property
+    def nominal(self) -> npt.NDArray[np.bool_]:
+        """Which cases are the rig itself, shape (m,)."""
+        return np.array([case.nominal for case in self.cases])
+
+
+def corners(loads: Sequence[str], u: Uncertainty) -> list[Case]:
+    """Return the rig with each load, and the corners of the set: for the synthesis."""
+    sides = list(product((1 - u.stiffness, 1 + u.stiffness), (1 - u.damping, 1 + u.damping)))
+    wire = ((0, 0.0), (u.samples, u.delay))
+    return [Case(load) for load in loads] + [
+        Case(load, k, b, samples, delay, part)
+        for load, (k, b), (samples, delay), part in product(loads, sides, wire, (0.0, u.mode[2]))
+    ]
+
+
+def dense(loads: Sequence[str], u: Uncertainty, steps: int = 5) -> list[Case]:
+    """Return the set on a grid, for what is stated of a design."""
+    stiff, damp = (1.0 + part * np.linspace(-1.0, 1.0, steps) for part in (u.stiffness, u.damping))
+    wire = product((0, u.samples), (0.0, 0.5 * u.delay, u.delay))
+    grid = product(loads, stiff, damp, wire, (0.0, 0.5 * u.mode[2], u.mode[2]))
+    return [Case(load, float(k), float(b), *path, part) for load, k, b, path, part in grid]
+
+
+def bench(load: Rig, case: Case) -> Rig:
+    """Return a rig with the stiffness and damping of a case."""
+    k, b = "spring.stiffness", "rotor.reflected_damping"
+    return load.with_values({k: load[k] * case.stiffness, b: load[b] * case.damping})
+
+
+def family(
+    loads: Mapping[str, Rig], cases: Sequence[Case], u: Uncertainty, rate: float, hz: FloatArray
+) -> Family:
+    """Return the responses of cases at frequencies, Hz, below half the rate."""
+    made: dict[tuple[str, float, float], tuple[ComplexArray, ComplexArray]] = {}
+    s, back = np.asarray(2j * np.pi * hz, dtype=np.complex128), 1.0 / z_of(1.0 / rate, hz)
+    plants, paths, currents = [], [], []
+    for case in cases:
+        key = case.load, case.stiffness, case.damping
+        if key not in made:
+            rig = bench(loads[case.load], case)
+            made[key] = lagging(rig, sampled(rig, rate), hz)
+        response, path = made[key]
+        seen = response.copy()
+        seen[FT] *= _mode(s, u.mode, case.participation)
+        plants.append(seen)
+        paths.append(path * back**case.samples * np.exp(-case.delay * s))
+        currents.append(path * back ** (case.samples + int(case.delay * rate + 1e-9)))
+    return Family(tuple(cases), hz, np.stack(plants, axis=1), np.array(paths), np.array(currents))
+
+
+def _mode(s: ComplexArray, mode: tuple[float, float, float], participation: float) -> ComplexArray:
+    w = 2.0 * np.pi * mode[0]
+    factor: ComplexArray = 1.0 - participation * s * s / (s * s + 2.0 * mode[1] * w * s + w * w)
+    return factor
