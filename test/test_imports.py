@@ -64,7 +64,7 @@ DIAGNOSIS = (
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
     {"selection", "step_fits", "signature"},
     {"forward_step", "backward_elimination", "evaluation", "flexible"},
-    {"replacement", "evidence"},
+    {"replacement", "evidence", "joint_play"},
     {"stepwise", "claims", "probability"},
     {"promotion"},
     {"weighing"},

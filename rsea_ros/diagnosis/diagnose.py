@@ -15,6 +15,7 @@ from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.conclusion import diagnosis_of
 from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
+from rsea_ros.diagnosis.joint_play import play_not_told
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -64,7 +65,8 @@ def diagnose(
         weighing = weigh(selection, stages, tested, pools, settings)
         every = [*checked, *([tested] if tested else [])]
         result = diagnosis_of(weighing, every, records, rig, pools, settings)
-    return replace(result, statements=(*sentences, *torque_scale(nominal), *result.statements))
+    told = (*sentences, *torque_scale(nominal), *play_not_told(selection, result))
+    return replace(result, statements=(*told, *result.statements))
 
 
 def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
