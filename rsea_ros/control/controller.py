@@ -75,12 +75,14 @@ class TorqueController:
     """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
 
     def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
-                 compensate: Iterable[str] = COMPENSATED, preview: bool = False,
+                 compensate: Iterable[str] = COMPENSATED, preview: bool = False, learn: bool = True,
                  corner: float = CORNER) -> None:  # fmt: skip
         """rate: Hz. gains: by default those of `synthesis.design`, which takes some seconds.
 
         preview: desired torques are those of two samples later, known ahead: no prediction. corner: of the
-        prediction, Hz. Raises ParameterError for a rig whose torque cannot be controlled.
+        prediction, Hz. learn: whether load and drive are learned; not inside an outer loop whose desired
+        torque follows the motion (virtual.py), where what is learned would change its impedance.
+        Raises ParameterError for a rig whose torque cannot be controlled.
         """
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: Law = law_of(rig, rate, gains)
@@ -88,7 +90,7 @@ class TorqueController:
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction = Prediction(corner, 1.0 / rate)
-        self._preview, self._limits = preview, limits or Limits()
+        self._preview, self._learn, self._limits = preview, learn, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
 
     def start(self, reading: Reading, desired: float = 0.0) -> None:
@@ -128,7 +130,7 @@ class TorqueController:
         more, learned = model.more(forward)
         more = min(max(more, low - forward), high - forward)
         error, slowness, reading = self._compare(reading, offset)
-        self._hear(reading, missed, error, slowness, sure=trust == 1.0 and not late)
+        self._hear(reading, missed, error, slowness, sure=self._learn and trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
         known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
