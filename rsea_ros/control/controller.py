@@ -125,17 +125,17 @@ class TorqueController:
         for wanted in self._prediction.between(desired, missed):
             self._coast(wanted)
         ahead, model = self._ahead(desired), self._reference
-        low, high = self._allowed()
-        forward = min(max(model.torque(ahead), low), high)
+        largest, most = self._largest(), self._limits.slew * self._law.period
+        forward = min(max(model.torque(ahead), -largest), largest)
         more, learned = model.more(forward)
-        more = min(max(more, low - forward), high - forward)
+        more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
         self._hear(reading, missed, error, slowness, sure=self._learn and trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
         known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + more + back + known + crossing
-        torque = min(max(asked, low), high)
+        torque = min(max(asked, self._sent - most, -largest), self._sent + most, largest)
         if (asked - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)
@@ -212,10 +212,8 @@ class TorqueController:
         self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
-    def _allowed(self) -> tuple[float, float]:
-        """Return the least and the largest torque that the limits let through now, N m."""
-        limits, before, h = self._limits, self._sent, self._law.period
+    def _largest(self) -> float:
+        """Return the largest torque that the limits let through now, N m; it grows after a start."""
+        limits, h = self._limits, self._law.period
         grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
-        largest = min(limits.torque, max(abs(self._begin), limits.torque * grown))
-        low, high = before - limits.slew * h, before + limits.slew * h
-        return min(max(low, -largest), largest), min(max(high, -largest), largest)
+        return min(limits.torque, max(abs(self._begin), limits.torque * grown))
