@@ -40,7 +40,11 @@ setup(
     python_requires=">=3.10",
     install_requires=requirements(),
     zip_safe=False,
-    package_data={"": ["py.typed"], "rsea_ros.report": ["*.css", "*.js"]},
+    package_data={
+        "": ["py.typed"],
+        "rsea_ros.report": ["*.css", "*.js"],
+        "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (str(SHARE), ["package.xml"]),

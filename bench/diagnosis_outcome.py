@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import traceback
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan, prod
 
 from diagnosis_cases import Case
@@ -12,7 +12,7 @@ from independent.hidden import MAIN_PARAMETER
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -91,11 +91,13 @@ class Outcome:
         return self.right or (not self.error and (lenient or mimic))
 
 
-def run_case(case: Case, rig_name: str = "paper_high_impedance") -> Outcome:
+def run_case(
+    case: Case, rig_name: str = "paper_high_impedance", settings: DiagnosisSettings = DEFAULT
+) -> Outcome:
     """Diagnose a case and set the result beside the truth; an exception is an outcome too."""
     start = time.perf_counter()
     try:
-        settings = DiagnosisSettings(without=case.without)
+        settings = replace(settings, without=case.without)
         diagnosis = diagnose([case.record], load_rig(rig_name), settings=settings)
     except Exception:
         told = traceback.format_exc(limit=-3)

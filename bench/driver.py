@@ -45,6 +45,7 @@ def main() -> None:
     parser.add_argument("--strings", type=int, default=1_000_000, help="damaged byte strings")
     parser.add_argument("--minutes", type=float, default=1.0, help="of `random`")
     parser.add_argument("--seed", type=int, default=1, help="of `random`")
+    parser.add_argument("--patient", action="store_true", help="`controller`: late replies are no fault")
     args, sections = chosen(parser, SECTIONS)
     print(f"{'what':58} {'asked':22} measured")
     for _, section in sections:

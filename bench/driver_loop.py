@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 
 from rsea_ros.hardware.device import State
-from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
-from rsea_ros.hardware.dynamixel.motor import usual_latency
+from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.settings import usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits
@@ -27,8 +27,8 @@ class Loop:
             MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate)),
             SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
         )  # fmt: skip
-        self.device.open()
         self.guarded = Guarded(self.device, limits, rate)
+        self.guarded.open()
         self.guarded.enable()
         self._period, self._due = 1e9 / rate, float(time.monotonic_ns())
         self.states: list[State] = []

@@ -1,7 +1,8 @@
 """Random faults at random instants, several at once, beside a monitor that knows one rule of the torque.
 
 No torque unless active, commanded in the last 100 ms, without fault. The seed of a violation repeats what was
-done; the machine's own stalls are not in it.
+done; the machine's own stalls are not in it. A torque that the bench has kept while it stood still itself, by
+its own account, is counted apart: a motor does not stand still, and no driver could have told it anything.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import argparse
 import random
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -34,7 +36,10 @@ class Watched:
         self.commanded = self.since = 0
         self.silent = 0
         self.violations: list[str] = []
+        self.excused: list[str] = []
+        self.happened: deque[str] = deque(maxlen=6)
         self.seen = self.faults = 0
+        self.looked = self.begun = time.monotonic_ns()
 
     def cycle(self) -> None:
         """Do a cycle, and look at what the motor has been told since the last look."""
@@ -59,27 +64,43 @@ class Watched:
         )  # fmt: skip
         goal, on = self.bench.torque()
         now = time.monotonic_ns()
+        held_up, self.looked = now - self.looked, now
         if not goal or not on:
             return
         self.seen += 1
         if not active:
-            self.violations.append("torque while not active")
+            self._violated("torque while not active", held_up)
         elif now - commanded > LONGEST + GRACE:
-            self.violations.append(f"commanded {(now - commanded) / 1e6:.0f} ms ago")
+            self._violated(f"commanded {(now - commanded) / 1e6:.0f} ms ago", held_up)
         elif fault is not None and now - since > LONGEST + GRACE:
-            self.violations.append(f"{fault} for {(now - since) / 1e6:.0f} ms")
+            self._violated(f"{fault} for {(now - since) / 1e6:.0f} ms", held_up)
+
+    def _violated(self, why: str, held_up: int) -> None:
+        """Note a violation with what went before it; apart where the bench itself stood still."""
+        still = self.bench.stood_still(time.monotonic_ns() - 10 * LONGEST)
+        after = f"{(time.monotonic_ns() - self.begun) / 1e9:.1f} s after the start"
+        told = f"{why}, {after}, this loop {held_up / 1e6:.0f} ms a turn, the bench still for {still:.0f} ms"
+        told += f", after {'; '.join(self.happened)}"
+        (self.excused if still > GRACE / 1e6 else self.violations).append(told)
 
     def _happen(self) -> None:
-        events: tuple[Callable[[], object], ...] = (
-            lambda: self._misbehave(silent=True), lambda: self._misbehave(drop=0.5),
-            lambda: self._misbehave(corrupt=0.3), lambda: self._misbehave(delay=0.5, late=0.02),
-            lambda: self._misbehave(ft_silent=True), lambda: self.bench.ask("ft_restart"),
-            lambda: self.bench.ask("set", temperature=self.dice.choice((30, 90))),
-            lambda: self.bench.ask("set", torque_enable=0), lambda: self.bench.ask("alert", bits=32),
-            self.loop.guarded.disable, self._quiet, self._recover, self._recover, self._recover,
+        events: tuple[tuple[str, Callable[[], object]], ...] = (
+            ("silent", lambda: self._misbehave(silent=True)), ("drop", lambda: self._misbehave(drop=0.5)),
+            ("corrupt", lambda: self._misbehave(corrupt=0.3)),
+            ("delay", lambda: self._misbehave(delay=0.5, late=0.02)),
+            ("ft silent", lambda: self._misbehave(ft_silent=True)),
+            ("ft restart", lambda: self.bench.ask("ft_restart")),
+            ("temperature", lambda: self.bench.ask("set", temperature=self.dice.choice((30, 90)))),
+            ("torque off", lambda: self.bench.ask("set", torque_enable=0)),
+            ("alert", lambda: self.bench.ask("alert", bits=32)), ("disable", self.loop.guarded.disable),
+            ("no commands", self._quiet), *(("recover", self._recover),) * 3,
         )  # fmt: skip
+        name, event = self.dice.choice(events)
+        begun = time.monotonic_ns()
         with suppress(DeviceError):
-            self.dice.choice(events)()
+            event()
+        took = (time.monotonic_ns() - begun) / 1e6
+        self.happened.append(f"{name} at {(begun - self.begun) / 1e9:.2f} s ({took:.0f} ms)")
 
     def _misbehave(self, **how: object) -> None:
         self.bench.ask("misbehave", **{**CALM, **how})
@@ -113,4 +134,5 @@ def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str
     what = f"{args.minutes:g} min of random faults, seed {args.seed}: violations"
     first = f": {watched.violations[0]}" if watched.violations else ""
     told = f"{len(watched.violations)}{first}; {watched.faults} faults, torque in {watched.seen} cycles"
+    told += f"; the bench itself stood still under torque {len(watched.excused)} times"
     return [(what, "0", told)]

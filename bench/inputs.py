@@ -3,6 +3,7 @@
     python bench/inputs.py                    all parts, a table
     python bench/inputs.py --quick            a few minutes of them
     python bench/inputs.py --part matrix --only "verb=diagnose"
+    python bench/inputs.py --part matrix --log matrix.jsonl --resume matrix.jsonl    go on after a break
 
 matrix: every rig, verb and subset of channels, pairwise rates, lengths, commands, clocks and dead sensors.
 mutations: damaged files of every format that is read. The promise: a result, or status 2 and one line.
@@ -18,6 +19,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -41,11 +43,11 @@ def main() -> int:
     broken = 0
     try:
         if "matrix" in args.part:
-            cases, said = matrix.bag_cases(args.seed, args.quick)
-            cases = [case for case in cases if matrix.samples(case) <= args.samples]
-            broken += play("bags", matrix.works(cases, matrix.play_bag, "b"), args, folder, said)
-            others = matrix.other_cases(args.seed, args.quick)
+            others = sorted(matrix.other_cases(args.seed, args.quick), key=matrix.expense)
             broken += play("rigs and numbers", matrix.works(others, matrix.play_other, "r"), args, folder, "")
+            cases, said = matrix.bag_cases(args.seed, args.quick)
+            cases = sorted((c for c in cases if matrix.samples(c) <= args.samples), key=matrix.expense)
+            broken += play("bags", matrix.works(cases, matrix.play_bag, "b"), args, folder, said)
         if "mutations" in args.part:
             count = 300 if args.quick else args.count
             broken += damage(args, count, folder)
@@ -68,6 +70,9 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--only", nargs="+", default=[], metavar="TEXT", help="lines that hold all of these")
     parser.add_argument("--log", type=Path, help="JSON lines: every case with its outcome")
+    parser.add_argument(
+        "--resume", type=Path, metavar="LOG", help="do not play again what this log holds with a kept promise"
+    )
     parser.add_argument("--keep", type=Path, metavar="DIR", help="copy mutated files that broke a promise")
     parser.add_argument("--verbose", action="store_true", help="what went wrong in full")
     return parser.parse_args()
@@ -80,15 +85,19 @@ def play(title: str, work: Iterable[Work], args: argparse.Namespace, folder: Pat
         return 0
     inside = folder / title.replace(" ", "_")
     inside.mkdir()
-    began, outcomes = time.monotonic(), []
-    for number, (name, outcome) in enumerate(serve(chosen, inside, args.jobs)):
+    kept = kept_promises(args.resume)
+    outcomes = [(name, kept[_case(name)]) for name, _ in chosen if _case(name) in kept]
+    began, before = time.monotonic(), len(outcomes)
+    for name, outcome in serve((w for w in chosen if _case(w[0]) not in kept), inside, args.jobs):
         outcomes.append((name, outcome))
         _log(args.log, outcomes[-1:])
         if sys.stderr.isatty():
-            print(f"\r{title}: {number + 1} of {len(chosen)}", end="", file=sys.stderr)
+            print(f"\r{title}: {len(outcomes)} of {len(chosen)}", end="", file=sys.stderr)
     if sys.stderr.isatty():
         print("\r\033[K", end="", file=sys.stderr)
-    print(f"\n{title}: {len(outcomes)} in {time.monotonic() - began:.0f} s" + (f" ({said})" if said else ""))
+    earlier = f" and {before} from {args.resume}" if before else ""
+    took = f"{len(outcomes) - before} in {time.monotonic() - began:.0f} s{earlier}"
+    print(f"\n{title}: {took}" + (f" ({said})" if said else ""))
     return table(outcomes, args.verbose)
 
 
@@ -126,6 +135,22 @@ def _log(path: Path | None, outcomes: list[tuple[str, Outcome]]) -> None:
         with path.open("a", encoding="utf-8") as file:
             for name, outcome in outcomes:
                 file.write(json.dumps({"case": name, **vars(outcome)}) + "\n")
+
+
+def kept_promises(log: Path | None) -> dict[str, Outcome]:
+    """Return the cases of a log whose last outcome kept the promise; a line that broke off is left out."""
+    last: dict[str, Outcome] = {}
+    for line in log.read_text(encoding="utf-8").splitlines() if log is not None and log.exists() else ():
+        with suppress(ValueError):
+            read = json.loads(line)
+            name = read.pop("case")
+            last[_case(name)] = Outcome(**read)
+    return {case: outcome for case, outcome in last.items() if not outcome.is_fault}
+
+
+def _case(name: str) -> str:
+    """Return what a case is, without its number, which new rigs and effects change."""
+    return name.partition(" ")[2]
 
 
 def table(outcomes: list[tuple[str, Outcome]], verbose: bool) -> int:

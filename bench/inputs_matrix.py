@@ -69,8 +69,13 @@ def bag_cases(seed: int, quick: bool) -> tuple[list[Case], str]:
 
 
 def samples(case: Case) -> float:
-    """Return how many samples the longest channel of a case has."""
-    return float(case["rate"] * case["duration"] * max(1.0, case["states"]))
+    """Return how many samples the longest channel of a case has, or what stands for them."""
+    return float(case.get("rate", 1.0) * case.get("duration", 1.0) * max(1.0, case.get("states", 1.0)))
+
+
+def expense(case: Case) -> tuple[bool, float]:
+    """Return what sorts cases by what they cost: a run that is broken off has played the most."""
+    return case["verb"] == "control", samples(case)
 
 
 def play_bag(case: Case, folder: Path) -> Outcome:

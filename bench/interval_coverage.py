@@ -1,6 +1,6 @@
 """How often identify's 95 % intervals hold the truth, on records of the second bench with something wrong.
 
-.venv/bin/python bench/interval_coverage.py --seeds 100 [--scenarios NAME ...] [--duration 20]
+.venv/bin/python bench/interval_coverage.py --seeds 100 [--scenarios NAME ...] [--duration 20] [--first 0]
 """
 
 from __future__ import annotations
@@ -54,20 +54,28 @@ def coloured(record: Record, rng: np.random.Generator) -> Record:
     return record.with_channels(**changed)
 
 
-def jittered(record: Record, rng: np.random.Generator, by: float = 3e-4) -> Record:
-    """Return the record with every message's stamp off by up to `by` s."""
-    off = {c: rng.uniform(-by, by, len(record["command"])) for c in sorted(set(CLOCKS.values()))}
-    return record.with_channels(
-        **{n: Channel(c.t + off[CLOCKS[n]][: len(c)], c.y.copy()) for n, c in record.channels.items()}
-    )
+def jittered(clocks: Sequence[str], by: float = 3e-4) -> Spoil:
+    """Return what puts the stamps of every message of these clocks off by up to `by` s."""
+
+    def spoil(record: Record, rng: np.random.Generator) -> Record:
+        off = {c: rng.uniform(-by, by, len(record["command"])) for c in clocks}
+        changed = {n: c for n, c in record.channels.items() if CLOCKS[n] in clocks}
+        return record.with_channels(
+            **{n: Channel(c.t + off[CLOCKS[n]][: len(c)], c.y.copy()) for n, c in changed.items()}
+        )
+
+    return spoil
 
 
 SCENARIOS: dict[str, tuple[dict[str, float], Spoil]] = {
     "white noise": ({}, unspoiled),
     "coloured noise, AR 0.9": ({}, coloured),
-    "stamps off by 0.3 ms": ({}, jittered),
+    "sensor stamps off by 0.3 ms": ({}, jittered(("ft", "joint"))),
+    "command stamps off by 0.3 ms": ({}, jittered(("command",))),
+    "all stamps off by 0.3 ms": ({}, jittered(("command", "ft", "joint"))),
     "Coulomb friction 0.3 N m": ({"coulomb": 0.3}, unspoiled),
     "motor constant 10 % off": ({"torque_gain": 1.1}, unspoiled),
+    "F/T gain 10 % off": ({"ft_gain": 1.1}, unspoiled),
     "command delay 2 ms": ({"delay": 2e-3}, unspoiled),
 }
 
@@ -87,11 +95,11 @@ def outcome(name: str, seed: int, duration: float) -> tuple[Identification, dict
     return identify([record], load_rig(RIG)), {n: plant[alias] for n, alias in TRUTH.items()}
 
 
-def row(name: str, seeds: int, duration: float) -> str:
+def row(name: str, seeds: Sequence[int], duration: float) -> str:
     """Return one line of the table: coverage by parameter, and the median half width of K_s."""
     inside = dict.fromkeys(TRUTH, 0)
     widths, ratios = [], []
-    for seed in range(seeds):
+    for seed in seeds:
         result, true = outcome(name, seed, duration)
         for p in result.parameters:
             if p.name in true:
@@ -99,8 +107,8 @@ def row(name: str, seeds: int, duration: float) -> str:
                 if p.name == "spring.stiffness":
                     widths.append(50.0 * (p.ci95[1] - p.ci95[0]) / p.value)
         ratios.append(max(v / result.noise_rms[n] for n, v in result.residual_rms.items()))
-    shares = "".join(f"{100.0 * inside[n] / seeds:10.0f}" for n in TRUTH)
-    return f"{name:26}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
+    shares = "".join(f"{100.0 * inside[n] / len(seeds):10.0f}" for n in TRUTH)
+    return f"{name:30}{shares}{np.median(widths):14.3g}{np.median(ratios):12.2f}"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -108,13 +116,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     formatter = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
     parser.add_argument("--seeds", type=int, default=100, help="records a scenario (default %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="first seed (default %(default)s)")
     parser.add_argument("--duration", type=float, default=20.0, help="s, of a record (default %(default)s)")
     parser.add_argument("--scenarios", nargs="+", choices=SCENARIOS, default=list(SCENARIOS), metavar="NAME")
     args = parser.parse_args(argv)
     print(f"truth inside the 95 % interval, %, of {args.seeds} records of {args.duration:g} s")
-    print(f"{'':26}{'J_m':>10}{'b_m':>10}{'K_s':>10}{'b_s':>10}{'K_s ± %':>14}{'x noise':>12}")
+    print(f"{'':30}{'J_m':>10}{'b_m':>10}{'K_s':>10}{'b_s':>10}{'K_s ± %':>14}{'x noise':>12}")
     for name in args.scenarios:
-        print(row(name, args.seeds, args.duration), flush=True)
+        print(row(name, range(args.first, args.first + args.seeds), args.duration), flush=True)
     return 0
 
 

@@ -78,7 +78,8 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")
     parts = _scan_all(files, contents)
-    contents.notes.extend(told.notes)
+    contents.notes.extend(told.remarks.notes)
+    contents.faults.extend(told.remarks.faults)
     read: Counter[str] = Counter()
     for part in parts:
         read.update({topic: len(messages.raw) for topic, messages in part.topics.items()})

@@ -26,6 +26,7 @@ from msg_adapters.mcap_records import (
     MAGIC,
     MESSAGE,
     MESSAGE_HEAD,
+    METADATA,
     RECORD,
     SCHEMA,
     STATISTICS,
@@ -35,6 +36,8 @@ from msg_adapters.mcap_records import (
     text,
 )
 from msg_adapters.mcap_summary import Summary, read_summary, take_statistics
+from msg_adapters.remarks import NAME as REMARKS
+from msg_adapters.remarks import remarks_of
 
 CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 
@@ -135,6 +138,8 @@ class _Scanner:
         elif opcode in (DATA_END, FOOTER):
             self.ended = True
             self._check_data(buffer, opcode, first, stop)
+        elif opcode == METADATA:
+            self._metadata(buffer, first, stop)
         elif opcode == STATISTICS and self.summary.total is None:
             self._statistics(buffer, first, stop)
         elif opcode == ATTACHMENT:
@@ -144,6 +149,23 @@ class _Scanner:
                 self.damage.add("checksum_mismatch", f"the checksum {where} does not fit its content")
         else:
             self._small(buffer, opcode, first, stop, 0)
+
+    def _metadata(self, buffer: Buffer, first: int, stop: int) -> None:
+        """Take in what this project's writer has to say of the file."""
+        try:
+            name, at = text(buffer, first, stop)
+            if name != REMARKS:
+                return
+            at, texts = at + 4, {}
+            while at < stop:
+                key, at = text(buffer, at, stop)
+                texts[key], at = text(buffer, at, stop)
+        except ValueError as error:
+            self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
+            return
+        remarks = remarks_of(texts)
+        self.contents.notes.extend(remarks.notes)
+        self.contents.faults.extend(remarks.faults)
 
     def _statistics(self, buffer: Buffer, first: int, stop: int) -> None:
         """Take in the statistics of a file whose footer does not lead to them."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import struct
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 
 from msg_adapters.definitions import definition
@@ -24,11 +25,13 @@ from msg_adapters.mcap_records import (
     MAGIC,
     MESSAGE,
     MESSAGE_INDEX,
+    METADATA,
     RECORD,
     SCHEMA,
     STATISTICS,
     STATISTICS_HEAD,
 )
+from msg_adapters.remarks import NAME as REMARKS
 from rsea_ros.files import create, write_at
 
 CHUNK_SIZE = 1 << 20
@@ -50,6 +53,7 @@ class McapStorage:
         self._chunks: list[bytes] = []
         self._counts: dict[int, int] = {}
         self._times: list[int] = []
+        self._remarks = 0
         self._put(MAGIC + _record(HEADER, _text("ros2"), _text("rsea_ros")))
 
     def add(self, topic: str, msgtype: str) -> int:
@@ -98,6 +102,14 @@ class McapStorage:
         self._times += [min(times), max(times)] if self._index else []
         self._chunk, self._index = bytearray(), {}
 
+    def remark(self, texts: Mapping[str, str]) -> None:
+        """Keep texts by name in a metadata record."""
+        self.flush()
+        if texts:
+            self._remarks += 1
+            pairs = b"".join(_text(name) + _text(text) for name, text in texts.items())
+            self._put(_record(METADATA, _text(REMARKS), _sized(pairs)))
+
     def close(self) -> None:
         """Write the rest and the summary."""
         self.flush()
@@ -119,7 +131,8 @@ class McapStorage:
 
     def _statistics(self) -> bytes:
         times = self._times or [0]
-        numbers = (sum(self._counts.values()), len(self._types), len(self._counts), 0, 0, len(self._chunks))
+        declared = (sum(self._counts.values()), len(self._types), len(self._counts))
+        numbers = (*declared, 0, self._remarks, len(self._chunks))
         counts = b"".join(struct.pack("<HQ", key, count) for key, count in self._counts.items())
         return _record(STATISTICS, STATISTICS_HEAD.pack(*numbers, min(times), max(times)), _sized(counts))
 

@@ -11,14 +11,14 @@ import yaml
 
 from msg_adapters import yaml_text
 from msg_adapters.contents import Contents
+from msg_adapters.remarks import Remarks, remarks_of
+from msg_adapters.yaml_text import NotUnderstood
 from rsea_ros.errors import BagError
 from rsea_ros.wording import brief
 
 NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
-NOTES = "rsea_notes"
 VERSION = 9
-_LONGEST_NOTE, _MOST_NOTES = 500, 50
 
 
 @dataclass
@@ -33,11 +33,11 @@ class Topic:
 
 @dataclass(frozen=True)
 class Known:
-    """What the metadata of a bag say: its files, how many messages each topic has, and notes."""
+    """What the metadata of a bag say: its files, how many messages each topic has, and remarks."""
 
     files: list[Path] = field(default_factory=list)
     counts: Mapping[str, int] = field(default_factory=dict)
-    notes: Sequence[str] = ()
+    remarks: Remarks = field(default_factory=Remarks)
 
 
 def known(bag: Path, contents: Contents) -> Known:
@@ -58,7 +58,7 @@ def known(bag: Path, contents: Contents) -> Known:
         raise
     except (TypeError, ValueError, KeyError) as error:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
-        contents.tell("damaged_metadata", NAME, f"not understood ({brief(str(error))}), read without it")
+        contents.tell("damaged_metadata", NAME, f"not understood ({_why(error)}), read without it")
         return Known()
     for file in found.files:
         if not file.exists():
@@ -67,33 +67,49 @@ def known(bag: Path, contents: Contents) -> Known:
 
 
 def _known(bag: Path, document: Any) -> Known:
-    """Raises TypeError, ValueError or KeyError for a document that is not what rosbag2 writes."""
-    root = document[ROOT]
+    """Raises NotUnderstood, TypeError, ValueError or KeyError for what rosbag2 does not write."""
+    root = document[ROOT] if isinstance(document, dict) else None
+    if not isinstance(root, dict):
+        raise NotUnderstood(f"no mapping {ROOT}")
     files = [bag / PurePath(_text_of(name)).name for name in _list_of(root["relative_file_paths"])]
     topics = [
         (topic["topic_metadata"]["name"], topic) for topic in _list_of(root["topics_with_message_count"])
     ]
-    counts = {_text_of(name): int(topic["message_count"]) for name, topic in topics}
+    counts = {_text_of(name): _count_of(topic["message_count"]) for name, topic in topics}
     custom = root.get("custom_data")
-    notes = custom.get(NOTES, "") if isinstance(custom, dict) else ""
-    lines = [brief(line, _LONGEST_NOTE) for line in _text_of(notes).splitlines()]
-    return Known(files, counts, lines[:_MOST_NOTES])
+    return Known(files, counts, remarks_of(custom if isinstance(custom, dict) else {}))
+
+
+def _why(error: Exception) -> str:
+    """Return in words why metadata were not understood."""
+    match error:
+        case NotUnderstood():
+            return brief(str(error))
+        case KeyError():
+            return f"no {brief(str(error.args[0]))}"
+    return "not in the form that rosbag2 writes"
 
 
 def _text_of(value: Any) -> str:
     if not isinstance(value, str) or "\0" in value:
-        raise TypeError(f"{brief(repr(value))}, expected a text")
+        raise NotUnderstood(f"{brief(repr(value))}, expected a text")
     return value
+
+
+def _count_of(value: Any) -> int:
+    if not (isinstance(value, str) and value.isdecimal() and value.isascii() and len(value) < 19):
+        raise NotUnderstood(f"message_count {brief(repr(value))}, expected a number")
+    return int(value)
 
 
 def _list_of(value: Any) -> list[Any]:
     if not isinstance(value, list):
-        raise TypeError(f"{brief(repr(value))}, expected a list")
+        raise NotUnderstood(f"{brief(repr(value))}, expected a list")
     return value
 
 
 def text(
-    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], notes: Sequence[str]
+    file: Path, storage: str, topics: Sequence[Topic], span: tuple[int, int], remarks: Remarks
 ) -> str:
     """Return the metadata of a bag of one file; span is its first and last log time, ns."""
     document: Mapping[str, Any] = {
@@ -105,7 +121,7 @@ def text(
         "compression_mode": "",
         "relative_file_paths": [file.name],
         "files": [{"path": file.name, **_amount(topics, span)}],
-        "custom_data": {NOTES: "\n".join(notes)} if notes else None,
+        "custom_data": remarks.texts() or None,
         "ros_distro": "rsea_ros",
     }
     return str(yaml.safe_dump({ROOT: document}, sort_keys=False))

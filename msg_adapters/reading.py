@@ -22,6 +22,9 @@ from rsea_ros.wording import brief
 _MOST_NAMED = 20
 """Topics or joints that a message lists."""
 
+_NEEDED = ((("torque_command",), ("desired_position",)), (("joint_states", "ft"), ("deflection",)))
+"""Roles of which one must have messages, and others that do as well."""
+
 LATEST = 2**62
 """The highest log time that is believed, ns: the year 2116. Differences of stamps stay within 64 bits."""
 
@@ -93,22 +96,27 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             )
         if found.raw:
             filled.add(role)
-    needs = [("torque_command",), ("joint_states", "ft")] if strict else [ROLES]
-    for roles in needs:
-        if not filled.intersection(roles):
+    for roles, others in _NEEDED if strict else [(ROLES, ())]:
+        if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)
             topics_held = sorted(contents.topics.items())[:_MOST_NAMED]
             have = ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics_held)
             have = have or "no topic at all"
-            raise BagError(f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}")
+            raise BagError(
+                f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}; "
+                "record one, or name its topic with --topic or --namespace"
+            )
 
 
 def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
     """Refuse messages whose arrays are empty where values are needed, and measurements of another clock."""
-    if strict and "command" not in series:
+    if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
     if not set(series) - ({"command", "reference"} if strict else set()):
-        raise BagError(f"{source}: the messages hold no values, expected a measurement{told.told()}")
+        raise BagError(
+            f"{source}: no measurement is left{told.told()}, expected joint states or F/T with values, "
+            "stamped by the command's clock"
+        )
 
 
 def _series(

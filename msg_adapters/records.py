@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters import encoding
+from msg_adapters.remarks import Remarks
 from msg_adapters.topics import AXES, FIELDS, TYPES, TopicMap, sign_and_index
 from msg_adapters.writing import BagWriter
 from rsea_ros.errors import BagError
@@ -37,11 +38,14 @@ def write_records(
 
     Log times are the stamps, or the highest stamp so far where a stamp goes back, so that a reader finds
     the samples in the order in which they stand in the record.
-    Raises BagError where the bag cannot be written, and for stamps before 1970 or after 2038.
+    Raises BagError where the bag cannot be written, for two roles on one topic, and for stamps before 1970
+    or after 2038.
     """
     series = [one for record, topics in records for one in _series(record, topics)]
+    _check_apart(series)
     notes = [note for record, _ in records for note in record.notes]
-    with BagWriter(path, storage, recording=False, notes=notes, force=force) as bag:
+    remarks = Remarks(notes, [fault for record, _ in records for fault in record.faults])
+    with BagWriter(path, storage, recording=False, remarks=remarks, force=force) as bag:
         for log_time, name, msgtype, raw in _in_order(series):
             bag.write(name, msgtype, log_time, raw)
 
@@ -63,6 +67,15 @@ class _Series:
         name, msgtype = self.topics.topic(self.role), TYPES[self.role]
         for log_time, raw in zip(self.log_times[part].tolist(), messages, strict=True):
             yield log_time, name, msgtype, raw
+
+
+def _check_apart(series: Sequence[_Series]) -> None:
+    """Refuse two roles on one topic: no reader could tell them apart. Raises BagError."""
+    roles: dict[str, tuple[TopicMap, str]] = {}
+    for one in series:
+        topic, this = one.topics.topic(one.role), (one.topics, one.role)
+        if (other := roles.setdefault(topic, this)) != this:
+            raise BagError(f"topic {topic}: is both {other[1]} and {one.role}, expected a topic for each")
 
 
 def _in_order(series: Sequence[_Series]) -> Iterator[tuple[int, str, str, bytes]]:
@@ -99,9 +112,8 @@ def _stamps(record: Record, name: str, t: FloatArray) -> IntArray:
     """Return stamps in ns since 1970. Raises BagError for those that no header can hold."""
     since = 1e-9 * record.epoch_ns + t
     for k in np.flatnonzero(~((since >= 0.0) & (since < LATEST)))[:1]:
-        raise BagError(
-            f"{record.source}: {name}: stamp {k} is {since[k]:.6g} s since 1970, expected 0 to {LATEST:.0f}"
-        )
+        stamp = f"{record.source or 'record'}: {name}: stamp {k} is {since[k]:.6g} s since 1970"
+        raise BagError(f"{stamp}, expected 0 to {LATEST:.0f}")
     return record.epoch_ns + np.rint(t * 1e9).astype(np.int64)
 
 

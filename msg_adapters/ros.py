@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
@@ -96,9 +97,7 @@ def diagnostics_message(
     """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: what it is about."""
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
     message = DiagnosticArray(
-        status=[
-            DiagnosticStatus(level=level, name=name, message=summary, values=pairs, hardware_id=hardware)
-        ]
+        status=[DiagnosticStatus(level=level, name=name, message=summary, values=pairs, hardware_id=hardware)]
     )
     message.header.stamp = time_of(stamp_ns)
     return message
@@ -150,6 +149,22 @@ def message_type(name: str) -> Any:
         raise ParameterError(
             f"message type {name!r} is not installed, expected a package {package!r}"
         ) from None
+
+
+def message_text(message: Any) -> str:
+    """Return any message as YAML."""
+    return yaml.safe_dump(_plain(message), sort_keys=False, allow_unicode=True)
+
+
+def _plain(value: Any) -> Any:
+    """Return a field as mappings, lists, numbers and text."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, bytes):
+        return value.hex()
+    if isinstance(value, str | bool | int | float):
+        return value
+    return [_plain(item) for item in value]
 
 
 def _index(message: JointState, joint: str | None) -> int:

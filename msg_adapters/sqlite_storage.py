@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -63,6 +63,9 @@ class SqliteStorage:
 
     def sync(self) -> None:
         """Do nothing: a commit waits for the disk."""
+
+    def remark(self, texts: Mapping[str, str]) -> None:
+        """Do nothing: only metadata.yaml has a place for them."""
 
     def close(self) -> None:
         """Commit the rest."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Protocol
 
@@ -22,6 +23,9 @@ class Storage(Protocol):
 
     def sync(self) -> None:
         """Wait until what was flushed is on the disk: from here on it survives a power cut too."""
+
+    def remark(self, texts: Mapping[str, str]) -> None:
+        """Keep texts by name in the file, where its format has a place for them."""
 
     def close(self) -> None:
         """Write the rest and the index."""

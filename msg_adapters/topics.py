@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from rsea_ros.errors import ParameterError
+from rsea_ros.errors import BagError, ParameterError
+from rsea_ros.wording import shown
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 
 AXES = tuple(f"{part}.{axis}" for part in ("force", "torque") for axis in "xyz")
-ROLES = ("torque_command", "joint_states", "ft", "desired_position")
+ROLES = ("torque_command", "joint_states", "ft", "deflection", "desired_position")
 
 FIELDS: Mapping[str, Mapping[str, str]] = {
     "torque_command": {"command": "effort"},
     "joint_states": {"position": "position", "velocity": "velocity", "motor_torque": "effort"},
     "ft": {"ft": "wrench"},
+    "deflection": {"deflection": "position"},
     "desired_position": {"reference": "position"},
 }
 """By role: the channels of the record, and the field of the message that each comes from."""
@@ -29,6 +32,18 @@ def sign_and_index(axis: str) -> tuple[float, int]:
     return (-1.0 if axis.startswith("-") else 1.0), AXES.index(axis.removeprefix("-"))
 
 
+_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+_LONGEST = 247
+"""Characters of a topic: ROS 2 puts eight more in front, and DDS takes 255."""
+
+
+def check_topic(topic: str) -> None:
+    """Refuse a name that no node can have: rosbag2 could not play it. Raises BagError."""
+    if not _NAME.fullmatch(topic) or len(topic) > _LONGEST:
+        expected = f"letters, digits and _ between slashes, none beginning with a digit, up to {_LONGEST}"
+        raise BagError(f"topic {shown(topic)}: is no name of ROS, expected {expected} characters")
+
+
 @dataclass(frozen=True)
 class TopicMap:
     """Names of the topics of one bench; the defaults are the contract's.
@@ -38,19 +53,27 @@ class TopicMap:
     the record. It is named like its sibling `desired_torque`, after what it asks for: `reference` says
     neither of what nor in which unit, and in ROS names a reference frame as often as a set point.
 
+    deflection is a JointState whose position is the angle of the spring by its own encoder.
+
     joint: which joint, where the messages hold several.
     axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
+    Raises ParameterError for another axis, and for a name that cannot be printed.
     """
 
     namespace: str = "/rsea"
     torque_command: str = "torque_command"
     joint_states: str = "joint_states"
     ft: str = "ft"
+    deflection: str = "deflection"
     desired_position: str = "desired_position"
     joint: str | None = None
     axis: str = "torque.z"
 
     def __post_init__(self) -> None:
+        for field in ("namespace", *ROLES, "joint"):
+            name = getattr(self, field) or ""
+            if not name.isprintable():
+                raise ParameterError(f"{field} {name!r}: cannot be printed, expected a name of ROS")
         if self.axis.removeprefix("-") not in AXES:
             raise ParameterError(
                 f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 
@@ -14,11 +14,14 @@ from msg_adapters import metadata
 from msg_adapters.definitions import definition
 from msg_adapters.mcap_storage import McapStorage
 from msg_adapters.metadata import Topic
+from msg_adapters.remarks import Remarks
 from msg_adapters.sqlite_storage import SqliteStorage
 from msg_adapters.storage import Storage
+from msg_adapters.topics import check_topic
 from rsea_ros import files
 from rsea_ros.errors import BagError, OutputError
 from rsea_ros.interrupts import undisturbed
+from rsea_ros.staging import Stage, make_stage
 
 STORAGES: Mapping[str, tuple[str, Callable[[Path], Storage]]] = {
     "mcap": (".mcap", McapStorage),
@@ -43,8 +46,8 @@ class BagWriter:
     """
 
     def __init__(
-        self, path: str | Path, storage: str = "mcap", *, recording: bool = True, notes: Sequence[str] = (),
-        force: bool = False, interval: float = INTERVAL,
+        self, path: str | Path, storage: str = "mcap", *, recording: bool = True,
+        remarks: Remarks | None = None, force: bool = False, interval: float = INTERVAL,
     ) -> None:  # fmt: skip
         self.path = Path(path)
         by_suffix = {suffix: name for name, (suffix, _) in STORAGES.items()}
@@ -53,12 +56,13 @@ class BagWriter:
         if self._kind not in STORAGES:
             raise BagError(f"{path}: storage {storage!r}, expected one of {', '.join(STORAGES)}")
         self._recording, self._force, self._interval = recording, force, interval
-        self.notes = list(notes)
+        self.remarks = remarks or Remarks()
         self._topics: dict[str, tuple[int, Topic]] = {}
         self._span = (0, 0)
         self._flushed = time.monotonic()
         self._disk = ThreadPoolExecutor(1, "disk")
         self._syncing: Future[None] | None = None
+        self._stage: Stage | None = None
 
     def __enter__(self) -> BagWriter:
         self._check_name()
@@ -66,7 +70,7 @@ class BagWriter:
         try:
             with undisturbed():
                 self._made = files.make_folder(self.path.parent)
-                self.partial = _new_directory(self.path, self._recording)
+                self.partial = self._new_directory()
                 self._made.insert(0, self.partial)
                 self._open()
         except OSError as error:
@@ -78,12 +82,14 @@ class BagWriter:
         return self
 
     def write(self, topic: str, msgtype: str, log_time: int, raw: bytes) -> None:
-        """Append a serialised message; log_time in ns since the epoch."""
+        """Append a serialised message; log_time in ns since the epoch.
+
+        Raises BagError for a topic that ROS could not have, and for a topic of another type than before.
+        """
         try:
-            if topic not in self._topics:
-                known = Topic(topic, msgtype, definition(msgtype).digest)
-                self._topics[topic] = (self._storage.add(topic, msgtype), known)
-            key, known = self._topics[topic]
+            key, known = self._topics.get(topic) or self._declared(topic, msgtype)
+            if known.msgtype != msgtype:
+                raise BagError(f"topic {topic}: is {known.msgtype} and {msgtype}, expected one type")
             self._storage.write(key, log_time, raw)
             known.count += 1
             first, last = self._span if self._span[1] else (log_time, log_time)
@@ -91,6 +97,13 @@ class BagWriter:
         except OSError as error:
             raise self._error(error) from None
         self.keep_up()
+
+    def _declared(self, topic: str, msgtype: str) -> tuple[int, Topic]:
+        """Return key and topic of a new one."""
+        check_topic(topic)
+        known = Topic(topic, msgtype, definition(msgtype).digest)
+        self._topics[topic] = (self._storage.add(topic, msgtype), known)
+        return self._topics[topic]
 
     def keep_up(self) -> None:
         """Flush once in an interval, and let a thread wait for the disk; call it also while nothing comes."""
@@ -133,6 +146,7 @@ class BagWriter:
             finally:
                 if not complete:
                     self._abandon()
+                self._release()
 
     def _check_name(self) -> None:
         """Refuse a name that is taken by something that may not be replaced. Raises BagError."""
@@ -147,6 +161,19 @@ class BagWriter:
             if any(file.name != metadata.NAME and file.suffix not in PARTS for file in inside):
                 raise BagError(f"{self.path}: holds more than a bag, expected a new name")
 
+    def _new_directory(self) -> Path:
+        """Make a directory that nobody has: a stage, or NAME.partial, which a killed recorder leaves."""
+        with files.naming(self.path):
+            if not self._recording:
+                self._stage = make_stage(self.path.parent, 0o777)
+                return self._stage.path
+            for number in count():
+                path = self.path.with_name(f"{self.path.name}.partial{number or ''}")
+                with suppress(FileExistsError):
+                    path.mkdir()
+                    break
+        return path
+
     def _open(self) -> None:
         suffix, opened = STORAGES[self._kind]
         name = self.path.stem if self._single else self.path.name
@@ -156,6 +183,8 @@ class BagWriter:
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
+        if self._single:
+            self._storage.remark(self.remarks.texts())
         self._storage.close()
         file = self._storage.path
         if self._single:
@@ -165,7 +194,7 @@ class BagWriter:
         topics = [topic for _, topic in self._topics.values()]
         files.remove(self.partial / metadata.NAME)
         files.write_new(
-            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.notes)
+            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.remarks)
         )
         files.give_names([(self.partial, self.path)], force=self._force)
 
@@ -182,22 +211,16 @@ class BagWriter:
         for path in self._made[1:]:
             with suppress(OSError):
                 path.rmdir()
+        self._release()
+
+    def _release(self) -> None:
+        """Let go of the lock of the stage."""
+        if self._stage is not None:
+            self._stage.release()
+            self._stage = None
 
     def _error(self, error: OSError) -> BagError:
         kept = f"; what was written until then is in {self.partial}" if self._recording else ""
         if isinstance(error, OutputError):
             return BagError(f"{error}{kept}")
         return BagError(f"{self.path}: cannot be written: {error.strerror or error}{kept}")
-
-
-def _new_directory(path: Path, recording: bool) -> Path:
-    """Make a directory that nobody has: NAME.partial of a recording; a killed recorder's stays."""
-    number = 0
-    while True:
-        name = f"{path.name}.partial{number or ''}" if recording else f"{files.PREFIX}{secrets.token_hex(4)}"
-        try:
-            with files.naming(path):
-                path.with_name(name).mkdir()
-            return path.with_name(name)
-        except FileExistsError:
-            number += 1

@@ -24,12 +24,17 @@ ALIASES: Mapping[str, str] = MappingProxyType(
         "tau_d": "ft",
         "torque": "ft",
         "q_ref": "reference",
+        "target_position": "reference",
+        "q_spring": "deflection",
     }
 )
 """Other names that people give to the channels of signals.UNITS."""
 
 FEWEST = 2
 """Samples of a channel: fewer have no rate."""
+
+_NO_NUMBERS = "cbmMSUV"
+"""Kinds of numpy arrays that numpy would turn into numbers that nobody meant."""
 
 
 class Table(Protocol):
@@ -42,7 +47,8 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
     """Return a record of channels that share their stamps t (s, shape (n,)); values are copied.
 
     channels: by a name of signals.UNITS or one of ALIASES, each in SI and of shape (n,).
-    Raises ChannelError for an unknown name, another shape, falling stamps or fewer than 2 samples.
+    Raises ChannelError for an unknown name, another shape, complex numbers, texts or dates, stamps that are
+    not finite or do not rise, a command that is not finite, or fewer than 2 samples.
     """
     stamps = _vector("t", t, source)
     values = {_channel(name, source): _vector(name, y, source) for name, y in channels.items()}
@@ -53,7 +59,10 @@ def record_from_arrays(t: npt.ArrayLike, source: str, channels: Mapping[str, npt
     for name, y in values.items():
         if y.shape != stamps.shape:
             raise ChannelError(f"{source}: {name} has {len(y)} values for {len(stamps)} stamps in t")
+    _check_finite("t", "s", stamps, source)
     _check_stamps(stamps, source)
+    if "command" in values:
+        _check_finite("command", UNITS["command"], values["command"], source)
     return Record({name: Channel(stamps - stamps[0], y) for name, y in values.items()}, source)
 
 
@@ -75,15 +84,29 @@ def _channel(name: str, source: str) -> str:
 
 
 def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
+    """Return the values of a channel, or of `t`, as doubles in memory of their own, NaN where masked.
+
+    Raises ChannelError for what is not of real numbers, or not of shape (n,) with n >= 2.
+    """
     try:
-        vector = np.array(values, dtype=np.float64)
+        given: Any = np.ma.asarray(values)
+        numbers = given if given.dtype.kind in _NO_NUMBERS else given.astype(np.float64)
     except (TypeError, ValueError) as error:
         raise ChannelError(f"{source}: {name} is not an array of numbers: {error}") from None
-    if vector.ndim != 1 or len(vector) < FEWEST:
+    if numbers.dtype.kind in _NO_NUMBERS:
+        unit = "s" if name == "t" else UNITS[_channel(name, source)]
+        raise ChannelError(f"{source}: {name} holds {numbers.dtype}, expected real numbers in {unit}")
+    if numbers.ndim != 1 or len(numbers) < FEWEST:
         raise ChannelError(
-            f"{source}: {name} has shape {vector.shape}, expected (n,) with n >= {FEWEST} samples"
+            f"{source}: {name} has shape {numbers.shape}, expected (n,) with n >= {FEWEST} samples"
         )
-    return vector
+    filled: FloatArray = numbers.filled(np.nan)
+    return filled
+
+
+def _check_finite(name: str, unit: str, values: FloatArray, source: str) -> None:
+    for k in np.flatnonzero(~np.isfinite(values))[:1]:
+        raise ChannelError(f"{source}: {name}[{k}] = {values[k]}, expected a finite value in {unit}")
 
 
 def _check_stamps(stamps: FloatArray, source: str) -> None:

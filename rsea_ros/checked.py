@@ -8,7 +8,7 @@ from typing import Any
 
 from rsea_ros.errors import FieldError
 from rsea_ros.units import same_unit
-from rsea_ros.wording import shown
+from rsea_ros.wording import did_you_mean, shown
 
 
 def number(value: Any, name: str, unit: str) -> float:
@@ -49,7 +49,7 @@ def only_keys(body: Mapping[str, Any], allowed: set[str], where: str) -> None:
     """Raise FieldError for a key that is not allowed."""
     for key in body:
         if key not in allowed:
-            expected = ", ".join(sorted(allowed))
+            expected = ", ".join(sorted(allowed)) + did_you_mean(str(key), allowed)
             raise FieldError(
                 f"{where}: unknown key {shown(key)}, expected one of {expected}", f"{where}.{key}"
             )

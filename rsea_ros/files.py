@@ -149,7 +149,7 @@ def _take_free(source: Path, target: Path, undo: Undo) -> None:
 
 def _exchange(source: Path, target: Path, undo: Undo) -> Path:
     """Put a file or folder in the place of another; return the new name of the other."""
-    aside = target.with_name(f"{PREFIX}{secrets.token_hex(4)}")
+    aside = target.with_name(f"{PREFIX}old-{secrets.token_hex(4)}")
     if source.is_dir():
         os.rename(target, aside)
         undo.append(lambda: os.rename(aside, target))

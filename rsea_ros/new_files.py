@@ -1,13 +1,12 @@
 """Results: files of one folder that appear together, complete, and not over what is there.
 
-They are written into a folder of a random name beside their destination, made for this process alone (0700),
-and get their names when all are complete and on the disk. An error or a signal before leaves all as it was.
+They are written into a folder of a random name beside their destination (see staging), and get their names
+when all are complete and on the disk. An error or a signal before leaves all as it was.
 """
 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,16 +16,15 @@ from types import TracebackType
 
 from rsea_ros.errors import OutputError, RseaError
 from rsea_ros.files import (
-    PREFIX,
     check_replaceable,
     give_names,
     make_folder,
     naming,
-    remove,
     taken,
     write_new,
 )
 from rsea_ros.interrupts import undisturbed
+from rsea_ros.staging import Stage, make_stage
 
 
 @dataclass(frozen=True)
@@ -53,14 +51,14 @@ class NewFiles:
         self.folder = self._place.folder
         self._names: list[str] = []
         self._made: list[Path] = []
-        self._stage: Path | None = None
+        self._stage: Stage | None = None
 
     def __enter__(self) -> NewFiles:
         try:
             with undisturbed():
                 self.folder = self._make_folder()
                 with naming(self.folder):
-                    self._stage = Path(tempfile.mkdtemp(prefix=PREFIX, dir=self.folder))
+                    self._stage = make_stage(self.folder)
         except BaseException:
             self._clear(complete=False)
             raise
@@ -70,7 +68,7 @@ class NewFiles:
         """Return where another writer puts the file that will have this name."""
         assert self._stage is not None
         self._names.append(name)
-        return self._stage / name
+        return self._stage.path / name
 
     def write(self, name: str, text: str) -> Path:
         """Write a file, and return the path that it will have."""
@@ -85,14 +83,14 @@ class NewFiles:
         with undisturbed():
             try:
                 if error is None:
-                    pairs = [(self._stage / name, self.folder / name) for name in self._names]
+                    pairs = [(self._stage.path / name, self.folder / name) for name in self._names]
                     give_names(pairs, force=self._place.force)
                     complete = True
             except (OSError, RseaError) as failure:
                 error = failure
                 raise
             finally:
-                _name_finally(error, self._stage, self.folder)
+                _name_finally(error, self._stage.path, self.folder)
                 self._clear(complete)
 
     def _make_folder(self) -> Path:
@@ -112,7 +110,7 @@ class NewFiles:
         """Remove what was only for the writing, and where nothing was written the folders as well."""
         with undisturbed():
             if self._stage is not None:
-                remove(self._stage)
+                self._stage.remove()
             for folder in () if complete else self._made:
                 with suppress(OSError):
                     folder.rmdir()

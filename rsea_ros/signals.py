@@ -25,6 +25,7 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "position": "rad",
         "velocity": "rad/s",
         "ft": "N m",
+        "deflection": "rad",
         "reference": "rad",
     }
 )
@@ -36,6 +37,8 @@ position      gear output relative to the housing
 velocity      its rate
 ft            torque of the F/T sensor about the actuator axis, positive when the spring pushes
               the distal side forward
+deflection    angle of the spring by an encoder of its own, positive when the spring pushes the distal side
+              forward
 reference     position asked for by a controller that ran during the record
 """
 
@@ -130,8 +133,9 @@ class Record:
         t: stamps, s, shape (n,), rising: a command takes effect at its stamp and is held, a measurement was
         taken at its stamp, so the row of a control loop that reads and then commands is one stamp.
         channels: values by name of UNITS (or an alias such as `q`, `u`, `tau`), in SI, shape (n,): arrays,
-        lists or columns of a table.
-        Raises ChannelError for an unknown name, another shape, or stamps that do not rise.
+        lists or columns of a table; NaN, or masked, where a measurement is missing.
+        Raises ChannelError for an unknown name, another shape, what is no real number, stamps that do not
+        rise, and stamps or commands that are not finite.
         """
         from rsea_ros.arrays import record_from_arrays
 
@@ -164,6 +168,11 @@ class Record:
         except KeyError:
             have = ", ".join(self.channels) or "none"
             raise ChannelError(f"{self.source}: no channel {name!r}, expected it beside: {have}") from None
+
+    @property
+    def driving(self) -> Channel | None:
+        """What drove the run: its torques, else its target positions; None where neither was recorded."""
+        return self.channels.get("command", self.channels.get("reference"))
 
     @property
     def start(self) -> float:

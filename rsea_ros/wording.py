@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 _CONTROLS = r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 _COLOUR = r"\x1b(?!\[[\d;]*m)"
@@ -14,6 +15,12 @@ _LONGEST = 60
 def listed(names: Sequence[str], last: str = "and") -> str:
     """Return names as `a, b and c`; last: the word before the last of them."""
     return f" {last} ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return `, did you mean X?` with the known name nearest to a wrong one, or nothing."""
+    near = difflib.get_close_matches(name, list(names), n=1, cutoff=0.6)
+    return f", did you mean {near[0]}?" if near else ""
 
 
 def printable(text: str, *, colours: bool = False) -> str:
@@ -30,6 +37,11 @@ def shown(value: object, longest: int = 60) -> str:
     """Return a value as it stands in a message: quoted, and cut where it is long."""
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
+
+
+def no_utf_8(error: UnicodeDecodeError) -> str:
+    """Return which byte of a file is no text in UTF-8."""
+    return f"byte {error.start} is {error.object[error.start]:#04x}, which is no UTF-8"
 
 
 def brief(text: str, longest: int = _LONGEST) -> str:

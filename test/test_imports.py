@@ -13,8 +13,9 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "new_files"}
-BASE = {"errors", "fault_kinds", "signals", "stamps", "progress", "wording"} | FILES | YAML
+FILES = {"interrupts", "files", "staging", "new_files"}
+FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
+BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 OWN = {
     "errors": set(),
@@ -23,9 +24,12 @@ OWN = {
     "fault_kinds": set(),
     "progress": set(),
     "wording": set(),
+    "version": set(),
+    "plugins": {"errors"},
     "interrupts": set(),
     "files": {"errors", "interrupts"},
-    "new_files": {"errors", "files", "interrupts"},
+    "staging": {"files"},
+    "new_files": {"errors", "files", "interrupts", "staging"},
     "units": set(),
     "decimal_number": set(),
     "keys": set(),
@@ -53,6 +57,18 @@ OWN = {
     "compiler_cache": set(),
 }
 """Layers of this project that a layer may import beside itself."""
+
+DIAGNOSIS = (
+    {"settings", "coherence", "data_split", "residual_peaks", "screening", "joint_scale"},
+    {"result", "score", "short_pieces", "initial_guess"},
+    {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences"},
+    {"selection", "step_fits"},
+    {"forward_step", "backward_elimination", "evaluation"},
+    {"replacement", "conclusion"},
+    {"stepwise"},
+    {"diagnose"},
+)
+"""Layers of rsea_ros/diagnosis: a module imports those of the lines above its own only."""
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
@@ -143,6 +159,24 @@ def may_import(layer: str, module: str) -> bool:
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_module_imports_only_what_its_layer_may(path):
     assert offences(path, path.read_text(encoding="utf-8")) == []
+
+
+DIAGNOSIS_FOLDER = ROOT / "rsea_ros" / "diagnosis"
+
+
+def test_every_module_of_the_diagnosis_has_a_layer():
+    modules = sorted(p.stem for p in DIAGNOSIS_FOLDER.glob("*.py") if p.stem != "__init__")
+    assert sorted(name for layer in DIAGNOSIS for name in layer) == modules
+
+
+@pytest.mark.parametrize("layer", range(len(DIAGNOSIS)))
+def test_a_module_of_the_diagnosis_imports_only_from_the_layers_above_it(layer):
+    allowed = set().union(*DIAGNOSIS[:layer])
+    for name in DIAGNOSIS[layer]:
+        path = DIAGNOSIS_FOLDER / f"{name}.py"
+        modules = (module.split(".") for module, _ in imports(path, path.read_text(encoding="utf-8")))
+        used = {parts[2] for parts in modules if parts[:2] == ["rsea_ros", "diagnosis"]}
+        assert used <= allowed, name
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,7 @@ def test_a_launch_file_is_the_graph_behind_its_first_node(describe, name, first)
 
 def test_no_launch_file_is_untested():
     assert {path.name.removesuffix(".launch.py") for path in LAUNCH.glob("*.py")} == {"graph", *FIRST}
+    assert yaml.safe_load((LAUNCH / "graph.yaml").read_text())["graphs"] == FIRST
 
 
 def test_the_graph_declares_every_argument_that_it_uses(describe):
@@ -96,7 +97,10 @@ def test_only_the_first_node_model_and_identify_start_unasked(describe):
         assert (configurations(first), value) == ({"first"}, name)
     assert {name: configurations(part) for name, part in wanted.items()} == {name: {name} for name in wanted}
     assert {name: defaults(parts)[name] for name in wanted} == {
-        "model": "true", "identify": "true", "controller": "false", "record": "false",
+        "model": "true",
+        "identify": "true",
+        "controller": "false",
+        "record": "false",
         "excite": "false",
     }
 

@@ -6,6 +6,7 @@ where: {column: test_nr, below: 100}          # optional: only these rows; also 
 delimiter: ";"                                # optional: text files only, else seen from the first line
 channels:
   position: {column: phi, unit: deg, sign: -1}
+  velocity: {file: states.csv, column: "rates[2]", unit: rad/s}   # of a file in the directory that is read
   command:                                    # a list is summed
     - {column: vir, unit: V, scale: 35.15}    # N m for each V
     - {column: pulses, unit: N m, constant: 0.5}
@@ -14,10 +15,11 @@ channels:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from msg_adapters.tables.elements import CHOSEN, chosen
 from msg_adapters.tables.keys import CHANNEL, MAP, RATES, TERM, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
@@ -32,12 +34,16 @@ LARGEST = 1e300
 
 @dataclass(frozen=True)
 class Term:
-    """A column's part in a channel, in SI: sign · scale · column · (SI factor of its unit) + constant."""
+    """A column's part in a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
+
+    file: in the directory that is read; empty for the one file that is.
+    """
 
     column: str
     unit: str
     gain: float
     constant: float = 0.0
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,30 @@ class ImportMap:
     where: Rows | None = None
     delimiter: str | None = None
     about: str = ""
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of the directory that is read, one empty name where a file is read."""
+        return tuple(dict.fromkeys(terms[0].file for terms in self.channels.values()))
+
+    def at(self, index: int | None) -> ImportMap:
+        """Return the map for one number of lists in cells. Raises ImportMapError where none is chosen."""
+        channels = {
+            name: tuple(replace(term, column=chosen(term.column, index)) for term in terms)
+            for name, terms in self.channels.items()
+        }
+        left = [t.column for terms in channels.values() for t in terms if t.column.endswith(f"[{CHOSEN}]")]
+        if left:
+            raise ImportMapError(
+                f"{self.path}: column {left[0]!r} holds several joints, expected the number of one, from 0 "
+                "(--index)"
+            )
+        return replace(self, channels=channels)
+
+    def of_file(self, file: str) -> ImportMap:
+        """Return the map of the channels that a file holds."""
+        held = {name: terms for name, terms in self.channels.items() if terms[0].file == file}
+        return replace(self, channels=held)
 
     def columns(self) -> list[str]:
         """Return every column that is needed, each once."""
@@ -117,7 +147,12 @@ def _terms(channel: str, value: object) -> tuple[Term, ...]:
             f"channels.{channel} is an empty list, expected a column or more", f"channels.{channel}"
         )
     fields = [f"channels.{channel}" + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
-    return tuple(_term(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
+    terms = tuple(_term(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
+    if len({term.file for term in terms}) > 1:
+        raise FieldError(
+            f"channels.{channel} sums columns of several files, expected one file", f"channels.{channel}"
+        )
+    return terms
 
 
 def _term(field: str, value: object, dimension: str) -> Term:
@@ -135,9 +170,15 @@ def _term(field: str, value: object, dimension: str) -> Term:
     sign = _number(body.get("sign", 1), f"{field}.sign")
     if sign not in (1, -1):
         raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
-    gain = sign * factor * _number(body.get("scale", 1), f"{field}.scale")
+    scale = _number(body.get("scale", 1), f"{field}.scale")
+    if scale == 0.0:
+        raise FieldError(
+            f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
+        )
+    gain = sign * factor * scale
     column, constant = _column(body["column"], f"{field}.column"), body.get("constant", 0)
-    return Term(column, str(body["unit"]), gain, _number(constant, f"{field}.constant"))
+    file = _file(body.get("file", ""), f"{field}.file")
+    return Term(column, str(body["unit"]), gain, _number(constant, f"{field}.constant"), file)
 
 
 def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ...]]:
@@ -178,6 +219,13 @@ def _column(value: object, field: str) -> str:
     raise FieldError(f"{field} is {shown(value)}, expected a name; put quotes around it", field)
 
 
+def _file(value: object, field: str) -> str:
+    """Return the plain name of a file."""
+    if isinstance(value, str) and value == Path(value).name:
+        return value
+    raise FieldError(f"{field} is {shown(value)}, expected the name of a file in the directory", field)
+
+
 def _delimiter(value: object) -> str | None:
     if value is None or (isinstance(value, str) and value in DELIMITERS):
         return None if value is None else DELIMITERS[value]
@@ -189,7 +237,8 @@ def _keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
     """Return a mapping that has only these keys, and all of them that are needed."""
     allowed = ", ".join(sorted(key.name for key in keys))
     if not isinstance(value, Mapping):
-        raise FieldError(f"{field} is {shown(value)}, expected a mapping with {allowed}", field)
+        held = "empty" if value is None else shown(value)
+        raise FieldError(f"{field} is {held}, expected a mapping with {allowed}", field)
     for name in value:
         if name not in [key.name for key in keys]:
             raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,33 +23,61 @@ LATEST = 2.0**31
 """s. The seconds of a message's stamp are a signed integer of 32 bits."""
 
 
-def import_record(path: str | Path, mapping: ImportMap) -> Record:
+@dataclass(frozen=True)
+class _Part:
+    """What one file holds: stamps of the rows that count, s, values by channel, and what was found."""
+
+    t: FloatArray
+    values: Mapping[str, FloatArray]
+    note: str
+    faults: tuple[Fault, ...]
+
+
+def import_record(path: str | Path, mapping: ImportMap, index: int | None = None) -> Record:
     """Read a measurement as its map says; the record's notes tell what was repaired.
 
-    Raises ImportMapError with file, row, column, value and expectation.
+    path: a file, or the directory of the files that the map names. index: of the joint, from 0, where cells
+    hold several. Raises ImportMapError with file, row, column, value and expectation.
     """
-    table = read_columns(Path(path), mapping.columns(), mapping.delimiter)
+    mapping = mapping.at(index)
+    parts = [_part(_file(Path(path), file, mapping), mapping.of_file(file)) for file in mapping.files]
     try:
-        return _record(path, table, mapping)
+        return _record(path, parts, mapping)
     except ImportMapError as error:
         raise ImportMapError(f"{path}: {error}") from None
 
 
-def _record(path: str | Path, table: Table, mapping: ImportMap) -> Record:
-    keep, undated = _rows_kept(table, mapping)
-    stamps, note = _stamps(table, mapping, keep)
-    start = float(stamps[0])
+def _file(path: Path, name: str, mapping: ImportMap) -> Path:
+    if name and not path.is_dir():
+        names = ", ".join(mapping.files)
+        raise ImportMapError(f"{path}: no directory, expected the one that holds {names}")
+    return path / name if name else path
+
+
+def _part(path: Path, mapping: ImportMap) -> _Part:
+    table = read_columns(path, mapping.columns(), mapping.delimiter)
+    try:
+        keep, undated = _rows_kept(table, mapping)
+        stamps, note = _stamps(table, mapping, keep)
+    except ImportMapError as error:
+        raise ImportMapError(f"{path}: {error}") from None
+    values = {name: _values(table, terms)[keep] for name, terms in mapping.channels.items()}
+    return _Part(stamps, values, note, tuple(_rows_left_out(path, table, undated)))
+
+
+def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
+    start, stop = min(float(p.t[0]) for p in parts), max(float(p.t[-1]) for p in parts)
     epoch = round(start * 1e9) if start > UNDATED else START_NS
-    _check_range(start, float(stamps[-1]), epoch)
-    t = stamps - start
-    channels, faults = {}, list(_rows_left_out(path, table, undated))
-    for name, terms in mapping.channels.items():
-        channels[name], lost = _channel(name, t, _values(table, terms)[keep], terms)
+    _check_range(start, stop, epoch)
+    channels, faults = {}, [fault for part in parts for fault in part.faults]
+    held = [(name, part.t - start, y) for part in parts for name, y in part.values.items()]
+    for name, t, y in held:
+        channels[name], lost = _channel(name, t, y, mapping.channels[name])
         faults += lost
     told = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
-        note,
+        *(part.note for part in parts),
         *told,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))

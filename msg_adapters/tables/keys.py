@@ -23,7 +23,7 @@ MAP = (
     Key("channels", "mapping", NEEDED, "a column, or a list of columns that are summed, for each channel"),
 )
 TIME = (
-    Key("column", "name or number of a column", "a rate", "the stamps, increasing"),
+    Key("column", "name or number of a column", "a rate", "the stamps, increasing, of each file"),
     Key("unit", "unit of time", "needed with a column", "of the stamps"),
     Key("rate", f"{RATES[0]:g} to {RATES[1]:g} Hz", "a column", "samples a second, of a file without stamps"),
 )
@@ -34,10 +34,11 @@ WHERE = (
     Key("equals", "number, as in the file", "no limit", "rows with exactly this value"),
 )
 TERM = (
-    Key("column", "name or number of a column", NEEDED, "the measured values"),
+    Key("column", "name or number of a column", NEEDED, "the measured values; `name[2]`: of lists in cells"),
+    Key("file", "name of a file", "FILE itself", "that holds it, in the directory FILE"),
     Key("unit", "unit", NEEDED, "of the column; another dimension than the channel's needs a scale"),
     Key("sign", "1 or -1", "1", "-1 turns the axis"),
-    Key("scale", "number", "1", "SI unit of the channel for each SI unit of the column"),
+    Key("scale", "number other than 0", "1", "SI unit of the channel for each SI unit of the column"),
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
 )
 CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())

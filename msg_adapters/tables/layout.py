@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from msg_adapters.tables.elements import base_and_index
 from rsea_ros.decimal_number import is_decimal
 
 COMMENT = "#"
@@ -59,7 +60,11 @@ def layout_of(first: str, columns: Sequence[str], path: Path, delimiter: str | N
     usual = "\t" if ".tsv" in path.suffixes else ","
     tried = [delimiter] if delimiter else list(dict.fromkeys([usual, "\t", ";", ",", "|", BLANKS]))
     layouts = [_layout(first, one) for one in tried]
-    fitting = (layout for layout in layouts if set(columns) <= set(layout.names))
+    fitting = (
+        layout
+        for layout in layouts
+        if all(base_and_index(column, layout.names)[0] in layout.names for column in columns)
+    )
     return next(fitting, max(layouts, key=lambda layout: len(layout.names)))
 
 

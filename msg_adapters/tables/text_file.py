@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from msg_adapters.tables.elements import base_and_index, number_in
 from msg_adapters.tables.layout import BLANKS, Layout, counts, layout_of
 from msg_adapters.tables.lines import blocks_of_lines
 from msg_adapters.tables.table import Table, check_size, index_of
@@ -29,7 +30,9 @@ def read_text(path: Path, columns: Sequence[str], delimiter: str | None) -> Tabl
     if first is None:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
     layout = layout_of(first[1], columns, path, delimiter)
-    reader = _Reader(layout, {column: index_of(column, layout.names) for column in columns})
+    places = {column: base_and_index(column, layout.names) for column in columns}
+    indices = {column: index_of(base, layout.names) for column, (base, _) in places.items()}
+    reader = _Reader(layout, indices, {column: element for column, (_, element) in places.items()})
     for block in _numbered_blocks(path):
         reader.add([row for row in block if not (layout.headed and row == first)])
     return reader.table()
@@ -46,9 +49,14 @@ def _numbered_blocks(path: Path) -> Iterator[list[tuple[int, str]]]:
 class _Reader:
     """Collects columns block by block."""
 
-    def __init__(self, layout: Layout, indices: dict[str, int]) -> None:
+    def __init__(
+        self, layout: Layout, indices: dict[str, int], elements: dict[str, int | None]
+    ) -> None:
+        """elements: by column, which number of a list in its cells, None for cells of one number."""
         self._layout = layout
         self._indices = indices
+        self._elements = elements
+        self._has_lists = any(element is not None for element in elements.values())
         self._parts: dict[str, list[FloatArray]] = {column: [] for column in indices}
         self._rows = 0
         self._left_out = 0
@@ -60,7 +68,7 @@ class _Reader:
             return
         self._rows += len(rows)
         check_size(self._rows, len(self._indices))
-        values = self._fast([line for _, line in rows])
+        values = None if self._has_lists else self._fast([line for _, line in rows])
         if values is None:
             values = self._careful(rows)
         for at, parts in enumerate(self._parts.values()):
@@ -97,12 +105,22 @@ class _Reader:
         for number, line in rows:
             cells = self._layout.cells(line)
             if len(cells) == len(self._layout.names):
-                kept.append([_value(number, name, cells[at]) for name, at in self._indices.items()])
+                kept.append([self._value(number, name, cells[at]) for name, at in self._indices.items()])
                 continue
             self._left_out += 1
             expected = len(self._layout.names)
             self._first = self._first or f"line {number} has {len(cells)} fields, expected {expected}"
         return np.array(kept, np.float64).reshape(len(kept), len(self._indices))
+
+    def _value(self, line: int, column: str, cell: str) -> float:
+        element = self._elements[column]
+        if element is None:
+            return _value(line, column, cell)
+        try:
+            number = number_in(cell, element)
+        except ValueError as error:
+            raise ValueError(f"line {line}, column {column!r} is {shown(cell)}, {error}") from None
+        return _value(line, column, number)
 
 
 def _value(line: int, column: str, cell: str) -> float:

@@ -40,6 +40,7 @@ CHANNELS: Mapping[str, str] = {
     "command": "torque",
     "motor_torque": "torque",
     "ft": "torque",
+    "deflection": "angle",
     "position": "angle",
     "velocity": "angular velocity",
     "reference": "angle",

@@ -12,16 +12,21 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.checks.gain_findings import gain_findings, strangers
 from rsea_ros.checks.gains import Readings, readings_of
+from rsea_ros.checks.impedance import impedance_findings
+from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings, identifiability
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.signal_findings import excitation, noises
+from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
 
@@ -31,7 +36,7 @@ _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -42,7 +47,9 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
     tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
     """
     with one_blas_thread(), np.errstate(all="ignore"):
-        record = bounded(record)
+        if rig.loop is not None and "reference" not in record:
+            return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
+        record = bounded(record if rig.loop is None else commanded(record, rig))
         checked = check(record, rig)
         found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
         found += [*order(record), *rates(record, rig)]
@@ -51,7 +58,27 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
             found += _against_rig(checked, rig, axis) if is_commanded(checked.record) else []
         found += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
-    return Findings(record.source, rig.name, tuple(found), faults)
+    findings = tuple(_of_targets(f) for f in found) if rig.loop is not None else tuple(found)
+    return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults)
+
+
+def _no_targets(record: Record) -> Finding:
+    return Finding(
+        "red",
+        "topics",
+        "reference",
+        expected="the target positions that drove the run",
+        detail=f"only {', '.join(record.channels)}",
+        remedy="record the targets, or name their topic with --topic desired_position=…",
+    )
+
+
+def _of_targets(f: Finding) -> Finding:
+    """Return a finding about the command as one about the target positions that it is."""
+    if f.channel != "command":
+        return f
+    unit, detail = ("rad" if f.unit == "N m" else f.unit), f.detail.replace("N m", "rad")
+    return replace(f, channel="reference", unit=unit, detail=detail)
 
 
 def _topics(record: Record) -> list[Finding]:
@@ -84,16 +111,40 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
                 remedy="cut it with --from and --to",
             )
         ]
-    found = noises(record, rig)
+    found = []
     whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
-    compared = quotients({n: s for n, s in sides(record, rig).items() if n in whole})
-    readings = readings_of(compared, rig)
-    silent = set(compared) - set(readings.channels if readings else ())
-    found += strangers([q for n, q in compared.items() if n in silent or q.related < _IN_COMMON])
-    if readings is None:
+    compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    late = lags(compared)
+    if late:
+        record = in_step(record, late)
+        found = lag_findings(late, len(compared))
+        compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    readings, matched = _matched(record, compared, rig, axis)
+    found += [*noises(record, rig), *matched]
+    if readings is None or late or _is_elsewhere(found):
         return found
-    found += gain_findings(readings, rig, axis)
-    return found if _is_elsewhere(found) else [*found, *_linearised(checked, rig, readings)]
+    return [*found, *_linearised(checked, rig, readings)]
+
+
+def _matched(
+    record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
+) -> tuple[Readings | None, list[Finding]]:
+    """Return the readings of the channels, and what they say of signs, scales and the rig."""
+    related = quotients(compared)
+    readings = readings_of(related, rig)
+    silent = set(related) - set(readings.channels if readings else ())
+    found = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
+    found += gain_findings(readings, rig, axis) if readings else []
+    found += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
+    another = _another(record, compared, rig)
+    return readings, [*another, *(f for f in found if not (another and f.kind == "wrong_rig"))]
+
+
+def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
+    """Return what makes the machine of a record another one than a rig without a spring."""
+    if not is_inverse(rig):
+        return []
+    return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
 
 
 def _is_elsewhere(found: list[Finding]) -> bool:
@@ -151,5 +202,6 @@ def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
 
 
 def _fault(f: Finding) -> Fault:
-    detail = "; ".join(filter(None, (f.detail, f.remedy)))
+    """Return the fault of a finding; whether the rig is right is asked once, before the results."""
+    detail = "; ".join(filter(None, (f.detail, "" if f.kind == "wrong_rig" else f.remedy)))
     return Fault(f.kind, f.channel, float("nan"), detail, f.value, f.unit)

@@ -7,6 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from rsea_ros.checks.expected import Side, quotients, sides
+from rsea_ros.checks.lag import lag_of
 from rsea_ros.checks.motion import is_commanded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
@@ -32,12 +33,13 @@ def dead_channels(record: Record, rig: Rig, frozen: Collection[str] = ()) -> lis
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
-        if n in found and not found[n] and n not in frozen and shows and q.is_unrelated:
+        alone = shows and q.is_unrelated and lag_of(compared[n]) == 0.0
+        if n in found and not found[n] and n not in frozen and alone:
             found[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
 
 
-_SENSORS = ("ft", "position", "velocity", "motor_torque")
+_SENSORS = ("ft", "deflection", "position", "velocity", "motor_torque")
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:

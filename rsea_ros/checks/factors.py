@@ -11,7 +11,7 @@ _TURN = 2.0 * math.pi
 _ANGLES = {"deg": math.degrees(1.0), "mrad": 1e3, "rev": 1.0 / _TURN, "arcmin": 60.0 * math.degrees(1.0)}
 _SPEEDS = {"rpm": 60.0 / _TURN, "deg/s": math.degrees(1.0), "rev/s": 1.0 / _TURN}
 _TORQUES = {"mN m": 1e3, "N cm": 100.0, "kN m": 1e-3, "lbf in": 8.8507}
-_UNITS = {"position": _ANGLES, "velocity": _SPEEDS}
+_UNITS = {"position": _ANGLES, "deflection": _ANGLES, "velocity": _SPEEDS}
 SAME_NUMBER = {"mN m": "mN m or N mm"}
 """Units that a factor cannot tell apart."""
 
@@ -36,7 +36,7 @@ def factors(channel: str, rig: Rig) -> tuple[Factor, ...]:
     units = _UNITS.get(channel, _TORQUES)
     plain = [Factor(v, u) for u, v in units.items()]
     ratio = rig["gear.ratio"]
-    if channel != "ft" and ratio > 1.5:
+    if channel not in ("ft", "deflection") and ratio > 1.5:
         si = {"position": "rad", "velocity": "rad/s"}.get(channel, "N m")
         side = ratio if channel in _UNITS else 1.0 / ratio
         plain += [Factor(side, si, True), *(Factor(f.value * side, f.unit, True) for f in list(plain))]

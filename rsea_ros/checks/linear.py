@@ -18,17 +18,16 @@ from rsea_ros.identification.confidence import BLOCK
 from rsea_ros.identification.problem import Case, Problem, case_from
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import (
-    CLOCK_DOUBT,
     Unknown,
     clocks,
     start_vector,
     unknowns_of_rig,
 )
-from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import drive_of
 from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 
-TIMED = ("ft", "position", "velocity")
+TIMED = ("ft", "deflection", "position", "velocity")
 """Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
 _ROUNDS = 6
@@ -63,20 +62,25 @@ class Number:
         return self.value - _Z95 * self.sd, self.value + _Z95 * self.sd
 
 
+class Brought(NamedTuple):
+    """What data bring of a value: the share of what is known of it then, and its one sigma over its size."""
+
+    share: float
+    relative_sd: float
+
+
 @dataclass(frozen=True)
 class Linear:
     """What the linearised fit says. offset: s at the start of the record, drift: s/s, by channel.
 
-    misfit: RMS of the residual over the noise by channel. told: by value of the rig, the share of what is
-    known of it that these data bring (0 to 1). relative: its one sigma over its value then. settled: whether
-    the clocks stood still at last; else their numbers mean nothing.
+    misfit: RMS of the residual over the noise by channel. values: what these data bring of the rig's values.
+    settled: whether the clocks stood still at last; else their numbers mean nothing.
     """
 
     offset: Mapping[str, Number]
     drift: Mapping[str, Number]
     misfit: Mapping[str, float]
-    told: Mapping[str, float]
-    relative: Mapping[str, float]
+    values: Mapping[str, Brought]
     settled: bool
 
 
@@ -97,16 +101,16 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     state = _State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
     case = case_from(_on_time(record, start, timed, state), rig, masked)
     setting = _Setting(record, start, case, rig, timed, values)
-    rows = _rows(setting, state)
+    rows = _rows(setting, _left(setting, state))
     step, sd = _solved(rows, setting, state)
     settled = False
     for k in range(_ROUNDS):
         parts = _PARTS[k // 2 :]  # whole steps turn to and fro about the end
-        tried = ((at, _rows(setting, at)) for at in (state.moved(part * step) for part in parts))
-        better = next((t for t in tried if t[1].loss < _WORSE * rows.loss), None)
+        tried = ((at, _left(setting, at)) for at in (state.moved(part * step) for part in parts))
+        better = next((t for t in tried if t[1].loss < _WORSE * rows.left.loss), None)
         if better is None:
             break
-        state, rows = better
+        state, rows = better[0], _rows(setting, better[1])
         step, sd = _solved(rows, setting, state)
         clock_steps = slice(len(theta), len(theta) + 2 * len(timed))
         finest = np.repeat([_RESOLUTION, _RESOLUTION / case.duration], len(timed))
@@ -136,13 +140,11 @@ def _cut(
 def _linear(setting: _Setting, state: _State, rows: _Rows, sd: FloatArray, settled: bool) -> Linear:
     n, m = len(setting.values), len(setting.timed)
     late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
-    told, relative = _told(setting, rows)
     return Linear(
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
-        misfit=dict(zip(setting.timed, rows.misfit.tolist(), strict=True)),
-        told=told,
-        relative=relative,
+        misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
+        values=_brought(setting, rows),
         settled=settled,
     )
 
@@ -173,12 +175,6 @@ class _Setting(NamedTuple):
     values: tuple[Unknown, ...]
 
 
-def _drive(record: Record, case: Case, rig: Rig) -> Drive:
-    """Return what drives the record, as case_from makes it."""
-    in_loop = rig.controller is not None and "reference" in record
-    return drive_from(record, closed_loop=in_loop, from_rest="position" in case.floating)
-
-
 def _on_time(record: Record, start: float, timed: Sequence[str], state: _State) -> Record:
     """Return the record with the stamps that its sensors would have had without offset and drift."""
     moved = {}
@@ -188,16 +184,17 @@ def _on_time(record: Record, start: float, timed: Sequence[str], state: _State) 
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """Residual r (m,) and derivatives (m, n) in units of the misfit.
+class _Left:
+    """What a state leaves of the record: residual over noise, shape (m,), with the problem and where it is.
 
-    Columns: the rig's values, then for each channel its clock, drift, bias and gain. block, of: block and
-    channel of each row. misfit: RMS over noise of each channel without bias and gain.
+    plain: derivatives of each channel's residual by bias and gain, shape (m, 2). of: channel of each row.
+    misfit: RMS over noise of each channel without bias and gain.
     """
 
+    problem: Problem
+    theta: FloatArray
     residual: FloatArray
-    matrix: FloatArray
-    block: IntArray
+    plain: FloatArray
     of: IntArray
     misfit: FloatArray
 
@@ -207,42 +204,63 @@ class _Rows:
         return float(np.prod(self.misfit))
 
 
-def _rows(setting: _Setting, state: _State) -> _Rows:
-    """Lay out the rows about a state."""
+@dataclass(frozen=True)
+class _Rows:
+    """Residual r (m,) and derivatives (m, n) in units of the misfit.
+
+    Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
+    """
+
+    left: _Left
+    residual: FloatArray
+    matrix: FloatArray
+    block: IntArray
+
+
+def _left(setting: _Setting, state: _State) -> _Left:
+    """Return what a state leaves: one simulation."""
     record = _on_time(setting.record, setting.start, setting.timed, state)
-    case = replace(setting.case, drive=_drive(record, setting.case, setting.rig))
-    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed))
+    case = replace(setting.case, drive=drive_of(record, setting.rig))
+    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
     problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
     theta = np.concatenate([state.theta, np.zeros(len(wide))])
-    residual = problem.residual(theta)
-    return _weighed(case, setting, residual, jacobian(problem, theta, residual))
+    residual, of = problem.residual(theta), _channel_of(case, setting.timed)
+    noise, y = _of_rows(case, case.noise, setting.timed), _of_rows(case, case.measured, setting.timed)
+    plain = np.column_stack([1.0 / noise, y / noise + residual])
+    return _Left(problem, theta, residual, plain, of, _misfits(residual, plain, of, len(setting.timed)))
 
 
-def _weighed(case: Case, setting: _Setting, residual: FloatArray, moved: FloatArray) -> _Rows:
-    timed, n = setting.timed, len(setting.values)
-    of = np.repeat(np.arange(len(timed)), [int(case.mask[c].sum()) for c in timed])
-    t, y, noise = (
-        np.concatenate([np.broadcast_to(what[c], case.t[c].shape)[case.mask[c]] for c in timed])
-        for what in (case.t, case.measured, case.noise)
-    )
-    of_channel = (of == np.arange(len(timed))[:, None]).astype(float).T
-    since = (t - setting.start)[:, None]
-    own = [moved[:, n:] * since, of_channel / noise[:, None], of_channel * (y / noise + residual)[:, None]]
-    block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
-    matrix = np.column_stack([moved, *own])
-    misfit = _misfits(residual, matrix, of, len(timed))
-    weight = 1.0 / np.maximum(misfit, _LEAST_MISFIT)[of]
-    return _Rows(residual * weight, matrix * weight[:, None], block, of, misfit)
+def _channel_of(case: Case, timed: Sequence[str]) -> IntArray:
+    """Return the channel of every row, as its number in `timed`."""
+    return np.repeat(np.arange(len(timed)), [int(case.mask[n].sum()) for n in timed])
 
 
-def _misfits(residual: FloatArray, matrix: FloatArray, of: IntArray, m: int) -> FloatArray:
+def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence[str]) -> FloatArray:
+    """Return what belongs to each channel, or to each of its samples, for every row."""
+    return np.concatenate([np.broadcast_to(what[n], case.t[n].shape)[case.mask[n]] for n in timed])
+
+
+def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> FloatArray:
     """Return the RMS over noise of each channel's residual, without bias and gain."""
     found = []
     for k in range(m):
-        plain, here = matrix[of == k][:, [-2 * m + k, -m + k]], residual[of == k]
-        left = here - plain @ np.linalg.lstsq(plain, here, rcond=None)[0]
+        columns, here = plain[of == k], residual[of == k]
+        left = here - columns @ np.linalg.lstsq(columns, here, rcond=None)[0]
         found.append(float(np.sqrt(np.mean(left**2))))
     return np.array(found)
+
+
+def _rows(setting: _Setting, left: _Left) -> _Rows:
+    """Lay out the rows about a state: one simulation for each unknown."""
+    (case,), n = left.problem.cases, len(setting.values)
+    moved = jacobian(left.problem, left.theta, left.residual)
+    t = _of_rows(case, case.t, setting.timed)
+    of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
+    own = [moved[:, n:] * (t - setting.start)[:, None]]
+    own += [of_channel * column[:, None] for column in left.plain.T]
+    weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
+    block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
+    return _Rows(left, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)
 
 
 def _solved(rows: _Rows, setting: _Setting, state: _State) -> tuple[FloatArray, FloatArray]:
@@ -271,23 +289,26 @@ def _scores(rows: _Rows, left: FloatArray) -> FloatArray:
     return scores
 
 
-def _told(setting: _Setting, rows: _Rows) -> tuple[dict[str, float], dict[str, float]]:
-    """Return by value of the rig what the data bring of it, and its relative one sigma after.
+def _brought(setting: _Setting, rows: _Rows) -> dict[str, Brought]:
+    """Return by value of the rig what the data bring of it.
 
     Gains and drifts count as known: they are what a check looks for, not what a fit frees.
     """
     values, n, m = setting.values, len(setting.values), len(setting.timed)
     if not n:
-        return {}, {}
+        return {}
     keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
     columns = rows.matrix[:, keep]
-    doubt = np.array([*(_doubt(u) for u in values), *[CLOCK_DOUBT] * m, *[np.inf] * m])
+    clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
+    doubt = np.array([*(_doubt(u) for u in values), *clock_doubts, *[np.inf] * m])
     part = columns.T @ columns + np.diag(doubt**-2.0)
     scale = np.sqrt(np.diag(part) + 1e-300)
     after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale
-    told = {u.name: float(max(0.0, 1.0 - (after[i] / doubt[i]) ** 2)) for i, u in enumerate(values)}
     size = [1.0 if u.logarithmic else abs(u.start) or 1.0 for u in values]
-    return told, {u.name: float(after[i] / size[i]) for i, u in enumerate(values)}
+    return {
+        u.name: Brought(float(max(0.0, 1.0 - (sd / before) ** 2)), float(sd / scale))
+        for u, sd, before, scale in zip(values, after, doubt, size, strict=False)
+    }
 
 
 def _doubt(u: Unknown) -> float:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linear import Linear, Number
-from rsea_ros.identification.unknowns import CLOCK_DOUBT
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""
@@ -92,9 +91,9 @@ def _beside(linear: Linear, name: str) -> str:
 def identifiability(linear: Linear, rig: Rig) -> list[Finding]:
     """Return for each value that a fit may move whether these data tell it."""
     found = []
-    for name, told in linear.told.items():
-        percent = 100.0 * linear.relative[name]
-        amber = told < _TOLD
+    for name, brought in linear.values.items():
+        percent = 100.0 * brought.relative_sd
+        amber = brought.share < _TOLD
         found.append(
             Finding(
                 "amber" if amber else "green",

@@ -11,7 +11,8 @@ from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
 
 WITNESSES = {
     "position": ("ft", "velocity", "motor_torque", "command"),
-    "ft": ("position", "velocity", "motor_torque", "command"),
+    "ft": ("position", "deflection", "velocity", "motor_torque", "command"),
+    "deflection": ("ft", "position", "velocity", "motor_torque", "command"),
     "velocity": ("ft", "position", "motor_torque", "command"),
     "motor_torque": ("command",),
 }
@@ -47,7 +48,7 @@ def is_commanded(record: Record) -> bool:
 
 def is_still(record: Record) -> bool:
     """Tell whether no sensor shows anything but white noise: what fourth differences show is all of it."""
-    return all(_is_noise(record[n]) for n in ("position", "velocity", "ft") if n in record)
+    return all(_is_noise(record[n]) for n in ("position", "velocity", "ft", "deflection") if n in record)
 
 
 def _is_noise(channel: Channel) -> bool:
@@ -62,7 +63,7 @@ def at_rest(record: Record) -> float:
     """Return the share of the commands at which neither command nor machine moved."""
     t = record["command"].t
     still = ~_moves(record["command"])
-    for name in ("position", "velocity", "ft"):
+    for name in ("position", "velocity", "ft", "deflection"):
         if name in record and _is_witness(record[name]):
             moves = _moves(record[name])
             still &= ~moves[np.clip(np.searchsorted(record[name].t, t), 0, len(moves) - 1)]

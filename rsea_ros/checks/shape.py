@@ -15,7 +15,7 @@ import numpy as np
 
 from rsea_ros.checks.spectra import Quotient, usable
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.responses import model_response
+from rsea_ros.identification.responses import model_responses
 from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
@@ -172,10 +172,9 @@ class ShapeFit:
 
     def _response(self, rig: Rig) -> ComplexArray:
         response = np.ones(len(self._of), complex)
-        for k, name in enumerate(self.channels):
-            if name != "motor_torque":
-                of = self._of == k
-                response[of] = model_response(rig, name, self._frequency[of])
+        rows = {n: self._of == k for k, n in enumerate(self.channels) if n != "motor_torque"}
+        for name, values in model_responses(rig, {n: self._frequency[of] for n, of in rows.items()}).items():
+            response[rows[name]] = values
         return response
 
     def _middle(self, left: FloatArray, k: int) -> float:

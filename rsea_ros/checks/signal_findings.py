@@ -12,7 +12,7 @@ from rsea_ros.checks.motion import at_rest
 from rsea_ros.checks.stamp_findings import natural_frequency
 from rsea_ros.identification.noise import noise_floor
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Record
+from rsea_ros.signals import UNITS, Channel, Record
 
 _MOSTLY = 0.5
 _WORTH_TELLING = 0.02
@@ -95,7 +95,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
         stated = max(sensor.noise, 0.5 * sensor.quantum)
         noise = noise_floor(record, name, sensor)
         loud = stated > 0.0 and min(noise, _rough(record[name])) > _LOUD * stated and name != "motor_torque"
-        unit = {"position": "rad", "velocity": "rad/s"}.get(name, "N m")
+        unit = UNITS[name]
         found.append(
             Finding(
                 "amber" if loud else "green",

@@ -88,7 +88,9 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
 
 
 def natural_frequency(rig: Rig) -> float | None:
-    """Return the lowest natural frequency of a rig, Hz; None where nothing oscillates."""
+    """Return the lowest natural frequency of a rig, Hz; None where nothing oscillates, and in a loop."""
+    if rig.loop is not None:
+        return None
     roots = np.linalg.eigvals(state_space(rig).a)
     sizes = np.abs(roots[np.abs(roots.imag) > 1e-6 * np.abs(roots)])
     return float(sizes.min()) / (2.0 * math.pi) if len(sizes) else None

@@ -7,15 +7,16 @@ import numpy as np
 from rsea_ros.checks.motion import is_still
 from rsea_ros.errors import IdentificationError
 from rsea_ros.fault_kinds import FAULT_KINDS
-from rsea_ros.signals import Channel, Record
+from rsea_ros.signals import UNITS, Channel, Record
 
 SHORTEST = 4.0
-"""s of commands: four blocks of every set (diagnosis/split.py) of a quarter of a second each."""
+"""s of commands: four blocks of every set (diagnosis/data_split.py) of a quarter of a second each."""
 
 
 def check_diagnosable(record: Record) -> None:
     """Raise IdentificationError for a record without commands, too short, without motion or in reverse."""
-    if "command" not in record:
+    driving = record.driving
+    if driving is None:
         have = ", ".join(record.channels) or "nothing"
         raise IdentificationError(
             f"{record.source}: no command, expected the torques that drove the run beside {have}"
@@ -23,9 +24,10 @@ def check_diagnosable(record: Record) -> None:
     for name, channel in record.channels.items():
         if len(channel) < 2 or np.median(np.diff(channel.t)) <= 0.0:
             raise IdentificationError(
-                f"{record.source}: {name}: {len(channel)} samples, expected rising stamps"
+                f"{record.source}: {name}: {len(channel)} samples, expected rising stamps: "
+                "stamp each message when its value takes effect or was measured"
             )
-    length = float(np.ptp(record["command"].t))
+    length = float(np.ptp(driving.t))
     if length < SHORTEST:
         raise IdentificationError(
             f"{record.source}: {length:.3g} s of commands, expected {SHORTEST:g} s or more"
@@ -34,19 +36,26 @@ def check_diagnosable(record: Record) -> None:
     if not measured:
         left_out = "; ".join(f"{f.channel}: {FAULT_KINDS[f.kind]}" for f in record.faults)
         reason = f" ({left_out})" if left_out else ""
-        raise IdentificationError(f"{record.source}: no measurement beside the command{reason}, expected one")
+        raise IdentificationError(
+            f"{record.source}: no measurement beside the command{reason}, expected one of ft, position and "
+            "velocity, stamped by the command's clock"
+        )
     if all(_constant(c) for c in measured):
-        raise IdentificationError(f"{record.source}: every measured channel holds one value, expected motion")
+        raise IdentificationError(
+            f"{record.source}: every measured channel holds one value, expected motion: "
+            "is the drive enabled, are the sensors alive?"
+        )
     require_motion(record)
 
 
 def require_motion(record: Record) -> None:
     """Raise IdentificationError for a record in which the command never changes and nothing moves."""
-    command = record.channels.get("command")
+    command = record.driving
     if command is None or not len(command) or not _constant(command) or not is_still(record):
         return
+    unit = UNITS["command" if "command" in record else "reference"]
     raise IdentificationError(
-        f"{record.source}: the command stays at {command.y[0]:g} N m and nothing moves, "
+        f"{record.source}: the command stays at {command.y[0]:g} {unit} and nothing moves, "
         "expected a run in which the command excites the machine"
     )
 

@@ -9,10 +9,26 @@ from pathlib import Path
 from rsea_ros.errors import OutputError
 from rsea_ros.new_files import Place, check_free
 
+FOUND = 1
+"""Exit status for a finding that --fail-on names."""
+
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Declare --force."""
     parser.add_argument("--force", action="store_true", help="replace files that exist (never an input)")
+
+
+def add_fail_on(parser: argparse.ArgumentParser, findings: Sequence[str], note: str = "") -> None:
+    """Declare --fail-on. findings: what it may name; the verb returns FOUND for those."""
+    parser.add_argument(
+        "--fail-on",
+        nargs="+",
+        action="extend",
+        default=[],
+        choices=findings,
+        metavar="FINDING",
+        help=f"exit status {FOUND} for any of these: {', '.join(findings)}{note}",
+    )
 
 
 def results_place(

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from msg_adapters.topics import AXES, ROLES, TopicMap
 from rsea_ros.errors import ParameterError
-from rsea_ros.signals import Record
+from rsea_ros.signals import Channel, Record
 
 
 def add_topic_options(parser: argparse.ArgumentParser) -> None:
@@ -34,9 +34,6 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
     """Return the map that the options ask for. Raises ParameterError for one that makes no sense."""
-    for name in (args.namespace, args.joint or "", *args.topic):
-        if not name.isprintable():
-            raise ParameterError(f"{name!r}: holds what cannot be printed, expected a name of ROS")
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
 
 
@@ -50,18 +47,26 @@ def each_once(bags: Sequence[str]) -> Sequence[str]:
 
 
 def add_window_options(parser: argparse.ArgumentParser) -> None:
-    """Declare --from, --to and --window."""
+    """Declare --from, --to, --window and --shift."""
     group = parser.add_argument_group("a part of the record, s since its first stamp")
     group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out what comes before")
     group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out what comes after")
     group.add_argument("--window", metavar="A:B", help="the same as --from A --to B")
+    group.add_argument(
+        "--shift",
+        action="append",
+        default=[],
+        metavar="CHANNEL=S",
+        help="add S (s) to the stamps of a channel, one that another clock has stamped",
+    )
 
 
 def cut(record: Record, args: argparse.Namespace) -> Record:
-    """Return the part of a record that the options ask for; stamps keep their origin.
+    """Return the part of a record that the options ask for; stamps keep their origin but for --shift.
 
-    Raises ParameterError for a window that makes no sense or holds no sample.
+    Raises ParameterError for a window that makes no sense or holds no sample, and for a shift of no channel.
     """
+    record = _shifted(record, args.shift)
     begin, end = _window(args)
     if begin == -math.inf and end == math.inf:
         return record
@@ -74,6 +79,22 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
             "expected some commands"
         )
     return replace(part, channels=channels)
+
+
+def _shifted(record: Record, shifts: Sequence[str]) -> Record:
+    """Return the record with the stamps of some channels moved. shifts: CHANNEL=S each."""
+    for shift in shifts:
+        name, _, text = shift.partition("=")
+        try:
+            seconds = float(text)
+        except ValueError:
+            seconds = math.nan
+        if name not in record or not math.isfinite(seconds):
+            known = ", ".join(record.channels)
+            raise ParameterError(f"--shift {shift}: expected CHANNEL=S, S in s, CHANNEL one of {known}")
+        channel = record[name]
+        record = record.with_channels(**{name: Channel(channel.t + seconds, channel.y)})
+    return record
 
 
 def _window(args: argparse.Namespace) -> tuple[float, float]:

@@ -25,6 +25,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free
 
 HELP = "a motor on a pseudo-terminal and an F/T sensor on UDP, with a simulated plant behind both"
+EXAMPLE = "rsea bench --rig paper_high_impedance --port bench_tty"
 PLANT_RATE = 2000.0
 
 
@@ -32,10 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
     add("--port", type=Path, default=Path("rsea-bench-tty"), help="link to the pseudo-terminal")
-    add("--model", type=int, default=54024, choices=sorted(MODELS), help="number of the motor")
+    add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",
+        help="number of the motor; of several on one line, with the IDs 1, 2, …: the sensor is on the first")
     add("--rig", default="paper_high_impedance", help="the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
-    add("--torque-constant", type=float, default=6.826, help="N m at the gear output per A")
+    add("--torque-constant", type=float, default=0.0, help="N m at the gear output per A; 0: its model's")
     add("--return-delay", type=int, default=0, help="pause before an answer, unit 2 µs, 0 to 254")
     add("--seed", type=seed, default=0, help="of the sensors' noise and of the misbehaviour")
     add("--requests", action="store_true", help="take requests to misbehave on stdin, a JSON object a line")
@@ -49,26 +51,38 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError(f"--return-delay {args.return_delay}, expected 0 to 254 (unit 2 µs)")
     if not args.port.is_symlink():  # a link is what a bench that was killed leaves
         check_free([args.port])
-    plant = SimulatedDevice(load_rig(args.rig), PLANT_RATE, seed=args.seed, clock=time.monotonic_ns)
     wrong = Misbehaviour(seed=args.seed)
-    motor = Motor(args.model, plant, args.torque_constant)
-    motor.put("return_delay", args.return_delay)
-    plant.open()
-    bus, sensor = Bus(args.port, motor, wrong), ForceSensor(plant, args.ft_rate, wrong)
+    plants, motors = _motors(args)
+    bus, sensor = Bus(args.port, motors, wrong), ForceSensor(plants[0], args.ft_rate, wrong)
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
-    requests = LineRequests(motor, bus, sensor, wrong, inlet, sys.stdout.fileno())
+    requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
     ports = {"ft_port": sensor.port, "page_port": sensor.page}
     gc.freeze()
     gc.disable()  # a motor does not pause to tidy up
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.default_int_handler)
-        print(json.dumps({"port": str(args.port), "model": args.model, **ports}), flush=True)
-        Station(plant, motor, bus, sensor, requests).run()
+        print(json.dumps({"port": str(args.port), "model": args.model[0], **ports}), flush=True)
+        Station(plants, motors, bus, sensor, requests).run()
     except KeyboardInterrupt:
         pass
     finally:
         bus.vanish()
         os.close(stopping)
     return 0
+
+
+def _motors(args: argparse.Namespace) -> tuple[list[SimulatedDevice], list[Motor]]:
+    """Return each motor's plant, which runs, and each motor, with the IDs 1, 2, …"""
+    rig = load_rig(args.rig)
+    plants, motors = [], []
+    for place, model in enumerate(args.model):
+        plant = SimulatedDevice(rig, PLANT_RATE, seed=args.seed + place, clock=time.monotonic_ns)
+        motor = Motor(model, plant, args.torque_constant)
+        motor.put("id", place + 1)
+        motor.put("return_delay", args.return_delay)
+        plant.open()
+        plants.append(plant)
+        motors.append(motor)
+    return plants, motors

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topics import AXES
+from rsea_ros.cli._output import FOUND
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.errors import RseaError
 from rsea_ros.signals import Channel
@@ -19,9 +20,8 @@ if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings
 
 HELP = "topics, rates, clocks, noise, sign, scale, rig: a traffic light a line, in seconds"
+EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 RIG = "paper_high_impedance"
-FOUND = 1
-"""Exit status when a light is one that --fail-on names, or worse."""
 NARROWEST = 140
 """Columns of the table where no terminal says how many it has."""
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rsea_ros.model.rig import Rig
 
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
+EXAMPLE = "rsea control paper_high_impedance --rate 280"
 
 JSON, REPORT = "control.json", "report.html"
 

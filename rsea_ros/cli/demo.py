@@ -18,6 +18,7 @@ from msg_adapters.bags import read_contents
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
+from rsea_ros.cli._ros import need_ros
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
@@ -26,6 +27,7 @@ from rsea_ros.new_files import unused
 from rsea_ros.report.fault_words import fault_lines
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
+EXAMPLE = "rsea demo --out first_demo"
 RIG = "paper_high_impedance"
 NAMES = ("bag", "bag-2", "bench.yaml", "log", "identification.json", "model.yaml", "report.html")
 DISTURBANCES = {"commands_left_out", "late_commands", "lost_messages", "watchdog_trips"}
@@ -54,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play the loop, then print identified beside true values and the path of the report."""
+    need_ros()
     out = directory(args.out)
     domain = random.randint(1, 101) if args.domain is None else args.domain
     duration = FULL if args.full else SHORT

@@ -13,6 +13,7 @@ from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
 
 HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
+EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
 JSON, REPORT = "design.json", "report.html"
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
 

@@ -8,7 +8,7 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
@@ -16,17 +16,15 @@ from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.signals import Record
 
 HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
+EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
 RIG = "paper_high_impedance"
 FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
-FOUND = 1
-"""Exit status for a finding that --fail-on names."""
 FAULTS = "faults"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    findings = (*get_args(Verdict), FAULTS)
     add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
     add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
     add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
@@ -36,15 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     most = "causes at most (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
     add("--json", action="store_true", help="print diagnosis.json to stdout and nothing else")
-    add(
-        "--fail-on",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=findings,
-        metavar="FINDING",
-        help=f"exit status {FOUND} for any of these: {', '.join(findings)} (of the data)",
-    )
+    add_fail_on(parser, (*get_args(Verdict), FAULTS), " (of the data)")
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -58,18 +48,22 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        records = [cut(readable(bag, topics), args) for bag in each_once(args.bags)]
-        holdout = readable(args.holdout, topics) if args.holdout else None
+        runs = [*each_once(args.bags), *([args.holdout] if args.holdout else [])]
+        records = [readable(bag, topics, args) for bag in runs]
         from rsea_ros.cli._checks import checked
 
         raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json, masks=True)
+        holdout = records.pop() if args.holdout else None
+        from rsea_ros.cli._provenance import provenance
         from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
         without = tuple(effect_named(name).name for name in args.without)
         result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
-        report = write_diagnosis(result, raw, place, write_overlay)
+        report = write_diagnosis(
+            result, raw, place, write_overlay, provenance("diagnose", args.bags, args.rig)
+        )
     if args.json:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:
@@ -78,8 +72,8 @@ def run(args: argparse.Namespace) -> int:
     return FOUND if findings.intersection(args.fail_on) else 0
 
 
-def readable(bag: str, topics: TopicMap) -> Record:
-    """Return a run with all its faults, which are findings.
+def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None) -> Record:
+    """Return a run with all its faults, which are findings. args: what to cut of it, if anything.
 
     Raises BagError or IdentificationError for one that cannot be diagnosed at all.
     """
@@ -87,6 +81,7 @@ def readable(bag: str, topics: TopicMap) -> Record:
     from rsea_ros.model.extent import bounded
 
     record = bounded(read_record([bag], topics=topics, strict=False))
+    record = record if args is None else cut(record, args)
     check_diagnosable(record)
     return record
 

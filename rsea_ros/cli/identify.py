@@ -5,23 +5,22 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from msg_adapters import read_record
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
+from rsea_ros.identification.result import Verdict
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "frequency response and parameters with confidence from recorded runs"
+EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Columns of the table where no terminal says how many it has."""
-VERDICTS = ("adequate", "misfit", "not_identifiable")
-FOUND = 1
-"""Exit status when the verdict is one that --fail-on names."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,15 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print identification.json to stdout and nothing else"
     )
-    parser.add_argument(
-        "--fail-on",
-        nargs="+",
-        action="extend",
-        default=[],
-        choices=VERDICTS,
-        metavar="VERDICT",
-        help=f"exit status {FOUND} when the verdict is one of these: {', '.join(VERDICTS)}",
-    )
+    add_fail_on(parser, get_args(Verdict))
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -66,11 +57,12 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._checks import checked
 
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
+        from rsea_ros.cli._provenance import provenance
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
         from rsea_ros.report.results import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
-        report = write_results(result, place)
+        report = write_results(result, place, provenance("identify", args.bags, args.rig))
     if args.json:
         print((report.parent / "identification.json").read_text(encoding="utf-8"))
     else:
@@ -96,6 +88,6 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.notes):
+    for sentence in (*found, *doubt_sentences(result), *result.statements):
         print(sentence)
     print(f"report: {report}")

@@ -16,7 +16,7 @@ from typing import NoReturn, Protocol, cast
 from rsea_ros.cli._shown import shown
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import Stopped, Stops
-from rsea_ros.wording import printable
+from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
 FAULT = "this is a fault of rsea, please report it"
@@ -26,6 +26,7 @@ class Verb(Protocol):
     """What a module in this directory has."""
 
     HELP: str
+    EXAMPLE: str
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Declare the verb's arguments, with units."""
@@ -68,7 +69,7 @@ def verbs() -> dict[str, Path]:
 def overview() -> str:
     """Return the help text with one line a verb, without importing any of them."""
     rows = [f"  {name:<10} {summary(path)}" for name, path in verbs().items()]
-    closing = "rsea VERB --help tells a verb's arguments and units."
+    closing = "rsea VERB --help shows a verb's arguments with units, and an example; rsea --version."
     return "\n".join(["usage: rsea VERB …", "", *rows, "", closing])
 
 
@@ -88,8 +89,14 @@ def _call(name: str, arguments: Sequence[str]) -> int:
     if name in ("-h", "--help"):
         print(overview())
         return SUCCESS
+    if name == "--version":
+        from rsea_ros.version import version
+
+        print(f"rsea_ros {version()}")
+        return SUCCESS
     if name not in verbs():
-        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}")
+        near = did_you_mean(name, verbs())
+        raise ParameterError(f"no verb {name!r}, expected one of: {', '.join(verbs())}{near}")
     if effects := os.environ.get("RSEA_EFFECTS"):
         _fail(f"rsea {name}", f"RSEA_EFFECTS={effects}: code from there runs as part of this program")
     return _run(name, arguments)
@@ -102,18 +109,42 @@ def _run(name: str, arguments: Sequence[str]) -> int:
     ones there.
     """
     verb = cast(Verb, importlib.import_module(f"rsea_ros.cli.{verbs()[name].stem}"))
-    parser = _Parser(prog=f"rsea {name}", description=verb.HELP)
+    parser = _Parser(
+        prog=f"rsea {name}",
+        description=verb.HELP,
+        epilog=f"example:\n  {verb.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     verb.add_arguments(parser)
-    args, rest = parser.parse_known_args(arguments)
+    args, rest = parser.parse_known_args(attached(arguments))
     if "pass_on" in args:
         args.pass_on = rest
     elif rest:
-        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+        parser.error(f"unrecognized arguments: {' '.join(rest)}{did_you_mean(rest[0], parser.options)}")
     return verb.run(args)
+
+
+def attached(arguments: Sequence[str]) -> list[str]:
+    """Return arguments with an axis that is turned around, `--axis -torque.z`, as one word.
+
+    argparse would take the value for an option.
+    """
+    joined: list[str] = []
+    for word in arguments:
+        if joined and joined[-1] == "--axis" and word.startswith("-") and "." in word:
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, as all others."""
+
+    @property
+    def options(self) -> list[str]:
+        """All options that it takes, `--out` and the like."""
+        return [option for action in self._actions for option in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
         """Leave with status 2."""

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rsea_ros.signals import Record
 
 HELP = "every equation, table and figure of the paper recomputed beside the printed value"
+EXAMPLE = "rsea paper --out paper"
 MOVING = {
     "paper_moving_output": ("ft",),
     "two_moving_outputs": ("ft", "position"),

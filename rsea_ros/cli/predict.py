@@ -19,6 +19,7 @@ from rsea_ros.report.identification_json import fault_json, numbers
 from rsea_ros.stamps import repair_stamps
 
 HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"
+EXAMPLE = "rsea predict results/model.yaml other_run.mcap"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

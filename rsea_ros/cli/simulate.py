@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import ParameterError
-from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
+from rsea_ros.identification.excitation import JOINT, KINDS, Settings, check_limits, excitation
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -24,6 +25,15 @@ from rsea_ros.signals import Channel
 from rsea_ros.wording import shown
 
 HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
+EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"
+
+
+_MOST_TORQUE, _MOST_TURNED = 100.0, 3.2
+"""N m, rad. Larger commands are refused unless --limit allows them."""
+
+
+def _default(name: str) -> str:
+    return f"(default {getattr(Settings(), name):g}, of a joint {getattr(JOINT, name):g})"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,26 +57,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="kind of the command (default %(default)s)",
     )
     parser.add_argument("--duration", type=float, default=60.0, help="s (default %(default)s)")
-    parser.add_argument("--rate", type=float, default=default.rate, help="Hz (default %(default)s)")
-    parser.add_argument(
-        "--amplitude", type=float, default=default.amplitude, help="N m (default %(default)s)"
-    )
+    parser.add_argument("--rate", type=float, help=f"Hz {_default('rate')}")
+    parser.add_argument("--amplitude", type=float, help=f"N m, of a joint rad {_default('amplitude')}")
     parser.add_argument(
         "--deviation",
         type=float,
-        default=default.noise,
-        help="N m, standard deviation of noise on a chirp (default %(default)s)",
+        help=f"N m, of a joint rad: standard deviation of noise on a chirp {_default('noise')}",
     )
-    parser.add_argument(
-        "--low", type=float, default=default.low, help="Hz, lowest frequency (default %(default)s)"
-    )
-    parser.add_argument(
-        "--high", type=float, default=default.high, help="Hz, highest frequency (default %(default)s)"
-    )
+    parser.add_argument("--low", type=float, help=f"Hz, lowest frequency {_default('low')}")
+    parser.add_argument("--high", type=float, help=f"Hz, highest frequency {_default('high')}")
     parser.add_argument(
         "--period", type=float, default=default.period, help="s, of multisine and steps (default %(default)s)"
     )
-    parser.add_argument("--limit", type=float, default=100.0, help="N m, refused above (default %(default)s)")
+    add = parser.add_argument
+    add("--limit", type=float, help="refused above (default 100 N m, of a joint 3.2 rad)")
     parser.add_argument(
         "--seed", type=seed, default=0, help="of command and sensor noise (default %(default)s)"
     )
@@ -80,26 +84,31 @@ def run(args: argparse.Namespace) -> int:
     rig = load_rig(args.rig)
     rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
     check_effects(rig.effects)
-    settings = Settings(
-        rate=args.rate,
-        duration=args.duration,
-        amplitude=args.amplitude,
-        noise=args.deviation,
-        low=args.low,
-        high=args.high,
-        period=args.period,
-        seed=args.seed,
-    )
+    settings = _settings(args, JOINT if rig.loop else Settings())
     values = excitation(args.excitation, settings)
-    check_limits(values, args.limit, args.rate)
-    command = Channel(np.arange(len(values)) / args.rate, values)
+    limit, unit = (_MOST_TURNED, "rad") if rig.loop else (_MOST_TORQUE, "N m")
+    check_limits(values, limit if args.limit is None else args.limit, settings.rate, unit)
+    command = Channel(np.arange(len(values)) / settings.rate, values)
     record = synthesize(rig, command, seed=args.seed + 1, noise=not args.no_noise)
     write_record(record, args.out, topic_map(args), force=args.force)
     print(
-        f"{args.out}: {args.duration:g} s at {args.rate:g} Hz of {rig.name}"
+        f"{args.out}: {args.duration:g} s at {settings.rate:g} Hz of {rig.name}"
         + "".join(f", {e.name}" for e in rig.effects)
     )
     return 0
+
+
+def _settings(args: argparse.Namespace, default: Settings) -> Settings:
+    """Return the excitation asked for, the default of this kind of rig where nothing is said."""
+    asked = {
+        "rate": args.rate,
+        "amplitude": args.amplitude,
+        "noise": args.deviation,
+        "low": args.low,
+        "high": args.high,
+    }
+    said = {name: value for name, value in asked.items() if value is not None}
+    return replace(default, duration=args.duration, period=args.period, seed=args.seed, **said)
 
 
 def parse_effect(text: str) -> EffectSetting:

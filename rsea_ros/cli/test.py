@@ -13,6 +13,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.interrupts import Stopped
 
 HELP = "run the tests; further arguments go to pytest (paths are relative to the repository)"
+EXAMPLE = "rsea test test/cli -x"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

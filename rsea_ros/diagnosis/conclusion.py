@@ -10,11 +10,13 @@ import numpy as np
 
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
-from rsea_ros.diagnosis.compare import misfits, spectrum
-from rsea_ros.diagnosis.experiment import amplitude_series, separating
-from rsea_ros.diagnosis.judge import gain
+from rsea_ros.diagnosis.data_split import TEST
+from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
+from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
-from rsea_ros.diagnosis.search import Search
+from rsea_ros.diagnosis.score import Score, gain, score_on
+from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.sentences import (
     coherence_lost,
     coloured_noise,
@@ -22,57 +24,62 @@ from rsea_ros.diagnosis.sentences import (
     on_measured_angle,
     verdict_sentence,
 )
-from rsea_ros.diagnosis.split import JUDGE, Score, score_on
-from rsea_ros.diagnosis.stages import Stage
-from rsea_ros.diagnosis.trial import Trial
-from rsea_ros.diagnosis.verdict import FLOOR, reached, verdict_of
-from rsea_ros.diagnosis.workers import Workers
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.diagnosis.verdict import is_at_floor, verdict_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.identification.unknowns import CLOCK_DOUBT
-from rsea_ros.model.rig import Rig
+from rsea_ros.identification.workers import Pools
+from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 from rsea_ros.signals import Record
 
 MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
-PRIMARY = ("ft", "position", "velocity", "motor_torque")
+PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
 """The channel that gains and verdicts speak of: the first of these that is there."""
 
 
-def conclusion(
-    found: Search,
-    stages: list[Stage],
+def diagnosis_of(
+    selection: Selection,
+    stages: list[Evaluated],
     checked: Sequence[Checked],
     records: Sequence[Record],
     rig: Rig,
-    at_work: Workers,
+    pools: Pools,
+    settings: DiagnosisSettings,
 ) -> Diagnosis:
     """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
-    channel = next((n for n in PRIMARY if n in stages[0].judged.sums), None)
+    channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
     if channel is None:
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
-    verdict = verdict_of(found, stages)
-    if verdict == "unexplained":
-        stages, channel = stages[:1], spoken_of(stages[0].judged, channel)
-    first, last = stages[0], stages[-1]
-    causes = tuple(_cause(found, a, b, last, channel) for a, b in itertools.pairwise(stages))
-    named = {c.name for c in causes}
-    others = [t for t in _latest(found.trials) if t.name not in named]
-    rejected = at_work.fits.map(lambda t: _rejected(t, found.cases, channel), others)
-    case = found.cases[0]
     faults = tuple(f for c in checked for f in c.faults)
-    where = misfits(case, first.outputs[0], channel, rig)
+    levels, causes_named = settings.floor, selection.last.causes
+    has_rivals = bool(causes_named) and bool(selection.rivals_of(causes_named[0]))
+    verdict = verdict_of([s.test for s in stages], has_rivals, levels, faults)
+    dropped: list[Rejected] = []
+    if verdict == "unexplained":
+        channel = main_channel(stages[0].test, channel, levels.reached)
+        dropped = [_dropped(a, b, channel) for a, b in itertools.pairwise(stages)]
+        stages = stages[:1]
+    first, last = stages[0], stages[-1]
+    causes = tuple(_cause(selection, a, b, last, channel) for a, b in itertools.pairwise(stages))
+    main = causes[0].channel if causes else channel
+    named = {c.name for c in causes} | {r.name for r in dropped}
+    others = [t for t in _latest(selection.trials) if t.name not in named]
+    rejected = pools.fits.map(lambda t: _rejected(t, selection.cases, main), others)
+    case = selection.cases[0]
+    where = misfits(case, first.outputs[0], main, rig)
     baseline = parameters_of(first.solution, first.confidence)
     return Diagnosis(
         verdict=verdict,
+        channel=main,
         sentence=verdict_sentence(
-            verdict, causes, channel, first.judged.ratio(channel), last.judged.ratio(channel), faults
+            verdict, causes, main, first.test.ratio(main), last.test.ratio(main), faults
         ),
         rig_name=rig.name,
         sources=tuple(r.source for r in records),
@@ -83,46 +90,46 @@ def conclusion(
         baseline=baseline,
         extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
         noise_rms=dict(case.noise),
-        residual_rms=_rms(first.judged, case),
-        fit_percent=_fit(first, found.cases),
-        extended_residual_rms=_rms(last.judged, case),
-        extended_fit_percent=_fit(last, found.cases),
-        at_noise_floor=reached(last.judged),
+        residual_rms=_rms(first.test, case),
+        fit_percent=_fit(first, selection.cases),
+        extended_residual_rms=_rms(last.test, case),
+        extended_fit_percent=_fit(last, selection.cases),
+        at_noise_floor=is_at_floor(last.test, levels),
         misfit=where,
         causes=causes,
-        rejected=tuple(rejected),
-        next_experiment=_next_experiment(found, stages, verdict, records[0]),
-        remaining=misfits(case, last.outputs[0], channel, rig),
+        rejected=(*dropped, *rejected),
+        next_experiment=_next_experiment(selection, stages, verdict, records[0]),
+        remaining=misfits(case, last.outputs[0], main, rig),
         masked=checked[0].masked,
+        settings=settings,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
-        spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.judged.sums),
+        spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),
         statements=(
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
-            *coherence_lost(lost_above(case, channel), channel),
+            *coherence_lost(lost_above(case, main), main),
             *on_measured_angle(last.solution.problem),
             *coloured_noise(sorted(case.coloured)),
         ),
     )
 
 
-def spoken_of(judged: Score, channel: str) -> str:
-    """Return the channel that tells an unexplained residual: the worst, unless `channel` is above noise."""
-    return channel if judged.ratio(channel) > FLOOR else judged.worst
+def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reached) -> str:
+    """Return the channel that shows an unexplained residual: `channel` if above noise, else the worst."""
+    return channel if test.ratio(channel) > reached else test.worst
 
 
-def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: str) -> Cause:
+def _cause(
+    selection: Selection, without: Evaluated, with_it: Evaluated, last: Evaluated, channel: str
+) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
-    setting = with_it.solution.problem.rig.effects[-1]
-    effect = effect_named(setting.name)
+    effect = effect_named(with_it.solution.problem.added[-1])
     speaks = (
         channel
-        if without.judged.ratio(channel) > 1.02 * with_it.judged.ratio(channel)
-        else max(
-            without.judged.sums, key=lambda n: without.judged.ratio(n) / max(with_it.judged.ratio(n), 1e-12)
-        )
+        if without.test.ratio(channel) > 1.02 * with_it.test.ratio(channel)
+        else max(without.test.sums, key=lambda n: without.test.ratio(n) / max(with_it.test.ratio(n), 1e-12))
     )
-    held_out, interval = gain(with_it.judged, without.judged, speaks)
+    held_out, interval = gain(with_it.test, without.test, speaks)
     train, _ = gain(with_it.train, without.train, speaks)
     estimates = {
         p.name.split(".")[1]: p
@@ -131,43 +138,43 @@ def _cause(found: Search, without: Stage, with_it: Stage, last: Stage, channel: 
     }
     return Cause(
         name=effect.name,
-        parameters={k: honest(e) for k, e in estimates.items()},
+        parameters={k: with_model_uncertainty(e) for k, e in estimates.items()},
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
         evidence=evidence_of(
-            effect, speaks, without.judged.ratio(speaks), with_it.judged.ratio(speaks), held_out
+            effect, speaks, without.test.ratio(speaks), with_it.test.ratio(speaks), held_out
         ),
         equation=effect.equation,
         channel=speaks,
-        confusable_with=tuple(m.causes[-1] for m in found.rivals_of(effect.name)),
+        confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
     )
 
 
-def honest(estimate: ParameterEstimate) -> Estimate:
+def with_model_uncertainty(estimate: ParameterEstimate) -> Estimate:
     """Return an estimate whose interval also holds what no residual shows.
 
     The fit's interval speaks of noise alone. Two right simulations of one bench differ by about MODEL_DOUBT
     in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
-    the sensors' clocks.
+    the sensors' clocks. The interval of the noise alone stands beside the whole one.
     """
-    doubt = MODEL_DOUBT * abs(estimate.value)
+    value, sd = estimate.value, MODEL_DOUBT * abs(estimate.value)
     if estimate.unit == "s":
-        doubt = float(np.hypot(doubt, CLOCK_DOUBT))
-    low, high = (float(np.hypot(end - estimate.value, 1.96 * doubt)) for end in estimate.ci95)
-    return Estimate(estimate.value, estimate.unit, (estimate.value - low, estimate.value + high))
+        sd = float(np.hypot(sd, CLOCK_DOUBT))
+    low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
+    return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
 
 
 def _next_experiment(
-    found: Search, stages: Sequence[Stage], verdict: Verdict, record: Record
+    selection: Selection, stages: Sequence[Evaluated], verdict: Verdict, record: Record
 ) -> Experiment | None:
     """Return the run that would tell what these data cannot; None when nothing is left to tell."""
     for stage in stages[1:]:
-        rivals = found.rivals_of(stage.solution.problem.rig.effects[-1].name)
+        rivals = selection.rivals_of(stage.solution.problem.added[-1])
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
-    if verdict in ("unexplained", "partly_explained"):
-        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
+    if verdict in ("unexplained", "partly_explained") and not is_at_floor(stages[-1].test):
+        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))), stages[0].solution.problem.rig)
     return None
 
 
@@ -183,17 +190,24 @@ def _latest(trials: Sequence[Trial]) -> list[Trial]:
 def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
     """Return a trial with its gain, on data that judge, over the model that it was tried beside."""
     problem = replace(trial.problem, cases=cases)
-    with_it = score_on(problem, cases, JUDGE, problem.outputs(trial.theta))
-    without = score_on(problem, cases, JUDGE, trial.beside.outputs)
-    return Rejected(trial.name, gain(with_it, without, channel)[0], trial.why)
+    with_it = score_on(problem, cases, TEST, problem.outputs(trial.theta))
+    without = score_on(problem, cases, TEST, trial.beside.outputs)
+    size = gain(with_it, without, channel)[0]
+    return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 
-def _rms(judged: Score, case: Case) -> dict[str, float]:
-    return {n: judged.ratio(n) * case.noise[n] for n in judged.sums}
+def _dropped(without: Evaluated, with_it: Evaluated, channel: str) -> Rejected:
+    """Return an effect that was accepted and is no cause, for the verdict is `unexplained`."""
+    name = with_it.solution.problem.added[-1]
+    return Rejected(name, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
 
 
-def _fit(stage: Stage, cases: tuple[Case, ...]) -> dict[str, float]:
+def _rms(test: Score, case: Case) -> dict[str, float]:
+    return {n: test.ratio(n) * case.noise[n] for n in test.sums}
+
+
+def _fit(stage: Evaluated, cases: tuple[Case, ...]) -> dict[str, float]:
     """Return the fit of every channel on all samples that count, %."""
     case, out = cases[0], stage.outputs[0]
-    keep = {n: case.mask[n] for n in stage.judged.sums if n in case.measured}
+    keep = {n: case.mask[n] for n in stage.test.sums if n in case.measured}
     return {n: fit_percent((out[n] - case.measured[n])[k], case.measured[n][k]) for n, k in keep.items()}

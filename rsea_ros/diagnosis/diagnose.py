@@ -1,21 +1,32 @@
-"""Diagnosis: simulate, compare, hypothesise, fit, judge, until nothing is left or nothing helps."""
+"""Diagnosis: what a rig's simulation gets wrong, by stepwise selection among the effects of the catalogue.
+
+The nominal model is fitted; effects are added one after another, each fitted to the training blocks and
+accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is reported
+with its gain on the test blocks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from rsea_ros.checks.faults import check
-from rsea_ros.diagnosis.conclusion import conclusion
-from rsea_ros.diagnosis.pruning import pruned
+from rsea_ros.checks.faults import Checked, check
+from rsea_ros.checks.usable import check_diagnosable
+from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
+from rsea_ros.diagnosis.conclusion import diagnosis_of
+from rsea_ros.diagnosis.evaluation import evaluate
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.diagnosis.search import search
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.stages import judged
-from rsea_ros.diagnosis.workers import workers
+from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.steady import steadied
+from rsea_ros.identification.workers import worker_pools
 from rsea_ros.model.extent import bounded
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
@@ -28,33 +39,40 @@ def diagnose(
     progress: Progress | None = None,
     settings: DiagnosisSettings | None = None,
 ) -> Diagnosis:
-    """Say where a rig's simulation and the records part, why, and what extending the model gains.
+    """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
 
-    holdout: a record that judges; without it, blocks of the records that took no part in fit or choice.
-    settings: what is tried, DiagnosisSettings() by default.
-    Raises IdentificationError when the records do not hold what the rig needs.
+    rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
+    holdout: a record on which the models are tested; without it, the test blocks of the records.
+    settings: what is tried and by which numbers, DiagnosisSettings() by default.
+    Raises IdentificationError when the records are too short or do not hold what the rig needs.
     """
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
-    rig = nominal_rig(rig)
-    records = [bounded(r) for r in records]
-    holdout = bounded(holdout) if holdout is not None else None
-    checked = [check(r, rig) for r in records]
+    records = [bounded(commanded(r, rig)) for r in records]
+    holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
+    for record in [*records, *([holdout] if holdout is not None else [])]:
+        check_diagnosable(record)
+    checked, sentences = _steady([check(r, rig) for r in records], rig)
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
-    judging = check(holdout, rig) if holdout is not None else None
-    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS)
+    tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
+    stated = frozenset(e.name for e in rig.effects)
+    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
-    with workers() as at_work:
-        found = search(cases, nominal, effects, at_work, tell, settings.max_causes)
+    with worker_pools() as pools:
+        start = joint_start(checked[0].record, rig) if rig.loop is not None else None
+        selection = select_stepwise(nominal, effects, pools, tell, settings, start)
         tell("looking for a simpler model", 0.9)
-        found = pruned(found, effects, at_work)
-        tell("judging", 0.95)
-        stages = [judged(found, m, judging, rig, at_work.run) for m in found.models]
-        return conclusion(found, stages, [*checked, *([judging] if judging else [])], records, rig, at_work)
+        selection = eliminate_backwards(selection, effects, pools, settings)
+        tell("evaluating on the test blocks", 0.95)
+        stages = [evaluate(selection, m, tested, pools, settings) for m in selection.models]
+        every = [*checked, *([tested] if tested else [])]
+        result = diagnosis_of(selection, stages, every, records, rig, pools, settings)
+    return replace(result, statements=(*sentences, *torque_scale(nominal), *result.statements))
 
 
-def nominal_rig(rig: Rig) -> Rig:
-    """Return the rig with only those of its effects whose parameters are all known."""
-    known = (e for e in rig.effects if all(f"{e.name}.{p}" in rig.known for p in e.parameters))
-    return rig.with_effects(*known)
+def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[str, ...]]:
+    """Return records on the even clocks that their values agree with, and what was done, in words."""
+    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    records = zip(checked, steady.records, strict=True)
+    return [replace(c, record=record) for c, record in records], steady.sentences

@@ -9,11 +9,29 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
+Reason = Literal[
+    "far_behind",
+    "at_bound",
+    "not_sure",
+    "too_small",
+    "explains_less",
+    "no_better_than_simpler",
+    "no_better_than_likelier",
+    "redundant",
+    "leaves_too_much",
+]
+"""Why an effect is no cause.
+
+far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound. not_sure,
+too_small: the gain on the validation blocks. explains_less, no_better_than_…: than the accepted rival.
+redundant: beside the other causes. leaves_too_much: it was accepted, but the verdict is `unexplained`.
+"""
 
 
 @dataclass(frozen=True)
@@ -30,11 +48,17 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter of a cause with its 95 % interval."""
+    """A parameter of a cause with its 95 % interval.
+
+    ci95: of all that is unknown, the simulation's own error included. statistical_ci95: of the data's noise
+    alone; None where it was not separated. model_sd: one sigma of the simulation's own error, in `unit`.
+    """
 
     value: float
     unit: str
     ci95: tuple[float, float]
+    statistical_ci95: tuple[float, float] | None = None
+    model_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -54,11 +78,17 @@ class Cause:
 
 @dataclass(frozen=True)
 class Rejected:
-    """A cause that was tried and not accepted, with its gain on data that it was not fitted to."""
+    """An effect that was tried and is no cause, with its gain on data that it was not fitted to.
+
+    rival: the effect that was preferred, empty for none. is_fitted: fitted to all training blocks; otherwise
+    only to short pieces of them, and its gain says little.
+    """
 
     name: str
     gain_holdout: float
-    why: str
+    reason: Reason
+    rival: str = ""
+    is_fitted: bool = True
 
 
 @dataclass(frozen=True)
@@ -84,11 +114,13 @@ class Spectrum:
 class Diagnosis:
     """The verdict and all that it rests on. Dicts are by channel, in the channel's unit.
 
+    channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
     before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
     """
 
     verdict: Verdict
+    channel: str
     sentence: str
     rig_name: str
     sources: tuple[str, ...]
@@ -114,3 +146,4 @@ class Diagnosis:
     spectra: tuple[Spectrum, ...] = ()
     statements: tuple[str, ...] = field(default=())
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
+    settings: DiagnosisSettings = DEFAULT

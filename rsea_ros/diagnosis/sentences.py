@@ -9,11 +9,14 @@ from rsea_ros.diagnosis.result import Cause, Verdict
 from rsea_ros.effects.effect import Effect
 from rsea_ros.fault_kinds import MASKED
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.silent import silent_channels
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
 _CHANNELS = {
     "ft": "F/T torque",
+    "deflection": "spring deflection",
     "position": "position",
     "velocity": "velocity",
     "motor_torque": "motor torque",
@@ -33,10 +36,10 @@ def verdict_sentence(
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
-    dead = [_CHANNELS.get(f.channel, f.channel) for f in faults if f.kind == "dead_channel"]
-    if verdict == "nothing_wrong" and dead:
+    silent = [_CHANNELS.get(n, n) for n in silent_channels(faults)]
+    if verdict == "unexplained" and silent and before <= AT_NOISE:
         return (
-            f"The {listed(dead)} measures nothing and is left out; with the model's values re-fitted "
+            f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "nothing_wrong":

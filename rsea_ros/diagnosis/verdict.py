@@ -1,49 +1,55 @@
-"""The verdict: from how the first and the last model do on data that judge."""
+"""The verdict: from the scores of the first and the last model on the test blocks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from rsea_ros.diagnosis.result import Verdict
-from rsea_ros.diagnosis.search import Search
-from rsea_ros.diagnosis.split import Score
-from rsea_ros.diagnosis.stages import Stage
-
-FLOOR = 1.1
-"""RMS of the residual over the noise, held out, up to which a model has reached the noise floor."""
-MISFIT = 1.5
-"""RMS of the residual over the noise above which a channel misfits."""
-MUCH = 3.0
-"""RMS of the residual over the noise above which a channel misfits much."""
-HALF = 0.5
-"""What may be left of a misfitting channel's residual for causes to be named without reaching the floor."""
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT, FloorSettings
+from rsea_ros.identification.silent import silent_channels
+from rsea_ros.signals import Fault
 
 
-def verdict_of(found: Search, stages: Sequence[Stage]) -> Verdict:
-    """Return the verdict: see contract.md, diagnosis.json."""
-    first, last = stages[0].judged, stages[-1].judged
-    if len(stages) == 1:
-        return "nothing_wrong" if reached(first) else "unexplained"
-    if reached(last):
+def verdict_of(
+    scores: Sequence[Score],
+    has_rivals: bool,
+    levels: FloorSettings = DEFAULT.floor,
+    faults: Sequence[Fault] = (),
+) -> Verdict:
+    """Return the verdict of models, from the nominal one to the one with all causes.
+
+    scores: on the test blocks, one a model. has_rivals: another effect does as well as the first cause.
+    faults: of the data. Where a sensor measures nothing, something is wrong that no effect explains
+    (docs/decisions/0063-a-sensor-that-measures-nothing.md).
+    `nothing_wrong` and `explained`: the residual is at the noise floor, without and with causes.
+    `partly_explained`: causes may be named although it is not. `unexplained`: none may.
+    """
+    first, last = scores[0], scores[-1]
+    if len(scores) == 1:
+        is_fine = is_at_floor(first, levels) and not silent_channels(faults)
+        return "nothing_wrong" if is_fine else "unexplained"
+    if is_at_floor(last, levels):
         return "explained"
-    return "partly_explained" if is_trusted(found, first, last) else "unexplained"
+    is_partly = not has_rivals and explains_enough(first, last, levels)
+    return "partly_explained" if is_partly else "unexplained"
 
 
-def reached(judged: Score) -> bool:
+def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
     """Tell whether every channel is at its noise floor."""
-    return all(judged.ratio(n) <= FLOOR for n in judged.sums)
+    return all(test.ratio(n) <= levels.reached for n in test.sums)
 
 
-def is_trusted(found: Search, first: Score, last: Score) -> bool:
+def explains_enough(first: Score, last: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
     """Tell whether causes may be named although the floor is not reached.
 
     What is not in the catalogue often looks a little like something that is. A cause is named only if it
     takes away half of the residual in every channel that misfits, or all of one that misfits much
-    without adding to another, and nothing else does as well as the first.
+    without adding to another.
     """
-    if found.rivals_of(found.last.causes[0]):
-        return False
-    misfitting = [n for n in first.sums if first.ratio(n) > MISFIT]
-    falls = [last.ratio(n) / first.ratio(n) for n in misfitting]
-    explained = [n for n in misfitting if first.ratio(n) > MUCH and last.ratio(n) < MISFIT]
-    return bool(falls) and (max(falls) < HALF or (bool(explained) and max(falls) <= 1.0))
+    misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]
+    left = [last.ratio(n) / first.ratio(n) for n in misfitting]
+    is_explained = any(
+        first.ratio(n) > levels.large_misfit and last.ratio(n) < levels.misfit for n in misfitting
+    )
+    return bool(left) and (max(left) < levels.share_left or (is_explained and max(left) <= 1.0))

@@ -20,6 +20,7 @@ from rsea_ros.effects.signal_table import (
     DISTAL_TORQUE,
     J_SC,
     K_S,
+    PLAY,
     SPRING_TORQUE,
     STEP,
     Port,
@@ -55,6 +56,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
         x[OWED] = spring + inertia - x[GIVEN]
         x[Y], x[V], x[SIDE], x[D], x[W] = y, v, side, d, w
         s[SPRING_TORQUE] += k * (y - d) + b * (v - w)
+        s[PLAY] = y - d
 
 
 EFFECT = Effect(

@@ -2,7 +2,8 @@
 
     inertia q'' + c q' + stiffness q = T_s,   c = 2 damping_ratio sqrt(stiffness inertia)
 
-q is the angle of the base; the F/T sensor sits between it and the spring.
+q is the angle of the base. The F/T sensor sits between it and the spring, or with above_sensor = 1 under it;
+between, it bears a share of the base's inertia:  T_ft = T_s - above_sensor * inertia q''
 """
 
 import math
@@ -26,6 +27,7 @@ def change(rig: Any, parameters: Mapping[str, float]) -> Any:
         "spring_end.inertia": inertia,
         "spring_end.stiffness": stiffness,
         "spring_end.damping": 2.0 * parameters["damping_ratio"] * math.sqrt(stiffness * inertia),
+        "spring_end.above_sensor": parameters["above_sensor"],
     }
     return replace(rig.with_values(values), clamped=rig.clamped - {"spring_end"})
 
@@ -57,11 +59,13 @@ EFFECT = Effect(
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True, optional=True
         ),
+        Parameter("above_sensor", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True),
     ),
     claims=Claims(
         "position", "odd", amplitude_exponent=1.0, passive=True, confusable_with=("structural_resonance",)
     ),
     structure=change,
     about="the clamped end of the spring gives",
-    equation="inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s",
+    equation="inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s, "
+    "T_ft = T_s - above_sensor · inertia · q̈",
 )

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
 import pkgutil
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import MappingProxyType
 
 import rsea_ros.effects as package
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import ParameterError
-from rsea_ros.wording import shown
+from rsea_ros.plugins import plugin_constant, plugin_files
+from rsea_ros.wording import did_you_mean, shown
 
 _NOT_EFFECTS = {"effect", "catalogue", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
@@ -24,14 +23,14 @@ EXTRA_PATH = "RSEA_EFFECTS"
 @lru_cache(maxsize=8)
 def _catalogue(extra: tuple[str, ...]) -> Mapping[str, Effect]:
     modules = [importlib.import_module(f"rsea_ros.effects.{name}") for name in sorted(_own_names())]
-    modules += [_load(path) for path in extra]
     effects = [m.EFFECT for m in modules]
+    effects += [plugin_constant(EXTRA_PATH, path, "EFFECT", Effect) for path in extra]
     return MappingProxyType({e.name: e for e in effects})
 
 
 def catalogue() -> Mapping[str, Effect]:
     """Return every effect by name, those of RSEA_EFFECTS included."""
-    return _catalogue(tuple(str(p) for p in _extra_files(os.environ.get(EXTRA_PATH, ""))))
+    return _catalogue(tuple(str(p) for p in plugin_files(os.environ.get(EXTRA_PATH, ""))))
 
 
 def effect_named(name: str) -> Effect:
@@ -41,7 +40,8 @@ def effect_named(name: str) -> Effect:
     effects = catalogue()
     if name not in effects:
         known = ", ".join(effects)
-        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}")
+        near = did_you_mean(name, effects)
+        raise ParameterError(f"effect {shown(name)}: not in the catalogue, expected one of {known}{near}")
     return effects[name]
 
 
@@ -55,23 +55,3 @@ def look_alikes(name: str, effects: Iterable[Effect]) -> list[Effect]:
 def _own_names() -> frozenset[str]:
     names = (m.name for m in pkgutil.iter_modules(package.__path__))
     return frozenset(n for n in names if n not in _NOT_EFFECTS and not n.startswith("_"))
-
-
-def _extra_files(paths: str) -> Iterable[Path]:
-    for item in filter(None, paths.split(os.pathsep)):
-        path = Path(item)
-        yield from sorted(path.glob("[!_]*.py")) if path.is_dir() else [path]
-
-
-def _load(path: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
-    if spec is None or spec.loader is None or not Path(path).exists():
-        raise ParameterError(f"{EXTRA_PATH}: {path}: no such file, expected a Python file with an EFFECT")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise ParameterError(f"{EXTRA_PATH}: {path}: {type(error).__name__}: {error}") from error
-    if not isinstance(getattr(module, "EFFECT", None), Effect):
-        raise ParameterError(f"{EXTRA_PATH}: {path}: no EFFECT in it, expected a constant of type Effect")
-    return module

@@ -1,30 +1,42 @@
 """Command that takes effect later than its stamp says.
 
-    T_m(t) = T_command(t - delay)
+    T_m(t) = T_command(t - delay),   of a position loop r(t) = target(t - delay)
 
 Commands are kept on the grid of the step; a delay that is no whole number of steps mixes two of them, which
 is the exact mean over the step of the held command.
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, REFERENCE, STEP, TARGETED, Port
 
 LENGTH = 1023
 """Commands kept: 60 ms at a step of 60 us."""
+STARTED = 1 + LENGTH
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Put the command into the ring x[1:] and take out the delayed one; x[0] is where the next one goes."""
+    """Put the command into the ring x[1:] and take out the delayed one; x[0] is where the next one goes.
+
+    Before the first target a loop had that target, before the first torque there was none.
+    """
     if p[0] == 0.0:
         return
     steps = min(p[0] / s[STEP], LENGTH - 2.0)
     whole, now = int(steps), int(x[0])
     part = steps - whole
-    x[1 + now] = s[COMMAND]
+    targeted = s[TARGETED] != 0.0
+    if targeted and x[STARTED] == 0.0:
+        for i in range(1, STARTED):
+            x[i] = s[REFERENCE]
+        x[STARTED] = 1.0
+    x[1 + now] = s[REFERENCE] if targeted else s[COMMAND]
     newer, older = x[1 + (now - whole) % LENGTH], x[1 + (now - whole - 1) % LENGTH]
     x[0] = (now + 1) % LENGTH
-    s[COMMAND], s[CURRENT] = newer + part * (older - newer), newer
+    if targeted:
+        s[REFERENCE] = newer + part * (older - newer)
+    else:
+        s[COMMAND], s[CURRENT] = newer + part * (older - newer), newer
 
 
 EFFECT = Effect(
@@ -37,7 +49,7 @@ EFFECT = Effect(
         "velocity", "odd", amplitude_exponent=1.0, confusable_with=("current_loop_lag", "gear_compliance")
     ),
     function=apply,
-    states=1 + LENGTH,
+    states=2 + LENGTH,
     about="the command takes effect later than its stamp says",
     equation="T_motor(t) = T_command(t - delay)",
 )

@@ -1,8 +1,11 @@
-"""F/T sensor whose zero walks away during the record.
+"""F/T sensor whose zero walks away during the record, straight on or settling as the sensor warms up.
 
-T_ft = T + drift * t / duration
+    T_ft = T + drift * s(t) / s(duration),   s(t) = 1 - exp(-t / time_constant), or t without one
+
+Source: the sensor's manual (warm-up); test of the second bench, ft_thermal.
 """
 
+from rsea_ros.effects._drift import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
 
@@ -10,16 +13,16 @@ from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Add the drift so far to what the sensor sees."""
-    s[FT] += p[0] * s[TIME] / s[DURATION]
+    s[FT] += p[0] * progress(s[TIME], s[DURATION], p[1])
 
 
 EFFECT = Effect(
     name="ft_drift",
     port=Port.SENSOR,
     order=30,
-    parameters=(Parameter("drift", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),),
+    parameters=(Parameter("drift", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5), SETTLING),
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_bias",)),
     function=apply,
     about="zero of the F/T sensor that walks during the record",
-    equation="T_ft = T + drift · t / duration",
+    equation="T_ft = T + drift · s(t) / s(duration), s(t) = 1 - exp(-t / time_constant), or t without one",
 )

@@ -19,7 +19,8 @@ class Port(IntEnum):
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
     SPRING: likewise, adds to s[SPRING_TORQUE]; and once more at the end of the step with s[COMMIT] = 1:
         then it may change its own states x, and what it adds is what the F/T sensor sees.
-    SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY] or s[CURRENT].
+    SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY], s[SPRING_ANGLE] or
+        s[CURRENT].
     STRUCTURE: not called; the effect changes the rig itself.
     """
 
@@ -37,7 +38,7 @@ DURATION = 2  # s, length of the record; a plant that runs on takes its `duratio
 COMMIT = 3  # 1 when the step is done: only then may a SPRING effect change its own states x
 COMMAND = 4  # N m, held over the step
 CURRENT = 5  # N m, motor torque that the measured current shows at the end of the step
-REFERENCE = 6  # rad, of a controller in the loop
+REFERENCE = 6  # rad, target of a controller in the loop
 K_S = 7  # N m/rad
 B_S = 8  # N m s/rad
 B_M = 9  # N m s/rad
@@ -75,5 +76,11 @@ DEFLECTION_SPAN = 33  # rad, change of DEFLECTION over the step; 0 when COMMIT i
 MOBILITY = 34  # rad/s per N m, what a torque at the gear over the step adds to GEAR_VELOCITY at its end
 J_SC = 35  # kg m^2, spring chassis where it turns with the gear output; 0 behind a gear that gives
 CREEP = 36  # rad/s, replaces the creep velocity of friction effects where it is not 0
+TURNS = 37  # 1, turns of the rotor for one of the gear output
+SENSED = 38  # 1, share of the spring's torque that the F/T sensor sees at once
 
-SIZE = 37
+PLAY = 39  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
+SPRING_ANGLE = 40  # rad, deflection of the spring as its own encoder sees it
+TARGETED = 41  # 1 where positions command the bench: then REFERENCE is what its commands say
+
+SIZE = 42

@@ -1,9 +1,14 @@
 """Hysteresis of the spring: torque that depends on the way the deflection came.
 
-    T = torque * z,   dz/dd = (1 - z sign(dd)) / angle
+    T = torque * z,   dz/dd = (1 - (beta sign(z dd) + gamma) |z|) / angle,   beta + gamma = 1
 
-Bouc-Wen with n = 1 and beta = gamma = 1/2, which is Dahl's model: over a way in one direction z goes to
-sign(dd) as exp(-|dd| / angle), exactly. Source: Dahl, AIAA J. 14, 1976; Wen, J. Eng. Mech. 102, 1976.
+Bouc-Wen with n = 1, scaled so that `torque` is where z ends; gamma = 0 is Dahl's model, at 1/2 unloading is
+straight. Over a way in one direction z is an exponential of the way while it loads, with the rate
+beta + gamma, and another while it unloads, with beta - gamma: both exact, and so is where z passes zero.
+A spring whose loading bends less than its unloading, gamma < -1/2, need not end at all: there
+beta + gamma = 1 - (gamma + 1/2)^2, which hardens below -3/2.
+Source: Dahl, AIAA J. 14, 1976; Wen, J. Eng. Mech. 102, 1976; Ismail, Ikhouane, Rodellar, Arch. Comput.
+Methods Eng. 16, 2009, eq. (2).
 """
 
 import math
@@ -14,15 +19,39 @@ from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, S
 
 Z, LAST, STARTED = range(3)
 _SMALL = 0.01
-"""A way, in angles, over which a series to the fourth power is exact to 1e-10."""
+"""A way, times its rate, over which a series to the fourth power is exact to 1e-10."""
+_LARGEST = 20.0
+"""Of z: what hardens further is no hysteresis."""
 
 
 @njit(inline="always")
-def mean_fade(u):  # type: ignore[no-untyped-def]
-    """Return the mean of exp(-x) over x from 0 to u."""
-    if u < _SMALL:
-        return 1.0 - u / 2.0 * (1.0 - u / 3.0 * (1.0 - u / 4.0))
-    return -math.expm1(-u) / u
+def reached(a, u):  # type: ignore[no-untyped-def]
+    """Return (1 - exp(-a u)) / a, what z gains from 0 over a way u, and its integral over the way."""
+    x = a * u
+    if abs(x) < _SMALL:
+        series = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0))
+        return u * series, 0.5 * u * u * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
+    gain = -math.expm1(-max(x, -30.0)) / a
+    return gain, (u - gain) / a
+
+
+@njit(inline="always")
+def along(z, u, gamma):  # type: ignore[no-untyped-def]
+    """Return z at the end of a forward way of u angles, and its integral over the way."""
+    area, beyond = 0.0, min(gamma + 0.5, 0.0)
+    a = 1.0 - beyond * beyond
+    if z < 0.0:
+        b, whole = a - 2.0 * gamma, u
+        if 1.0 - b * z > 0.0:
+            whole = math.log1p(-b * z) / b if abs(b) > 1e-9 else -z
+        way = min(u, whole)
+        gain, rise = reached(b, way)
+        area = z * way + (1.0 - b * z) * rise
+        z = z + (1.0 - b * z) * gain if u < whole else 0.0
+        u -= way
+    gain, rise = reached(a, u)
+    rest = 1.0 - a * z
+    return min(max(z + rest * gain, -_LARGEST), _LARGEST), area + z * u + rest * rise
 
 
 @compiled
@@ -33,14 +62,14 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     way = s[DEFLECTION] - x[LAST] if s[COMMIT] == 1.0 else s[DEFLECTION_SPAN]
     if x[STARTED] == 0.0 and s[COMMIT] == 1.0:
         way = 0.0
-    u, goal = abs(way) / p[1], math.copysign(1.0, way)
-    mean = mean_fade(u)
+    u, side = abs(way) / p[1], math.copysign(1.0, way)
+    end, area = along(side * x[Z], u, p[2])
     if s[COMMIT] == 1.0:
-        x[Z] += (goal - x[Z]) * u * mean
-        x[LAST], x[STARTED] = s[DEFLECTION], 1.0
+        x[Z], x[LAST], x[STARTED] = side * end, s[DEFLECTION], 1.0
         s[SPRING_TORQUE] += p[0] * x[Z]
     else:
-        s[SPRING_TORQUE] += p[0] * (goal + (x[Z] - goal) * mean)
+        mean = area / u if u > 0.0 else side * x[Z]
+        s[SPRING_TORQUE] += p[0] * side * min(max(mean, -_LARGEST), _LARGEST)
 
 
 EFFECT = Effect(
@@ -49,6 +78,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("torque", "N m", null=0.0, low=0.0, high=20.0, typical=1.0),
         Parameter("angle", "rad", null=2e-3, low=1e-4, high=0.05, typical=2e-3, logarithmic=True),
+        Parameter("gamma", "1", null=0.0, low=-3.0, high=0.95, typical=0.0, optional=True),
     ),
     claims=Claims(
         "velocity",
@@ -60,5 +90,5 @@ EFFECT = Effect(
     states=3,
     reads=(DEFLECTION,),
     about="spring torque that depends on the way the deflection came",
-    equation="T = torque · z, dz/dd = (1 - z · sign(ḋ)) / angle",
+    equation="T = torque · z, dz/dd = (1 - (β · sign(z · ḋ) + gamma) · |z|) / angle, β = 1 - gamma",
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.protection import Protection
 
 Wrench = tuple[float, float, float, float, float, float]
 
@@ -36,6 +37,8 @@ class State:
     current A, voltage V, temperature °C: nan where the device does not measure them.
     hardware_error, ft_trouble: what motor and sensor complain of, in words; empty when of nothing.
     motor_trouble: what the motor has become that it was not made to be, such as torque off, in words.
+    deflection: rad, of the spring, from a second encoder, the drive's side less the distal one; nan without.
+    inferred: whether the wrench is stiffness times deflection, and no sensor's.
     """
 
     stamp: int
@@ -51,10 +54,24 @@ class State:
     hardware_error: str = ""
     ft_trouble: str = ""
     motor_trouble: str = ""
+    deflection: float = math.nan
+    inferred: bool = False
 
 
 class Device(Protocol):
-    """An actuator on a wire. Each method raises DeviceError when the device does not answer."""
+    """An actuator on a wire. Each method raises DeviceError when the device does not answer.
+
+    A DeviceError is a fault of the device: the driver latches it, NoReply only after `lost_cycles` of them.
+    Any other exception is a mistake of the program: the driver closes the device and is unconfigured.
+    `read` and `write` are called in every cycle, by one thread: together they may block for the rest of a
+    period, and a reply that does not come by then is a NoReply. All others may take seconds; no cycle runs
+    meanwhile, but beside `zero_ft` and `health`, which must not touch what `read` and `write` use.
+    protection: what ends the torque when the driver's process dies; asked once the device is open.
+    """
+
+    @property
+    def protection(self) -> Protection:
+        """Return the protection against a dead host, of the kind NONE where there is none."""
 
     def open(self) -> None:
         """Connect, with no torque."""
@@ -84,4 +101,7 @@ class Device(Protocol):
         """Return counts and values for diagnostics, by name."""
 
     def close(self) -> None:
-        """Command zero torque and let go; also after a failed `open` or `read`."""
+        """Command zero torque and let go. It follows on everything: a failed `open`, any exception, itself.
+
+        It raises nothing for a device that is away: that its torque ends then is the protection's work.
+        """

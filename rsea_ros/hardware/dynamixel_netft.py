@@ -1,4 +1,4 @@
-"""The paper's bench as a device: a Dynamixel Pro on RS-485 and an ATI Net F/T sensor."""
+"""The paper's bench as a device: a Dynamixel on its bus and an ATI Net F/T sensor."""
 
 from __future__ import annotations
 
@@ -7,30 +7,44 @@ from collections.abc import Mapping
 
 from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
+from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.limits import Limits, check_limits
 from rsea_ros.hardware.netft.sensor import Sensor
 from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.protection import Protection
 
 
 class DynamixelNetft:
     """Motor and sensor behind the Device interface.
 
     Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
+    absolute: they count from the motor's own zero instead, its encoder's with its homing offset.
     stiffness: of the rig's spring, N m/rad, which the limits are checked against.
     """
 
     def __init__(
-        self, motor: MotorSettings, sensor: SensorSettings | None, limits: Limits, stiffness: float
+        self,
+        motor: MotorSettings,
+        sensor: SensorSettings | None,
+        limits: Limits,
+        stiffness: float,
+        *,
+        absolute: bool = False,
     ) -> None:
         self._motor = Motor(motor)
         self._sensor = Sensor(sensor) if sensor is not None else None
-        self._limits, self._stiffness = limits, stiffness
+        self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0
         self.origin = 0.0
         self._waiting: list[tuple[int, Wrench]] = []
         self._trouble = ""
         self._last: State | None = None
+
+    @property
+    def protection(self) -> Protection:
+        """The motor's."""
+        return self._motor.protection
 
     def open(self) -> None:
         """Connect to both and check the limits. Raises DeviceError, ParameterError; nothing stays open."""
@@ -38,7 +52,10 @@ class DynamixelNetft:
         try:
             self._motor.open()
             check_limits(self._limits, self._motor.torque_limit, self._stiffness)
-            self.origin = self._motor.patiently(self._motor.read).position
+            assert self._motor.own is not None
+            check_own_limits(self._limits, self._motor.own, self._motor.known.name)
+            position = self._motor.bus.patiently(self._motor.read).position
+            self.origin = 0.0 if self._absolute else position
             if self._sensor is not None:
                 self._sensor.open()
         except Exception:
@@ -118,8 +135,16 @@ class DynamixelNetft:
     def health(self) -> Mapping[str, object]:
         """Return errors of bus and stream by kind, and what the motor said of itself last."""
         values: dict[str, object] = {f"bus_{kind}": n for kind, n in self._motor.bus.errors.items()}
-        if self._motor.table is not None:
-            values |= {"motor": self._motor.table.name, "torque_limit_nm": f"{self._motor.torque_limit:.4g}"}
+        own = self._motor.own
+        if self._motor.table is not None and own is not None:
+            values |= {
+                "motor": self._motor.table.name,
+                "firmware": own.firmware,
+                "torque_limit_nm": f"{self._motor.torque_limit:.4g}",
+                "torque_constant": self._motor.torque_constant,
+                "homing_offset_rad": f"{own.homing_offset:.6g}",
+                "reversed": own.reversed,
+            }
         if self._sensor is not None:
             values |= {f"ft_{kind}": n for kind, n in self._sensor.counts().items()}
             values["ft_noise_nm"] = f"{self._sensor.noise[5]:.3g}"

@@ -6,10 +6,13 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
-from rsea_ros.errors import DeviceError
+from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
+from rsea_ros.hardware.protection import NONE
+from rsea_ros.hardware.spring import Spring
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
 
@@ -19,10 +22,12 @@ class Guarded:
 
     enabled: whether commands get through. cycles: `failed_reads`, `failed_writes` of the cycles so far.
     away: whether somebody else talks to the device, which takes longer than a cycle; cycles leave it alone.
+    spring: by which a measured deflection becomes a wrench where no sensor measures one; None: it does not.
     """
 
-    def __init__(self, device: Device, limits: Limits, rate: float) -> None:
+    def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
         self.device, self.guard = device, Guard(limits, 1.0 / rate)
+        self._spring = spring
         self.enabled = False
         self.cycles: Counter[str] = Counter()
         self.state: State | None = None
@@ -34,6 +39,22 @@ class Guarded:
     def fault(self) -> Fault | None:
         """The latched fault."""
         return self.guard.fault
+
+    def open(self, *, unprotected: bool = False) -> None:
+        """Open the device and ask for its protection against a dead host.
+
+        unprotected: whether there may be none. Raises ParameterError where there is none and may not be,
+        DeviceError; nothing stays open then.
+        """
+        self.device.open()
+        if self.device.protection.kind == NONE and not unprotected:
+            self.device.close()
+            raise ParameterError(
+                "nothing ends the torque of this device when the driver's process dies: dead-host protection"
+                " none, expected a bus watchdog or a supervisor, or parameter"
+                " allow_no_dead_host_protection = true"
+            )
+        self.guard.clear()
 
     def cycle(self, wanted: float, age: float | None) -> State | None:
         """Write a torque, then read; a reading that trips a fault zeroes the torque at once.
@@ -53,7 +74,8 @@ class Guarded:
     def read(self) -> State | None:
         """Return the reading of this cycle; None when there was none."""
         try:
-            state = self.device.read()
+            self.device.protection.beat()  # to wait for a reply that is lost is not to hang
+            state = self._read()
         except DeviceError as error:
             self._failed("read", error)
             return None
@@ -66,6 +88,7 @@ class Guarded:
         """Write a torque (N m) within the limits, zero when not enabled; return it. age: see Guard."""
         torque = self.guard.allowed(wanted, age if self.enabled and not self._taring else None)
         try:
+            self.device.protection.beat(torque != 0.0)
             self.device.write(torque)
         except DeviceError as error:
             self._failed("write", error)
@@ -91,6 +114,7 @@ class Guarded:
             self.guard.torque = 0.0
             if not self.away:
                 self.device.disable()
+                self.device.protection.beat(False)
 
     def zero_ft(self) -> None:
         """Tare the F/T sensor, beside the cycles. Raises DeviceError while torque is commanded."""
@@ -115,13 +139,35 @@ class Guarded:
     def reboot(self) -> None:
         """Restart the actuator; the fault is forgotten, the torque is on as before, at zero."""
         self.guard.torque = 0.0
-        self._alone(self.device.reboot)
+        self._alone(self._reboot)
+
+    def _reboot(self) -> None:
+        self.device.disable()
+        self.device.protection.beat(False)
+        self.device.reboot()
 
     def _recover(self) -> None:
         self.device.recover()
-        fault = complaint(self.guard.limits, self.device.read())
+        fault = complaint(self.guard.limits, self._read())
         if fault is not None:
             raise DeviceError(f"{fault} is still there, expected it to be over")
+
+    @property
+    def ft_source(self) -> str:
+        """Where the wrench of the newest reading comes from, in words."""
+        if self.state is None or self.state.wrench is None or self._spring is None:
+            return "none" if self.state is None or self.state.wrench is None else "sensor"
+        return f"{self._spring}" if self.state.inferred else "sensor"
+
+    def _read(self) -> State:
+        """Return a reading, with the spring's torque where that is what is measured of it."""
+        state = self.device.read()
+        if self._spring is None:
+            return state
+        state = self._spring.felt(state)
+        if self.state is not None and self.state.inferred and not state.inferred:
+            return replace(state, ft_trouble="the spring's deflection is not measured any more")
+        return state
 
     def _alone(self, work: Callable[[], None]) -> None:
         """Do something with the device while the cycles leave it alone, then begin anew, at zero torque."""
@@ -141,6 +187,7 @@ class Guarded:
                 if not self.enabled:  # also where it was asked for meanwhile
                     with suppress(DeviceError):
                         self.device.disable()
+                        self.device.protection.beat(False)
 
     def _failed(self, what: str, error: DeviceError) -> None:
         """Count a failure. One lost answer costs a cycle; several in a row, and any other failure, trip."""

@@ -19,7 +19,8 @@ class Limits:
     """SI. torque N m, slew N m/s, temperature °C, current A, voltage V (at least), velocity rad/s, position
     rad from where the device was opened, ft N m about the actuator's axis, power W, measured, either way.
 
-    deflection: rad, of the spring: of the drive's angle where that is the spring's.
+    deflection: rad, of the spring, as a second encoder measures it, else of the drive's angle where that is
+    the spring's.
     soft_start: N m/s, by which the largest torque grows after an activation and a fault.
     effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
     command_timeout: s without a command while torque is commanded. ramp: s from there to zero torque.
@@ -62,6 +63,9 @@ class Fault:
 
 def complaint(limits: Limits, state: State) -> Fault | None:
     """Return what a reading says is wrong, the first of it."""
+    if not math.isfinite(state.position + state.velocity + state.motor_torque):
+        reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N m"
+        return Fault("reading", detail=f"{reading}, expected finite values")
     for cause, words in (
         ("hardware_error", state.hardware_error),
         ("motor_state", state.motor_trouble),
@@ -70,8 +74,9 @@ def complaint(limits: Limits, state: State) -> Fault | None:
         if words:
             return Fault(cause, detail=words)
     ft = abs(state.wrench[limits.ft_axis]) if state.wrench is not None else math.nan
+    deflection = state.position if math.isnan(state.deflection) else state.deflection
     for cause, value, limit, unit in (
-        ("deflection", abs(state.position), limits.deflection, "rad"),
+        ("deflection", abs(deflection), limits.deflection, "rad"),
         ("temperature", state.temperature, limits.temperature, "°C"),
         ("current", abs(state.current), limits.current, "A"),
         ("velocity", abs(state.velocity), limits.velocity, "rad/s"),

@@ -9,6 +9,7 @@ import numpy as np
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.protection import PROCESS, Protection
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import build, measure, run
@@ -26,6 +27,8 @@ class SimulatedDevice:
     clock: returns the time, ns since the epoch, without a jump; by default the monotonic clock with the
     system clock's time when the device is made. duration: over which drifts come to their full size, s.
     """
+
+    protection = Protection(PROCESS)
 
     def __init__(
         self,

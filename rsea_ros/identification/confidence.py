@@ -35,10 +35,16 @@ _INVOLVED = 0.2
 """A parameter moves along with an untold direction when it moves at least so much of the largest."""
 _ALIKE = 0.8
 """Values share a factor when the one that moves least moves so much of the one that moves most."""
+_FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+_FIXES_LOOP = "A measured motor torque, a gain known from the firmware, or a known inertia would fix it."
 _MEASURE = "Measure it apart, or excite it more."
 _TORQUE_SCALE = (
     "Without the F/T sensor every torque is known only through the motor constant: "
     "a constant g times as large scales inertia, damping and stiffness by g."
+)
+_GAIN_SCALE = (
+    "Without the F/T sensor every torque is known only through the loop's gains, and through the motor "
+    "constant where a current was measured: gains g times as large scale inertia, damping and friction by g."
 )
 _REMEDY = {
     "spring.damping": "Excitation above the resonance, or F/T sensor and encoder together, would tell it.",
@@ -78,13 +84,27 @@ def confidence_of(solution: Solution) -> Confidence:
     if np.linalg.eigvalsh(information * np.outer(doubt, doubt))[0] < _WEAK:
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
         information = solution.jacobian.T @ solution.jacobian
-    inverse = np.linalg.pinv(information + prior, hermitian=True)
+    inverse = _inverse(information + prior)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
     return Confidence(solution.theta, covariance, _told(information, doubt), information)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a positive definite matrix whose unknowns may be scaled very differently.
+
+    Each unknown is brought to the scale of its own diagonal first: otherwise a value that only wide bounds
+    hold is taken for a singular direction beside one that is known well. What rounding hides of an eigenvalue
+    counts as the smallest that rounding shows, which leaves a wide variance and never none.
+    """
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    values = np.maximum(values, len(values) * np.finfo(float).eps * values[-1])
+    result: FloatArray = (vectors / values) @ vectors.T * np.outer(scale, scale)
+    return result
 
 
 def _alike(case: Case) -> float:
@@ -158,7 +178,7 @@ def torque_scale(problem: Problem) -> tuple[str, ...]:
     fitted = any(u.name.startswith("torque_constant_error.") for u in problem.unknowns)
     if fitted or any("ft" in case.measured for case in problem.cases):
         return ()
-    return (_TORQUE_SCALE,)
+    return (_TORQUE_SCALE if problem.rig.loop is None else _GAIN_SCALE,)
 
 
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:
@@ -193,9 +213,10 @@ def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
         source = "what is known of it is the rig's prior" if prior else "they do not show it"
         remedy = _REMEDY.get(names[0], _MEASURE)
         return f"{names[0]} is not identifiable from these data: {source}. {remedy}"
+    in_loop = any(name.startswith("controller.") for name in names)
     if all(u.name in FIELDS for u in unknowns) and moved.min() > _ALIKE * moved.max():
         return (
             f"Only ratios of {listed(names)} are identifiable from these data: a common factor is taken from "
-            "the rig. A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+            f"the rig. {_FIXES_LOOP if in_loop else _FIXES}"
         )
     return f"{listed(names)} are identifiable from these data only together, not each. {_MEASURE}"

@@ -1,13 +1,14 @@
-"""Sensors that measured on an even clock and were stamped with scatter, as a driver's process stamps them.
+"""Commands and sensors on an even clock that were stamped with scatter, as a driver's process stamps them.
 
-Scattered stamps read the simulation at wrong instants. That is no mere noise: it makes quick motion look
-dear, and a fit finds too much damping (errors in variables; Fuller, Measurement Error Models, 1987). Whether
-the stamps or the even clock behind them are right the values tell: the simulation agrees with one of them.
+Scattered stamps read the simulation at wrong instants, and those of commands drive it at wrong instants. That
+is no mere noise: it makes quick motion look dear, and a fit finds too much damping (errors in variables;
+Fuller, Measurement Error Models, 1987). Whether the stamps or the even clock behind them are right the values
+tell: the simulation agrees with one of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +25,12 @@ SCATTER = 0.005
 _FARTHEST = 0.45
 """Of a period: a stamp further off an even clock could belong to another sample."""
 _SURE = 4.0
-"""Standard deviations of a period, up to which it may be that of the command: one clock makes both."""
+"""Standard deviations of a period, up to which it may be that of all others: one clock makes them."""
 _FALL = 0.8
 """Of the residual at the stamps: the even clock must leave less."""
+_NO_WORSE = 1.02
+"""Of a sensor's residual: an even clock of the command that raises it by more is not the one that acted."""
+_TINY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -52,51 +56,106 @@ def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
     """Return the records with an even clock for each channel whose residual under a solution prefers it."""
     if is_inverse(rig):
         return Evened(tuple(records), {})
-    even = [_on_even_clocks(record) for record in records]
     scatter: dict[str, float] = {}
     result = []
-    for record, (steady, sizes) in zip(records, even, strict=True):
-        chosen = _preferred(record, steady, rig, solution) & sizes.keys() if sizes else set()
+    for record in records:
+        steady, sizes = _on_even_clocks(record)
+        chosen = _preferred(record, steady, sizes.keys(), rig, solution) if sizes else set()
         scatter |= {n: max(sizes[n], scatter.get(n, 0.0)) for n in chosen}
-        result.append(record.with_channels(**{n: steady[n] for n in chosen}))
+        result.append(_taking(record, steady, chosen))
     return Evened(tuple(result), scatter)
+
+
+def may_be_even(record: Record) -> bool:
+    """Tell whether the stamps of any channel scatter about an even clock."""
+    return bool(_on_even_clocks(record)[1])
 
 
 def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
-    shared: period of another channel, s: taken where the stamps do not speak against it, for it is surer.
+    shared: period of all channels, s: taken where the stamps do not speak against it, for it is surer.
     Returns t itself where no even clock comes near to all of it, or where t is even already.
     """
-    period = float(np.median(np.diff(t)))
-    place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / period))])
-    slope, first = np.polyfit(place, t, 1)
-    off = np.abs(t - (first + slope * place))
-    doubt = np.sqrt(np.mean(off**2)) / (np.std(place) * np.sqrt(len(place)))
-    if abs(slope - shared) < _SURE * doubt:
-        slope, first = shared, float(np.mean(t - shared * place))
-    even = first + slope * place
-    if off.max() > _FARTHEST * period or np.sqrt(np.mean(off**2)) < SCATTER * period:
+    line = _line(t)
+    period = shared if abs(line.period - shared) < _SURE * line.doubt else line.period
+    even = period * line.place + float(np.mean(t - period * line.place))
+    usual = float(np.median(np.diff(t)))
+    if line.farthest > _FARTHEST * usual or line.scatter < SCATTER * usual:
         return t
     return np.asarray(even)
 
 
+@dataclass(frozen=True)
+class _Line:
+    """Stamps over the number of their sample, by least squares: period and its one sigma, s.
+
+    place: the number of each sample. farthest, scatter: largest and RMS distance of a stamp from it, s.
+    """
+
+    place: FloatArray
+    period: float
+    doubt: float
+    farthest: float
+    scatter: float
+
+
+def _line(t: FloatArray) -> _Line:
+    usual = float(np.median(np.diff(t)))
+    place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / usual))])
+    period, first = np.polyfit(place, t, 1)
+    off = np.abs(t - (first + period * place))
+    scatter = float(np.sqrt(np.mean(off**2)))
+    doubt = scatter / (float(np.std(place)) * float(np.sqrt(len(place))))
+    return _Line(place, float(period), doubt, float(off.max()), scatter)
+
+
+def _shared_period(record: Record) -> float:
+    """Return the period, s, of all channels that may have the one of the surest, each by its doubt."""
+    lines = [_line(c.t) for n, c in record.channels.items() if n != "reference"]
+    best = min(lines, key=lambda line: line.doubt)
+    alike = [x for x in lines if abs(x.period - best.period) <= _SURE * np.hypot(x.doubt, best.doubt)]
+    return float(np.average([x.period for x in alike], weights=[1.0 / (x.doubt**2 + _TINY) for x in alike]))
+
+
 def _on_even_clocks(record: Record) -> tuple[Record, dict[str, float]]:
-    """Return a record with its sensors on even clocks, and the RMS scatter of those that changed, s."""
-    command = record["command"].t
-    shared = float((command[-1] - command[0]) / np.round((command[-1] - command[0]) * record["command"].rate))
-    clocks = {
-        n: even_clock(c.t, shared) for n, c in record.channels.items() if n not in ("command", "reference")
-    }
+    """Return a record on even clocks, and the RMS scatter of the channels that changed, s."""
+    shared = _shared_period(record)
+    clocks = {n: even_clock(c.t, shared) for n, c in record.channels.items() if n != "reference"}
     changed = {n: t for n, t in clocks.items() if t is not record[n].t}
     steady = record.with_channels(**{n: Channel(t, record[n].y) for n, t in changed.items()})
     return steady, {n: float(np.std(record[n].t - t)) for n, t in changed.items()}
 
 
-def _preferred(record: Record, steady: Record, rig: Rig, solution: Solution) -> set[str]:
-    """Return the channels whose residual is less on the even clock."""
-    left = [_left(each, rig, solution) for each in (record, steady)]
-    return {n for n in left[0].keys() & left[1].keys() if left[1][n] < _FALL * left[0][n]}
+def _taking(record: Record, steady: Record, names: Collection[str]) -> Record:
+    """Return the record with some channels as they are on even clocks."""
+    return record.with_channels(**{n: steady[n] for n in names})
+
+
+def _preferred(
+    record: Record, steady: Record, changed: Collection[str], rig: Rig, solution: Solution
+) -> set[str]:
+    """Return the channels that leave less on the even clock: sensors each, the command by what all leave."""
+    sensors = set(changed) - {"command"}
+    chosen, left = _sensors_preferred(record, steady, sensors, rig, solution)
+    if "command" not in changed:
+        return chosen
+    driven = _taking(record, steady, ["command"])
+    others, even = _sensors_preferred(driven, steady, sensors, rig, solution)
+    falls = [even[n] / max(left[n], _TINY) for n in left.keys() & even.keys() - {"motor_torque"}]
+    return {"command", *others} if falls and min(falls) < _FALL and max(falls) < _NO_WORSE else chosen
+
+
+def _sensors_preferred(
+    record: Record, steady: Record, sensors: set[str], rig: Rig, solution: Solution
+) -> tuple[set[str], dict[str, float]]:
+    """Return the sensors that leave less on the even clock, and what every sensor leaves then."""
+    stamped = _left(record, rig, solution)
+    if not sensors:
+        return set(), stamped
+    even = _left(_taking(record, steady, sensors), rig, solution)
+    chosen = {n for n in sensors & stamped.keys() & even.keys() if even[n] < _FALL * stamped[n]}
+    return chosen, {**stamped, **{n: even[n] for n in chosen}}
 
 
 def _left(record: Record, rig: Rig, solution: Solution) -> dict[str, float]:

@@ -67,6 +67,10 @@ class Settings:
         return round(self.duration * self.rate)
 
 
+JOINT = Settings(rate=100.0, amplitude=0.4, noise=0.03, low=0.05, high=3.0)
+"""What suits a joint that positions command: amplitude and noise in rad."""
+
+
 def chirp(settings: Settings) -> FloatArray:
     """Return the paper's excitation: a logarithmic sweep with white noise on top (section 3.2.1).
 
@@ -194,13 +198,13 @@ def ramped(command: FloatArray, n: int) -> FloatArray:
     return command * window
 
 
-def check_limits(command: FloatArray, limit: float, rate: float) -> None:
-    """Raise ParameterError for the first sample above the limit (N m) or not finite. rate: Hz."""
+def check_limits(command: FloatArray, limit: float, rate: float, unit: str = "N m") -> None:
+    """Raise ParameterError for the first sample above the limit (in unit) or not finite. rate: Hz."""
     bad = ~(np.abs(command) <= limit)
     if bad.any():
         first = int(np.argmax(bad))
         largest = np.max(np.abs(command))
         raise ParameterError(
-            f"command of {command[first]:.4g} N m at {first / rate:.3f} s (largest {largest:.4g} N m), "
-            f"expected at most {limit:g} N m either way"
+            f"command of {command[first]:.4g} {unit} at {first / rate:.3f} s (largest {largest:.4g} {unit}), "
+            f"expected at most {limit:g} {unit} either way"
         )

@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
+from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
 from rsea_ros.identification.confidence import (
     Confidence,
     confidence_of,
@@ -19,6 +20,7 @@ from rsea_ros.identification.confidence import (
     what_is_not_told,
 )
 from rsea_ros.identification.even_stamps import Evened, evened
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -41,14 +43,17 @@ from rsea_ros.identification.unknowns import (
     start_vector,
     unknowns_of_effect,
     unknowns_of_rig,
+    vector_of,
 )
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
+from rsea_ros.units import in_motion
 
-CHANNELS = ("ft", "position", "velocity", "motor_torque")
+CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1
@@ -62,6 +67,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
+    records = [commanded(record, rig) for record in records]
     for record in records:
         check_usable(record)
     records = [bounded(record) for record in records]
@@ -71,22 +77,30 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        solution, cases = fit(
-            cases, rig, run=in_pool(pool), start=None if is_inverse(rig) else start_from(responses, rig)
-        )
+        solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
-        if misfits:
-            steady = evened(records, rig, solution)
-        if steady.scatter:
+        while misfits and (more := evened(steady.records, rig, solution)).scatter:
+            steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
-            solution, cases = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
+            solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
-    return replace(result, statements=(*steady.sentences, *result.statements))
+    return replace(
+        result,
+        statements=(*steady.sentences, *result.statements),
+        notes=(*result.notes, *asked.sentences),
+    )
+
+
+def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
+    """Return where a fit may begin beside the rig's own values."""
+    if is_inverse(rig):
+        return None
+    return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
@@ -126,14 +140,17 @@ def _check_excited(records: Sequence[Record]) -> None:
 
 def fit(
     cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
-) -> tuple[Solution, tuple[Case, ...]]:
-    """Fit the rig's free values, its effects and the sensors' clocks; return the cases with their noise too.
+) -> tuple[Solution, tuple[Case, ...], Asked]:
+    """Fit the rig's free values, its effects and the clocks that the data ask for.
+
+    Returns the cases with their noise too, and what was asked of the clocks.
 
     The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
     weight becomes that residual, as maximum likelihood with unknown noise has it. start: where to begin,
     should the records fit it better than `rig`.
     """
-    problem = Problem(tuple(cases), rig, unknowns_of(rig, cases), CHANNELS)
+    unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
+    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = _with_noise_of(problem, outputs)
@@ -141,6 +158,13 @@ def fit(
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(solution.problem, outputs)
+    asked = asked_of(solution, run)
+    if asked.clocks:
+        solution = solve(*freed(solution, asked), run=run)
+        solution = solve(*without_needless(solution), run=run)
+        problem = solution.problem
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(problem, outputs)
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
@@ -148,7 +172,7 @@ def fit(
         heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
-    return solution, known
+    return solution, known, asked
 
 
 def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
@@ -168,8 +192,7 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
     own = start_vector(problem.unknowns)
     if start is None:
         return own
-    values = start.values()
-    other = np.array([u.inner(values.get(u.name, u.start)) for u in problem.unknowns])
+    other = vector_of(problem.unknowns, start)
     costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
     return other if costs[1] < costs[0] else own
 
@@ -181,7 +204,7 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),
-        *(clocks(channels) if not is_inverse(rig) else ()),
+        *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
 
 
@@ -250,7 +273,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
         ParameterEstimate(
             name=u.name,
             value=u.outer(float(theta)),
-            unit=u.unit,
+            unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
             spread=u.doubt,
@@ -265,7 +288,12 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
 def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
     """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
-    sensors = {n: replace(s, clock=s.clock + clocks.get(n, 0.0)) for n, s in rig.sensors.items()}
+    sensors = {
+        n: replace(
+            s, clock=s.clock + clocks.offset.get(n, 0.0), clock_rate=s.clock_rate + clocks.rate.get(n, 0.0)
+        )
+        for n, s in rig.sensors.items()
+    }
     quantities = dict(rig.quantities)
     for estimate in parameters:
         if estimate.name in quantities:

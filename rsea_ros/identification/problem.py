@@ -11,11 +11,12 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
-from rsea_ros.identification.unknowns import Unknown, apply
-from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.identification.unknowns import Clocks, Unknown, apply
+from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig, Sensor
-from rsea_ros.model.simulation import simulate_drives
+from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import BoolArray, FloatArray, Record
 
@@ -67,16 +68,16 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     """
     if is_inverse(rig):
         return _inverse_case(record, rig)
+    record = commanded(record, rig)
     channels = _channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
-    in_loop = rig.controller is not None and "reference" in record
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
     sensors = {n: rig.sensors.get(n, Sensor()) for n in channels}
     good = {n: ~masked[n] if masked and n in masked else np.ones(len(record[n]), bool) for n in channels}
     start = float(record["command"].t[0]) + SETTLE
     return Case(
-        drive=drive_from(record, closed_loop=in_loop, from_rest="position" in floating),
+        drive=drive_of(record, rig),
         t=MappingProxyType({n: record[n].t for n in channels}),
         measured=MappingProxyType({n: record[n].y for n in channels}),
         noise=MappingProxyType({n: noise_floor(record, n, sensors[n]) for n in channels}),
@@ -95,10 +96,11 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     A sensor that holds one value throughout is dead or unplugged: it has no noise to weigh it by.
     Raises IdentificationError when none of them shows the motion.
     """
-    channels = [n for n in OUTPUTS if n in record and not (n == "ft" and rig.rigid_spring)]
+    channels = [n for n in OUTPUTS if n in record and rig.measures(n)]
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
-            f"{record.source}: no ft, position or velocity channel for rig {rig.name}, expected one"
+            f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
+            "expected one: record it, or name its topic with --topic"
         )
     start = float(record["command"].t[0]) + SETTLE
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
@@ -109,8 +111,8 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
         f"{n} {'holds one value' if record[n].is_still else f'has {counts[n]} samples'}" for n in channels
     )
     raise IdentificationError(
-        f"{record.source}: {have}; expected ft, position or velocity with motion in it and {FEWEST} samples "
-        f"or more later than {SETTLE:g} s after the first command"
+        f"{record.source}: {have}; expected ft, deflection, position or velocity with motion in it and "
+        f"{FEWEST} samples or more later than {SETTLE:g} s after the first command"
     )
 
 
@@ -142,13 +144,13 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
 
 
 def simulated(
-    cases: Sequence[Case], rig: Rig, offsets: Mapping[str, float], *, ride: bool = False
+    cases: Sequence[Case], rig: Rig, clocks: Clocks, *, ride: bool = False
 ) -> list[dict[str, FloatArray]]:
-    """Return the simulated channels of cases, sensors read `offsets` seconds later than stamped.
+    """Return the simulated channels of cases, sensors read as their clocks have it.
 
     A channel whose zero is unknown comes with the measured mean.
     """
-    drives = [_shifted(c.drive, offsets) for c in cases if isinstance(c.drive, Drive)]
+    drives = [_shifted(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
     simulations = iter(simulate_drives(rig, drives, ride=ride))
     return [
         {"motor_torque": inverse_torque(rig, c.drive)}
@@ -165,10 +167,11 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
     return outputs
 
 
-def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
-    if not any(offsets.values()):
+def _shifted(drive: Drive, clocks: Clocks) -> Drive:
+    if clocks.are_right:
         return drive
-    return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
+    late = {n: clocks.later(n, drive.origin + drive.step * at) for n, at in drive.at.items()}
+    return replace(drive, at={n: at + late[n] / drive.step for n, at in drive.at.items()})
 
 
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
@@ -183,18 +186,32 @@ def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[s
 
 @dataclass(frozen=True)
 class Problem:
-    """Records, the rig, and what may move. channels: what the residual is made of."""
+    """Records, the rig, and what may move. channels: what the residual is made of.
+
+    stated: names of the effects that belong to the nominal rig; a search adds others beside them.
+    """
 
     cases: tuple[Case, ...]
     rig: Rig
     unknowns: tuple[Unknown, ...]
     channels: tuple[str, ...]
     ride: bool = False
+    stated: frozenset[str] = frozenset()
+
+    @property
+    def acting(self) -> tuple[str, ...]:
+        """Return the names of all effects of the rig."""
+        return tuple(e.name for e in self.rig.effects)
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Return the names of the effects that a search has added, in the order in which it did."""
+        return tuple(name for name in self.acting if name not in self.stated)
 
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
-        rig, offsets = apply(self.rig, self.unknowns, theta)
-        return simulated(self.cases, rig, offsets, ride=self.ride)
+        rig, clocks = apply(self.rig, self.unknowns, theta)
+        return simulated(self.cases, rig, clocks, ride=self.ride)
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""
@@ -213,6 +230,18 @@ class Problem:
             for n in self.present(case)
         ]
         return np.concatenate(parts)
+
+    def since_start(self) -> FloatArray:
+        """Return for every residual the time since the start of its record, s, shape (m,)."""
+        return np.concatenate(
+            [
+                case.t[n][case.mask[n]]
+                - case.start
+                + (case.drive.origin if isinstance(case.drive, Drive) else 0.0)
+                for case in self.cases
+                for n in self.present(case)
+            ]
+        )
 
     def present(self, case: Case) -> list[str]:
         """Return the channels of a case that count, in a fixed order."""

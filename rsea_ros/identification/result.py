@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, Fault, FloatArray
@@ -14,7 +15,7 @@ Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_JUDGED = ("ft", "position", "velocity")
+_JUDGED = ("ft", "deflection", "position", "velocity")
 """Channels that judge a model; the motor torque only echoes the command, and judges where no other can."""
 _TOLD = 0.5
 """Share of what is known of a value that the data must have brought for it to be identified."""
@@ -39,6 +40,10 @@ class FrequencyResponse:
     method: str
     noise: FloatArray | None = None
     distortion: FloatArray | None = None
+
+
+CLOCKS = ("clock.", "clock_rate.")
+"""What the names of the sensors' clocks begin with."""
 
 
 @dataclass(frozen=True)
@@ -108,10 +113,23 @@ class Identification:
         return {n: r for n, r in ratios.items() if n in _JUDGED} or ratios
 
     @property
+    def at_noise(self) -> bool:
+        """Return whether every channel that judges is down to its noise."""
+        return all(ratio <= AT_NOISE for ratio in self.times_noise.values())
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Return the sensors that measure nothing: the model was not held against them."""
+        return silent_channels(self.faults)
+
+    @property
     def verdict(self) -> Verdict:
-        """Return whether the model fits, and whether the data tell any of its values."""
-        if any(not ratio <= AT_NOISE for ratio in self.times_noise.values()):
+        """Return whether the model fits what the sensors measured, and whether that tells any value.
+
+        A sensor that measures nothing is a misfit: the model says what it should have measured.
+        """
+        if not self.at_noise or self.silent:
             return "misfit"
-        physical = [p for p in self.parameters if not p.name.startswith("clock.")]
+        physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
         told = any(p.told_by_data >= _TOLD for p in physical)
         return "adequate" if told or not physical else "not_identifiable"

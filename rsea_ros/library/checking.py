@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from rsea_ros.checks.finding import Finding, Findings, Light
 from rsea_ros.library.frames import plain
-from rsea_ros.library.inputs import rig_of
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
 
@@ -46,4 +46,4 @@ def check(data: Record, rig: Rig | str) -> Checks:
     """
     from rsea_ros.checks.check import check_record
 
-    return Checks(check_record(data, rig_of(rig)))
+    return Checks(check_record(data, load_rig(rig)))

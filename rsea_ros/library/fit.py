@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.library.frames import parameter_frame, plain
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
 
@@ -30,6 +31,11 @@ class Fit:
     def rig(self) -> Rig:
         """The rig with the identified values and their intervals."""
         return self.result.rig
+
+    @property
+    def verdict(self) -> str:
+        """`adequate`, `misfit` or `not_identifiable`, as in identification.json."""
+        return self.result.verdict
 
     @property
     def parameters(self) -> dict[str, ParameterEstimate]:
@@ -89,9 +95,10 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     rig: a rig, its file, or the name of one in config/rigs. progress: hears a step's name and the share done.
     Raises IdentificationError for records from which the rig cannot be identified, RigError for the rig.
     """
+    from rsea_ros.checks.carried import held_against
     from rsea_ros.identification.identify import identify as identify_records
-    from rsea_ros.library.inputs import checked, records_of, rig_of
+    from rsea_ros.library.inputs import records_of
 
-    rig = rig_of(rig)
-    records = [checked(record, rig, masks=False) for record in records_of(data)]
+    rig = load_rig(rig)
+    records = [held_against(record, rig, masks=False) for record in records_of(data)]
     return Fit(identify_records(records, rig, progress))

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.library.inputs import rig_of
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel, Record
 
@@ -22,11 +22,11 @@ def simulate(
     command: motor torque at the gear output, N m, shape (n,). rate: Hz. seed: of the sensors' noise; noise:
     False for perfect sensors. Raises ParameterError for commands or a rate that make no sense.
     """
-    values = np.array(command, dtype=np.float64)
-    if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
-        raise ParameterError(
-            f"command: shape {values.shape}, expected (n,) finite torques in N m with n >= 2 samples"
-        )
+    given = np.asarray(command)
+    if given.dtype.kind not in "iuf" or given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all():
+        kind = f"shape {given.shape} of {given.dtype}"
+        raise ParameterError(f"command: {kind}, expected (n,) finite torques in N m with n >= 2 samples")
+    values = given.astype(np.float64)
     if not (math.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"rate = {rate:g} Hz, expected a finite rate > 0")
-    return synthesize(rig_of(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)
+    return synthesize(load_rig(rig), Channel(np.arange(len(values)) / rate, values), seed=seed, noise=noise)

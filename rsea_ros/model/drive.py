@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -14,11 +15,15 @@ from scipy.interpolate import CubicHermiteSpline
 from rsea_ros.compiler import njit
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import check_extent
+from rsea_ros.model.rig import Hold
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import Channel, FloatArray, Record
 
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
+
+LONGEST_OF_JOINTS = 1e-3
+"""s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
 
 ON_GRID = 1e-3
 """Stamps this near to the end of a step, in steps, are meant to be there: half a microsecond."""
@@ -33,12 +38,13 @@ class Drive:
     """The command on the step grid and the instants at which channels are wanted.
 
     step: s. start: record time of the first step, s. command: mean over each step of the held command,
-    N m, shape (steps,). reference: rad, shape (steps,) or empty. angle: measured position at the end of
-    each step, rad, or empty. at: for each channel the sampling instants in steps since `start`.
+    N m, or of the held target of a position loop, rad, shape (steps,). reference: rad, shape (steps,) or
+    empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
+    sampling instants in steps since `start`.
     impulse: what the held command has brought by each of these beside its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
-    `duration` when the drive is a piece of one.
+    `duration` when the drive is a piece of one. jumps: the command is held, not a line between its stamps.
     """
 
     step: float
@@ -52,6 +58,12 @@ class Drive:
     hold: int = 1
     origin: float = 0.0
     whole: float = math.nan
+    jumps: bool = True
+
+    @property
+    def kinks(self) -> FloatArray:
+        """Command by step where velocities have a kink: nowhere for one that does not jump."""
+        return self.command if self.jumps else np.zeros(len(self.command))
 
     @property
     def drift_time(self) -> float:
@@ -70,13 +82,22 @@ def steps_per_sample(period: float, longest: float = LONGEST_STEP) -> int:
 
 
 def drive_from(
-    record: Record, *, refine: int = 1, closed_loop: bool = False, from_rest: bool = False
+    record: Record,
+    *,
+    refine: int = 1,
+    closed_loop: bool = False,
+    from_rest: bool = False,
+    targeted: bool = False,
+    hold: Hold = "zero",
 ) -> Drive:
     """Lay a record's command on the step grid. Raises IdentificationError for a record too short.
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
     the bag's command has beside the measured motor torque, where there is one, is an outside disturbance.
-    from_rest: the bench began at zero, whatever the first samples say.
+    from_rest: the bench began at zero, whatever the first samples say. targeted: the commands are targets
+    of a position loop, rad: it began where the first sample is. hold: what acts between two stamps,
+    the command of the first (zero), a straight line (first), or for an analogue command that was filtered and
+    sampled the curve without a frequency above half the rate (band).
     """
     command = record["command"]
     if len(command) < 10:
@@ -84,8 +105,8 @@ def drive_from(
             f"{record.source}: command has {len(command)} samples, expected at least 10"
         )
     period = _period(command.t)
-    hold = steps_per_sample(period) * refine
-    step = period / hold
+    steps = steps_per_sample(period, LONGEST_OF_JOINTS if targeted else LONGEST_STEP) * refine
+    step = period / steps
     start = float(command.t[0])
     stop = max(record.stop, float(command.t[-1]) + period)
     check_extent(record, start, stop)
@@ -94,19 +115,23 @@ def drive_from(
     if closed_loop:
         made = "motor_torque" if "motor_torque" in record else "command"
         torque = torque - np.interp(command.t, *_ty(record[made]))
-    held = _mean_of_held(knots, torque, count)
+    jumps = hold == "zero"
+    means = {"zero": _mean_of_held, "first": _mean_of_line, "band": partial(_mean_of_curve, steps)}
+    held = means[hold](knots, torque, count)
     at = {n: _in_steps(record[n].t, start, step) for n in OUTPUTS if n in record}
+    beside = {n: _beside_mean(knots, torque, held, a) if jumps else np.zeros(len(a)) for n, a in at.items()}
     ends = np.asarray(start + step * np.arange(1, count + 1), np.float64)
     return Drive(
         step=step,
         start=start,
         command=held,
         at=MappingProxyType(at),
-        impulse=MappingProxyType({n: step * _beside_mean(knots, torque, held, a) for n, a in at.items()}),
+        impulse=MappingProxyType({n: step * b for n, b in beside.items()}),
         reference=np.interp(ends - step, *_ty(record["reference"])) if closed_loop else np.empty(0),
         angle=_angle(record, ends),
-        initial=(0.0, 0.0) if from_rest else _initial(record),
-        hold=hold,
+        initial=(0.0, 0.0) if from_rest else _first(record) if targeted else _initial(record),
+        hold=steps,
+        jumps=jumps,
     )
 
 
@@ -155,6 +180,12 @@ def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
     return channel.t, channel.y
 
 
+def _first(record: Record) -> tuple[float, float]:
+    """Return the first position and velocity, zero where there is none."""
+    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
+    return float(position[0]), float(velocity[0])
+
+
 def _initial(record: Record) -> tuple[float, float]:
     """Return position and velocity at the start: rest, unless the first samples say otherwise.
 
@@ -175,6 +206,26 @@ def _angle(record: Record, ends: FloatArray) -> FloatArray:
         spline = CubicHermiteSpline(t, q, record["velocity"].y)
         return np.asarray(spline(np.clip(ends, t[0], t[-1])))
     return np.interp(ends, t, q)
+
+
+def _mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
+    """Return the mean over each step of the lines between the stamps (in steps), held beyond the last."""
+    at = np.union1d(knots, np.arange(count + 1.0))
+    line = np.interp(at, knots, y)
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(at))])
+    return np.diff(np.interp(np.arange(count + 1.0), at, area))
+
+
+def _mean_of_curve(finer: int, knots: FloatArray, y: FloatArray, count: int) -> FloatArray:
+    """Return the mean over each step of the band-limited curve through samples `finer` steps apart.
+
+    By Simpson's rule, from the Fourier series of the samples and their mirror image: no jump at the ends.
+    """
+    from scipy.signal import resample
+
+    series = resample(np.concatenate([y, y[::-1]]), 4 * finer * len(y))[: 2 * finer * (len(y) - 1) + 1]
+    means = (series[:-2:2] + 4.0 * series[1:-1:2] + series[2::2]) / 6.0
+    return np.concatenate([means, np.full(count, y[-1])])[:count]
 
 
 def _moved(y: FloatArray) -> bool:

@@ -80,7 +80,7 @@ def mechanics(rig: Rig, *, linear_gravity: bool = True) -> Mechanics:
     """Return the equations of motion of a rig.
 
     linear_gravity: count a pendulum's m g l as a stiffness, as small angles allow; the simulation
-    leaves it out here and adds m g l sin(theta) itself.
+    leaves it out here and adds m g l sin(theta + gravity_angle) itself.
     """
     placement = _placement(rig)
     mass, damping, stiffness = (
@@ -146,6 +146,7 @@ def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArr
     for end, name in END_COORDINATES:
         if rig.end_is_free(name):
             gravity = rig[f"{name}.gravity"] if linear_gravity else 0.0
+            gravity *= math.cos(rig[f"{name}.gravity_angle"])
             mass[end, end] = rig[f"{name}.inertia"]
             damping[end, end] = rig[f"{name}.damping"]
             stiffness[end, end] = rig[f"{name}.stiffness"] + gravity

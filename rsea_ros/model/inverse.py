@@ -6,24 +6,27 @@ dynamic model (Gautier, Janot et al.): filter the measured position both ways, d
 torques, filtered alike:
 
     T = J q'' + D q' + K q + m g l sin(q) - (torques of the effects)
+
+What effects make of a command is undone where the torque is only known as commanded; a limit cannot be.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.equations import mechanics, train_ratio
+from rsea_ros.model.equations import mechanics
 from rsea_ros.model.extent import check_extent
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import build
-from rsea_ros.model.step import call_port
+from rsea_ros.model.simulation import Machine, build
+from rsea_ros.model.step import Calls, call_port
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
 CUT_OFF = 20.0
@@ -38,23 +41,32 @@ FEWEST = 64
 _SIGN = 1e-5
 """rad/s. Along a measured motion the sign of the speed needs no smoothing."""
 
-_MOTOR, _GEAR = int(st.Port.MOTOR), int(st.Port.GEAR)
+_UNDOINGS = 4
+"""Rounds that undo what effects make of a command: delays and lags of up to 60 degrees within the band."""
+
+_COMMAND, _MOTOR, _GEAR, _SENSOR = (
+    int(port) for port in (st.Port.COMMAND, st.Port.MOTOR, st.Port.GEAR, st.Port.SENSOR)
+)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m)."""
+    """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
+
+    commanded: the torque is the command, not what was measured of it.
+    """
 
     t: FloatArray
     q: FloatArray
     v: FloatArray
     a: FloatArray
     torque: FloatArray
+    commanded: bool = False
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Tell whether a rig is judged by torque: no spring holds it, so it drifts."""
-    return rig.rigid_spring
+    """Tell whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
+    return rig.rigid_spring and rig.loop is None
 
 
 def motion_from(record: Record) -> Motion:
@@ -79,7 +91,8 @@ def motion_from(record: Record) -> Motion:
     q = smoothed(CubicSpline(position.t, position.y)(t), step)
     v = np.gradient(q, step)
     all_five = (t, q, v, np.gradient(v, step), smoothed(_torque_at(record, t), step))
-    return Motion(*(values[::finer] for values in all_five))
+    t, q, v, a, torque = (values[::finer] for values in all_five)
+    return Motion(t, q, v, a, torque, commanded="motor_torque" not in record)
 
 
 def acted(record: Record) -> Channel:
@@ -116,19 +129,49 @@ def smoothed(values: FloatArray, period: float) -> FloatArray:
 
 def inverse_torque(rig: Rig, motion: Motion) -> FloatArray:
     """Return the motor torque that a motion takes, N m, filtered like the motion, shape of motion.t."""
-    m = mechanics(rig, linear_gravity=False)
+    rig_as_is = structured(rig)
+    m = mechanics(rig_as_is, linear_gravity=False)
     if m.order != 1 or "housing_end" not in rig.clamped:
         raise IdentificationError(
             f"rig {rig.name}: {m.order} moving parts, expected one on a clamped housing for the inverse model"
         )
     period = float(motion.t[1] - motion.t[0])
     machine = build(rig, period, float(motion.t[-1] - motion.t[0]))
-    torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q
-    torque = torque + rig["spring_end.gravity"] * np.sin(motion.q)
-    gains = motor_gain(machine.calls, machine.table, machine.own)
-    added = _effect_torques(machine.calls, machine.table, machine.own, motion.q, motion.v, train_ratio(rig))
-    result: FloatArray = (torque - smoothed(added, period)) / gains
-    return result
+    motion = _as_moved(machine, motion, period)
+    gravity = rig_as_is["spring_end.gravity"] * np.sin(motion.q + rig_as_is["spring_end.gravity_angle"])
+    torque = m.mass[0, 0] * motion.a + m.damping[0, 0] * motion.v + m.stiffness[0, 0] * motion.q + gravity
+    load = gravity + sum(
+        rig_as_is[f"spring_end.{name}"] * values
+        for name, values in (("inertia", motion.a), ("damping", motion.v), ("stiffness", motion.q))
+    )
+    added = _effect_torques(*_parts(machine), motion.q, motion.v, motion.torque, load)
+    needed = (torque - smoothed(added, period)) / motor_gains(*_parts(machine), len(motion.t))
+    return _undone(machine, motion, needed, period) if motion.commanded else needed
+
+
+def _parts(machine: Machine) -> tuple[Calls, FloatArray, FloatArray]:
+    """Return calls, table and states for a walk along a motion, nothing remembered."""
+    machine.own[:] = 0.0
+    return machine.calls, machine.table, machine.own
+
+
+def _as_moved(machine: Machine, motion: Motion, period: float) -> Motion:
+    """Return a motion without what effects of the encoder added to it."""
+    if machine.calls.first[_SENSOR] == machine.calls.first[_SENSOR + 1]:
+        return motion
+    error = smoothed(_sensor_errors(*_parts(machine), motion.q), period)
+    v = np.gradient(error, period)
+    return replace(motion, q=motion.q - error, v=motion.v - v, a=motion.a - np.gradient(v, period))
+
+
+def _undone(machine: Machine, motion: Motion, torque: FloatArray, period: float) -> FloatArray:
+    """Return the command of which its effects make a torque: x + (torque - effects of x), again and again."""
+    if machine.calls.first[_COMMAND] == machine.calls.first[_COMMAND + 1]:
+        return torque
+    command = torque
+    for _ in range(_UNDOINGS):
+        command = command + torque - _made_of(*_parts(machine), command, motion.v)
+    return smoothed(command, period)
 
 
 def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
@@ -137,22 +180,49 @@ def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
 
 
 @njit(cache=True, error_model="numpy")
-def motor_gain(calls, s, own):  # type: ignore[no-untyped-def]
-    """Return what the effects at the motor make of a torque of 1 N m."""
-    s[st.COMMAND] = 1.0
-    call_port(_MOTOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
-    return s[st.COMMAND]
+def motor_gains(calls, s, own, count):  # type: ignore[no-untyped-def]
+    """Return what the effects at the motor make of a torque of 1 N m, at each sample."""
+    gains = np.empty(count)
+    for k in range(count):
+        s[st.TIME], s[st.COMMAND] = k * s[st.STEP], 1.0
+        call_port(_MOTOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        gains[k] = s[st.COMMAND]
+    return gains
 
 
 @njit(cache=True, error_model="numpy")
-def _effect_torques(calls, s, own, q, v, ratio):  # type: ignore[no-untyped-def]
+def _made_of(calls, s, own, command, v):  # type: ignore[no-untyped-def]
+    """Return what the effects at the command make of one, N m, along a motion."""
+    made = np.empty(len(command))
+    for k in range(len(command)):
+        s[st.TIME], s[st.OUTPUT_VELOCITY] = k * s[st.STEP], v[k]
+        s[st.COMMAND] = s[st.CURRENT] = command[k]
+        call_port(_COMMAND, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        made[k] = s[st.COMMAND]
+    return made
+
+
+@njit(cache=True, error_model="numpy")
+def _sensor_errors(calls, s, own, q):  # type: ignore[no-untyped-def]
+    """Return what the effects at the sensors add to the encoder's angle, rad, along a motion."""
+    errors = np.empty(len(q))
+    for k in range(len(q)):
+        s[st.TIME] = k * s[st.STEP]
+        s[st.POSITION] = s[st.OUTPUT_ANGLE] = q[k]
+        call_port(_SENSOR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
+        errors[k] = s[st.POSITION] - q[k]
+    return errors
+
+
+@njit(cache=True, error_model="numpy")
+def _effect_torques(calls, s, own, q, v, torque, load):  # type: ignore[no-untyped-def]
     """Return what the effects add at the gear along a motion, N m."""
     added = np.empty(len(q))
     s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
     s[st.CREEP] = _SIGN
     for k in range(len(q)):
-        s[st.TIME] = k * s[st.STEP]
-        s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], ratio * q[k]
+        s[st.TIME], s[st.COMMAND], s[st.LOAD] = k * s[st.STEP], torque[k], load[k]
+        s[st.GEAR_ANGLE], s[st.GEAR_VELOCITY], s[st.ROTOR_ANGLE] = q[k], v[k], s[st.TURNS] * q[k]
         s[st.GEAR_TORQUE] = 0.0
         call_port(_GEAR, calls, s.ctypes.data, calls.p.ctypes.data, own.ctypes.data)
         added[k] = s[st.GEAR_TORQUE]

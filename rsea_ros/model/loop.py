@@ -1,16 +1,62 @@
-"""The position loop that ran while a record was made, at the command port.
+"""The position loop that ran while a record was made, at the command port. Each sample of the firmware:
 
-command += k_v (k_p (reference - q) - dq/dt), limited
+    pd        u = k_p e + k_i int e dt - k_d q' + k_f r',   e = r - q; r follows its target within a speed
+    cascade   v_r = k_pos e within a limit,   u = k_v (v_r - q') + k_vi int (v_r - q') dt
+
+The firmware takes the mean of the target since its last sample: when in it a new target comes nobody knows,
+and one that counted only at a sample would make every residual a staircase in the delay.
+u is limited, held until the next sample, and adds to what is commanded from outside. An integral stands still
+while u is at its limit and the error would drive it further (conditional integration; Astrom, Hagglund,
+Advanced PID Control, 2006, section 3.5).
 """
 
+import math
+
 from rsea_ros.effects.effect import compiled
-from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_ANGLE, OUTPUT_VELOCITY, REFERENCE
+from rsea_ros.effects.signal_table import (
+    COMMAND,
+    CURRENT,
+    OUTPUT_ANGLE,
+    OUTPUT_VELOCITY,
+    REFERENCE,
+    STEP,
+    TIME,
+)
+
+PD, CASCADE = 0.0, 1.0
+STATES = 8
+_KIND, _POSITION, _INTEGRAL, _VELOCITY, _FORWARD, _TORQUE_LIMIT, _VELOCITY_LIMIT, _SAMPLE = range(8)
+_SUM, _HELD, _DUE, _TARGET, _ASKED, _STARTED, _TOTAL, _COUNT = range(STATES)
 
 
 @compiled
 def control(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the loop's command to the outside one. p: k_p (1/s), k_v (N m s/rad), limit (N m)."""
-    u = p[1] * (p[0] * (s[REFERENCE] - s[OUTPUT_ANGLE]) - s[OUTPUT_VELOCITY])
-    u = min(max(u, -p[2]), p[2])
-    s[COMMAND] += u
-    s[CURRENT] += u
+    """Add the loop's torque. p: kind, three gains, feed-forward, limits of torque and speed, sample time."""
+    h, r = s[STEP], s[REFERENCE]
+    x[_TOTAL] += r
+    x[_COUNT] += 1.0
+    if x[_STARTED] == 0.0:
+        x[_TARGET] = x[_ASKED] = r
+        x[_DUE], x[_STARTED] = s[TIME], 1.0
+    if s[TIME] + 0.5 * h > x[_DUE]:
+        dt = max(p[_SAMPLE], h)
+        x[_DUE] += dt
+        r = x[_TOTAL] / x[_COUNT]
+        x[_TOTAL] = x[_COUNT] = 0.0
+        forward = p[_FORWARD] * (r - x[_ASKED]) / dt
+        x[_ASKED] = r
+        if p[_KIND] == PD:
+            most = p[_VELOCITY_LIMIT] * dt
+            x[_TARGET] += min(max(r - x[_TARGET], -most), most)
+            error = x[_TARGET] - s[OUTPUT_ANGLE]
+            u = p[_POSITION] * error - p[_VELOCITY] * s[OUTPUT_VELOCITY] + forward
+        else:
+            speed = p[_POSITION] * (r - s[OUTPUT_ANGLE])
+            error = min(max(speed, -p[_VELOCITY_LIMIT]), p[_VELOCITY_LIMIT]) - s[OUTPUT_VELOCITY]
+            u = p[_VELOCITY] * error
+        u += p[_INTEGRAL] * x[_SUM]
+        x[_HELD] = min(max(u, -p[_TORQUE_LIMIT]), p[_TORQUE_LIMIT])
+        if u == x[_HELD] or math.copysign(1.0, error) != math.copysign(1.0, u):
+            x[_SUM] += error * dt
+    s[COMMAND] += x[_HELD]
+    s[CURRENT] += x[_HELD]

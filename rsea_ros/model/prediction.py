@@ -12,9 +12,11 @@ import numpy.typing as npt
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.extent import bounded, check_command
 from rsea_ros.model.inverse import inverse_torque, is_inverse, motion_from
+from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
+from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
 SETTLE = 0.3
@@ -53,7 +55,7 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
     A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
     whose zero is unknown by its changes. Raises IdentificationError for a record with nothing to compare.
     """
-    record = bounded(record)
+    record = bounded(commanded(record, rig))
     check_command(record)
     record = replace(record, channels={n: c for n, c in record.channels.items() if len(c)})
     if is_inverse(rig):
@@ -70,7 +72,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
 def _why(record: Record) -> str:
     """Return which channels the reading left out, and why."""
     reasons = "; ".join(f"{f.channel}: {f.detail}" for f in record.faults if f.share == 1.0 and f.detail)
-    return f" ({reasons}), expected one channel" if reasons else ", expected one channel"
+    expected = f"expected one channel of {', '.join(OUTPUTS)}: record it, or name its topic with --topic"
+    return f" ({reasons}), {expected}" if reasons else f", {expected}"
 
 
 def _on_measured_zero(c: Comparison) -> Comparison:

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from rsea_ros.effects import signal_table as st
 from rsea_ros.model.equations import Mechanics, mechanics, train_ratio
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.step import Linear
 from rsea_ros.signals import FloatArray
 
@@ -22,6 +22,10 @@ _DIFFERENCES = {
     st.HOUSING_ANGLE: (0.0, 0.0, 0.0, 0.0, 1.0),
     st.DISTAL_ANGLE: (0.0, 0.0, 0.0, 1.0, 0.0),
 }
+
+
+_LOAD_ANGLE = (-1.0, 0.0, 0.0, 1.0, 0.0)
+"""The spring end against the housing."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,14 @@ def read_row(rig: Rig, m: Mechanics, signal: int) -> FloatArray:
     return row
 
 
+def encoder_row(rig: Rig, m: Mechanics, *, is_rate: bool = False) -> FloatArray:
+    """Return the row that reads what the encoder sees from x: an angle, or its rate."""
+    difference = np.array(_LOAD_ANGLE if rig.encoder_end == "spring_end" else _DIFFERENCES[st.OUTPUT_ANGLE])
+    row = np.zeros(2 * m.order)
+    row[m.order * is_rate : m.order * (is_rate + 1)] = difference @ m.placement
+    return row
+
+
 def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
     """Return the propagators of a step of h seconds, by one matrix exponential.
 
@@ -82,7 +94,7 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
         matrix=np.ascontiguousarray(matrix),
         spans=np.array([read_row(rig, system.mechanics, s) for s in (st.GEAR_VELOCITY, st.DEFLECTION)]),
         outputs=_outputs(rig, system.mechanics),
-        gravity=np.array([rig["housing_end.gravity"], rig["spring_end.gravity"]]),
+        gravity=np.array([rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES]),
         reads_load=reads_load,
     )
 
@@ -93,7 +105,7 @@ def start_map(rig: Rig) -> FloatArray:
     So an encoder that starts away from zero turns what is free to turn and leaves the spring alone.
     """
     m = mechanics(rig)
-    row = np.array(_DIFFERENCES[st.OUTPUT_ANGLE]) @ m.placement
+    row = encoder_row(rig, m)[: m.order]
     start = np.zeros((2 * m.order, 2))
     if row.any():
         stiff = m.stiffness + 1e-9 * np.trace(m.stiffness + m.mass) * np.eye(m.order)
@@ -104,14 +116,29 @@ def start_map(rig: Rig) -> FloatArray:
 
 
 def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
-    """Return the rows of position, velocity and the linear torque at the F/T sensor."""
-    position, velocity = (read_row(rig, m, s) for s in (st.OUTPUT_ANGLE, st.OUTPUT_VELOCITY))
-    if rig.ft_end == "housing_end":
-        return np.array([position, velocity, _proximal_torque(rig, m)])
-    if rig.rigid_spring:
-        return np.array([position, velocity, np.zeros(2 * m.order)])
+    """Return the rows of position, velocity, the linear torque at the F/T sensor, and deflection."""
+    position, velocity = encoder_row(rig, m), encoder_row(rig, m, is_rate=True)
     deflection, rate = (read_row(rig, m, s) for s in (st.DEFLECTION, st.DEFLECTION_RATE))
-    return np.array([position, velocity, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate])
+    if rig.ft_end == "housing_end":
+        torque = _proximal_torque(rig, m)
+    elif rig.rigid_spring:
+        torque = np.zeros(2 * m.order)
+    else:
+        torque = _below(rig, m, rig["spring.stiffness"] * deflection + rig["spring.damping"] * rate)
+    return np.array([position, velocity, torque, deflection])
+
+
+def _below(rig: Rig, m: Mechanics, spring: FloatArray) -> FloatArray:
+    """Return the row of T_s less the torque that the load above the sensor takes: part of its J q''.
+
+    J q'' is T_s less what holds the load to ground.
+    """
+    share = rig["spring_end.above_sensor"]
+    if share == 0.0:
+        return spring
+    angle, rate = (read_row(rig, m, s) for s in (st.DISTAL_ANGLE, st.DISTAL_VELOCITY))
+    held = rig["spring_end.stiffness"] * angle + rig["spring_end.damping"] * rate
+    return np.asarray((1.0 - share) * spring + share * held)
 
 
 def _proximal_torque(rig: Rig, m: Mechanics) -> FloatArray:

@@ -18,7 +18,6 @@ from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import ErrorModel, Estimate
-from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_filter import (
     CORNER,
     FELL,
@@ -38,6 +37,7 @@ from rsea_ros.model.pure_torque_filter import (
 )
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.structure import structured
 
 Verdict = Literal["no torque", "pure", "beyond"]
 VERDICTS: tuple[Verdict, ...] = ("no torque", "pure", "beyond")

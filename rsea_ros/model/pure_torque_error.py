@@ -25,7 +25,6 @@ from numpy.polynomial import polynomial
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_over_end
 from rsea_ros.model.observer import Estimate
-from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.pure_torque_window import (
     BEYOND,
     HEARD,
@@ -43,6 +42,7 @@ from rsea_ros.model.pure_torque_window import (
     judge_error,
 )
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.structure import structured
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.signals import FloatArray
 

@@ -10,14 +10,20 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Literal
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.signals import FloatArray
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
+CLOCK_DOUBT = 1e-4
+"""s, one sigma. How far the stamps of a sensor may lie from its instants where the rig does not say."""
 END_NAMES = ("housing_end", "spring_end")
+Hold = Literal["zero", "first", "band"]
+HOLDS: tuple[Hold, ...] = ("zero", "first", "band")
 
 
 @dataclass(frozen=True)
@@ -35,7 +41,29 @@ _END_FIELDS = {
     "damping": Field("N m s/rad", default=0.0),
     "stiffness": Field("N m/rad", default=0.0),
     "gravity": Field("N m", default=0.0),
+    "gravity_angle": Field("rad", low=-math.inf, default=0.0),
 }
+
+LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
+    "pd": {
+        "k_p": Field("N m/rad"),
+        "k_i": Field("N m/rad/s", default=0.0),
+        "k_d": Field("N m s/rad", default=0.0),
+        "k_f": Field("N m s/rad", default=0.0),
+    },
+    "cascade": {
+        "k_pos": Field("1/s"),
+        "k_v": Field("N m s/rad"),
+        "k_vi": Field("N m/rad", default=0.0),
+    },
+}
+"""Gains of the kinds of position loop (model/loop.py)."""
+_LIMIT_FIELDS = {
+    "torque_limit": Field("N m", low_allowed=False, default=math.inf),
+    "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
+    "sample_time": Field("s", default=0.0),
+}
+LOOP_LIMITS = tuple(_LIMIT_FIELDS)
 
 FIELDS: Mapping[str, Field] = MappingProxyType(
     {
@@ -50,6 +78,9 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
         "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
         "proximal_spring.damping": Field("N m s/rad", default=0.0),
         **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
+        **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
+        **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
+        "spring_end.above_sensor": Field("1", default=0.0),
     }
 )
 
@@ -69,13 +100,17 @@ class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
 
     zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
-    so only changes of its values tell something. clock: s, how much later than its stamps it reads.
+    so only changes of its values tell something. clock: s, how much later than its stamps it reads at the
+    start of a record; clock_rate: ppm, by how much more with time. clock_doubt: s, one sigma of `clock`: a
+    fit looks for the rest.
     """
 
     noise: float = 0.0
     quantum: float = 0.0
     zero_unknown: bool = False
     clock: float = 0.0
+    clock_doubt: float = CLOCK_DOUBT
+    clock_rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -105,22 +140,32 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
+    linear: it moves along a line: m, N and kg stand for rad, N m and kg m^2.
     other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
     may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
+    encoder_end: what the encoder reads against the housing: the gear output, or the spring end behind play
+    and spring. loop: kind of the position loop whose targets command the bench, a key of LOOP_FIELDS, its
+    gains among the quantities. controller: a loop that added its torque to the record's command. hold: what
+    acts between two commands: the first of them, a line to the other, or the curve without a frequency above
+    half the rate, as where an analogue command was sampled behind a filter.
     """
 
     name: str
     quantities: Mapping[str, Quantity]
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
+    linear: bool = False
     train: Train = "planetary"
     other_trains: tuple[Train, ...] = ()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     known: frozenset[str] = frozenset()
     proximal: str = "housing_end"
     ft_end: str = "spring_end"
+    encoder_end: str = "gear_output"
+    loop: str | None = None
     controller: Controller | None = None
+    hold: Hold = "zero"
     effects: tuple[EffectSetting, ...] = ()
     about: str = ""
     source: str = ""
@@ -177,13 +222,22 @@ class Rig:
         """Return the unit of a value."""
         return unit_of(name)
 
+    def measures(self, channel: str) -> bool:
+        """Tell whether a bench of this rig can have a channel: without a spring nothing shows its torque."""
+        return not (self.rigid_spring and channel in ("ft", "deflection"))
+
     def zero_unknown(self, channel: str) -> bool:
         """Tell whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
-    def clock(self, channel: str) -> float:
-        """Return how much later than its stamps a channel is read, s."""
-        return self.sensors[channel].clock if channel in self.sensors else 0.0
+    def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
+        """Return how much later than its stamps a channel is read, s; since: of the record's start, s."""
+        sensor = self.sensors.get(channel, Sensor())
+        return sensor.clock + 1e-6 * sensor.clock_rate * since
+
+    def clock_doubt(self, channel: str) -> float:
+        """Return one sigma of what a channel's clock may be off beside `clock`, s."""
+        return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
 
     def end_is_free(self, end: str) -> bool:
         """Tell whether an end can move (it has an inertia of its own)."""
@@ -236,11 +290,45 @@ def _check_structure(rig: Rig) -> None:
             f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
         )
     if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
+        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
         raise RigError(
-            f"rig {rig.name}: spring.stiffness is missing, expected a value in N m/rad or `rigid: true`"
+            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
+            "spring.stiffness",
         )
     for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
         rig[name]
+    _check_loop(rig)
     for end in END_NAMES:
         if rig.end_is_free(end):
             rig[f"{end}.inertia"]
+
+
+def _check_loop(rig: Rig) -> None:
+    if rig.encoder_end not in ("gear_output", "spring_end"):
+        raise RigError(
+            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
+            "encoder_end",
+        )
+    stated = [n.split(".")[1] for n in rig.quantities if n.startswith("controller.")]
+    if rig.loop is None:
+        if stated:
+            raise RigError(
+                f"rig {rig.name}: controller.{stated[0]} without controller.kind, expected one of "
+                f"{', '.join(LOOP_FIELDS)}",
+                "controller",
+            )
+        return
+    if rig.loop not in LOOP_FIELDS:
+        raise RigError(
+            f"rig {rig.name}: controller.kind = {rig.loop!r}, expected one of {', '.join(LOOP_FIELDS)}",
+            "controller.kind",
+        )
+    allowed = (*LOOP_FIELDS[rig.loop], *LOOP_LIMITS)
+    for name in stated:
+        if name not in allowed:
+            raise RigError(
+                f"rig {rig.name}: controller.{name} in a {rig.loop} loop, expected {', '.join(allowed)}",
+                f"controller.{name}",
+            )
+    for name in LOOP_FIELDS[rig.loop]:
+        rig[f"controller.{name}"]

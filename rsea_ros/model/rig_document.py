@@ -15,22 +15,39 @@ from rsea_ros.errors import FieldError, RigError
 from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
 from rsea_ros.model.rig import (
+    CLOCK_DOUBT,
     END_NAMES,
     FIELDS,
+    HOLDS,
+    LOOP_FIELDS,
+    LOOP_LIMITS,
     Controller,
     EffectSetting,
     Field,
+    Hold,
     Quantity,
     Rig,
     Sensor,
     check_value,
 )
-from rsea_ros.model.rig_keys import CLOCK, CONTROLLER, EFFECT, GROUPS, QUANTITY, SENSOR, SWITCHES, TOP
+from rsea_ros.model.rig_keys import (
+    CLOCK,
+    CLOCK_RATE,
+    CONTROLLER,
+    EFFECT,
+    GROUPS,
+    QUANTITY,
+    SENSOR,
+    SWITCHES,
+    TOP,
+)
 from rsea_ros.signals import UNITS
 from rsea_ros.wording import shown
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
+_FASTEST = 1000.0
+"""ppm. A clock that runs faster than this counts in other units."""
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -45,6 +62,8 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
     only_keys(document, names(TOP), "rig")
     groups = {g: mapping(document.get(g, {}), g) for g in GROUPS}
     quantities = {name: q for g, body in groups.items() for name, q in _quantities(g, body)}
+    loop, gains = _loop(document.get("controller"))
+    quantities |= gains
     clamped = frozenset(end for end in END_NAMES if switch(groups[end], f"{end}.clamped"))
     effects = _effects(document.get("effects", []))
     return Rig(
@@ -54,6 +73,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         quantities=quantities,
         clamped=clamped,
         rigid_spring=switch(groups["spring"], "spring.rigid"),
+        linear=switch(document, "linear"),
         train=groups["gear"].get("train", "planetary"),
         other_trains=_other_trains(groups["gear"].get("or", [])),
         sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
@@ -63,7 +83,10 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         ),
         proximal=text(document.get("proximal", "housing_end"), "proximal"),
         ft_end=text(document.get("ft_end", "spring_end"), "ft_end"),
-        controller=_controller(document.get("controller")),
+        encoder_end=text(document.get("encoder_end", "gear_output"), "encoder_end"),
+        loop=loop,
+        controller=None if loop else _controller(document.get("controller")),
+        hold=_hold(document.get("hold", "zero")),
         effects=effects,
     )
 
@@ -76,8 +99,16 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
+    if rig.linear:
+        document["linear"] = True
     if rig.ft_end != "spring_end":
         document["ft_end"] = rig.ft_end
+    if rig.encoder_end != "gear_output":
+        document["encoder_end"] = rig.encoder_end
+    if rig.loop:
+        document["controller"] = {"kind": rig.loop}
+    if rig.hold != "zero":
+        document["hold"] = rig.hold
     for name, quantity in rig.quantities.items():
         group, key = name.split(".")
         document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
@@ -105,7 +136,11 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
 def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
     body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
     body |= {"zero_unknown": True} if sensor.zero_unknown else {}
-    return body | ({"clock": {"value": sensor.clock, "unit": "s"}} if sensor.clock else {})
+    if sensor.clock or sensor.clock_doubt != CLOCK_DOUBT:
+        body["clock"] = {"value": sensor.clock, "unit": "s"}
+    if sensor.clock_doubt != CLOCK_DOUBT:
+        body["clock"]["doubt"] = sensor.clock_doubt
+    return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -153,8 +188,8 @@ def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
     return low, high
 
 
-def _clock(fields: Mapping[str, Any], name: str) -> float:
-    """Return s from `clock: {value: …, unit: s}`; 0 where there is none."""
+def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
+    """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
     only_keys(item, names(CLOCK), field)
@@ -162,6 +197,21 @@ def _clock(fields: Mapping[str, Any], name: str) -> float:
     value = number(item.get("value"), f"{field}.value", "s")
     if not abs(value) < _LATEST:
         raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
+    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    if not 0.0 < doubt < _LATEST:
+        raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
+    return value, doubt
+
+
+def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
+    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
+    field = f"sensors.{name}.clock_rate"
+    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
+    only_keys(item, names(CLOCK_RATE), field)
+    unit(item.get("unit"), f"{field}.unit", "ppm")
+    value = number(item.get("value"), f"{field}.value", "ppm")
+    if not abs(value) < _FASTEST:
+        raise RigError(f"{field}.value = {value:g} ppm, expected less than {_FASTEST:g} either way", field)
     return value
 
 
@@ -181,7 +231,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, clock)
+        sensors[name] = Sensor(noise, quantum, floating, *clock, _clock_rate(fields, name))
     return sensors
 
 
@@ -201,6 +251,27 @@ def _known(items: Any, stated: Collection[str]) -> frozenset[str]:
                 f"known[{i}]",
             )
     return frozenset(items)
+
+
+def _loop(item: Any) -> tuple[str | None, dict[str, Quantity]]:
+    """Return the kind of a position loop whose targets command the bench, and its gains and limits."""
+    if not isinstance(item, Mapping) or "kind" not in item:
+        return None, {}
+    kind = text(item["kind"], "controller.kind")
+    if kind not in LOOP_FIELDS:
+        raise RigError(
+            f"controller.kind = {shown(kind)}, expected one of {', '.join(LOOP_FIELDS)}", "controller.kind"
+        )
+    only_keys(item, {"kind", *LOOP_FIELDS[kind], *LOOP_LIMITS}, "controller")
+    names_of = (key for key in item if key != "kind")
+    return kind, {f"controller.{key}": _quantity(f"controller.{key}", item[key]) for key in names_of}
+
+
+def _hold(item: Any) -> Hold:
+    for hold in HOLDS:
+        if item == hold:
+            return hold
+    raise RigError(f"hold = {shown(item)}, expected {', '.join(HOLDS)}", "hold")
 
 
 def _controller(item: Any) -> Controller | None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,18 +15,32 @@ from rsea_ros.errors import FieldError, OutputError, RigError
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document, rig_to_document
 from rsea_ros.new_files import write_text
+from rsea_ros.wording import did_you_mean, shown
 
 
 def rig_path(name_or_path: str | Path) -> Path:
-    """Return the file of a rig given by path or by the bare name of a file in config/rigs."""
+    """Return the file of a rig given by path or by the bare name of a file in config/rigs.
+
+    Raises RigError for a name that no rig has, and for what is no name of a file.
+    """
+    if not isinstance(name_or_path, (str, os.PathLike)) or "\0" in str(name_or_path):
+        raise RigError(f"rig {shown(name_or_path)}: expected the name of a rig, or of a YAML file")
     path = Path(name_or_path)
     if path.suffix in (".yaml", ".yml") or path.is_file():
         return path
     for folder in rig_folders():
         if (folder / f"{name_or_path}.yaml").exists():
             return folder / f"{name_or_path}.yaml"
-    known = sorted({p.stem for folder in rig_folders() for p in folder.glob("*.yaml")})
-    raise RigError(f"rig {str(name_or_path)!r} not found, expected a YAML file or one of {', '.join(known)}")
+    known = rig_names()
+    near = did_you_mean(str(name_or_path), known)
+    raise RigError(
+        f"rig {str(name_or_path)!r} not found, expected a YAML file or one of {', '.join(known)}{near}"
+    )
+
+
+def rig_names() -> list[str]:
+    """Return the names of the rigs that come with the package."""
+    return sorted({p.stem for folder in rig_folders() for p in folder.glob("*.yaml")})
 
 
 def rig_folders() -> list[Path]:
@@ -39,8 +54,13 @@ def rig_folders() -> list[Path]:
     return [folder for folder in candidates if folder.is_dir()]
 
 
-def load_rig(name_or_path: str | Path) -> Rig:
-    """Read a rig. Raises RigError naming file, field, value and what was expected."""
+def load_rig(name_or_path: str | Path | Rig) -> Rig:
+    """Read a rig; one that is a Rig already is returned as it is.
+
+    Raises RigError naming file, field, value and what was expected.
+    """
+    if isinstance(name_or_path, Rig):
+        return name_or_path
     path = rig_path(name_or_path)
     try:
         document = strict_yaml.read(path)
@@ -51,7 +71,7 @@ def load_rig(name_or_path: str | Path) -> Rig:
     except FieldError as error:
         raise RigError(f"{path}: {error}") from None
     if not isinstance(document.content, Mapping):
-        held = type(document.content).__name__
+        held = "nothing" if document.content is None else type(document.content).__name__
         raise RigError(f"{path}: holds {held}, expected a mapping with the keys of a rig")
     try:
         return rig_from_document(document.content, default_name=path.stem)

@@ -6,16 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.keys import NEEDED, Key, table
-from rsea_ros.model.rig import END_NAMES, FIELDS, Field
+from rsea_ros.model.rig import CLOCK_DOUBT, END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field
 from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
 
-_END = (
-    "inertia of its load",
-    "its viscous damping",
-    "its stiffness to ground",
-    "m g l of a pendulum: its largest torque",
-)
+_END = {
+    "inertia": "inertia of its load",
+    "damping": "its viscous damping",
+    "stiffness": "its stiffness to ground",
+    "gravity": "m g l of a pendulum: its largest torque",
+    "gravity_angle": "how far from hanging the pendulum is at angle zero",
+}
 _MEANINGS = {
     "rotor.reflected_inertia": "rotor inertia, seen at the gear output",
     "rotor.reflected_damping": "viscous damping of motor and gear, seen there",
@@ -30,11 +31,12 @@ _MEANINGS = {
     **{
         f"{end}.{key}": meaning
         for end in END_NAMES
-        for key, meaning in zip(("inertia", "damping", "stiffness", "gravity"), _END, strict=True)
+        for key, meaning in _END.items()
     },
+    "spring_end.above_sensor": "share of its inertia between spring and F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
-GROUPS = sorted({name.split(".")[0] for name in FIELDS})
+GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
     "gear": (
         Key("train", _TRAINS, "planetary", "kind of gear train, and what of it is held"),
@@ -48,10 +50,18 @@ TOP = (
     Key("about", "text", "empty", "what the bench is"),
     Key("source", "text", "empty", "where its values come from"),
     Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "which end the paper calls proximal"),
+    Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "what the encoder reads"),
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "where the F/T sensor sits"),
+    Key("linear", "true or false", "false", "it moves along a line: m, N, kg stand for rad, N m, kg m^2"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
-    Key("controller", "mapping", "none", "position loop that ran during the record"),
+    Key("controller", "mapping", "none", "position loop that ran during the record, see below"),
+    Key(
+        "hold",
+        "`zero`, `first` or `band`",
+        "`zero`",
+        "between commands: the last, a line, a band-limited curve",
+    ),
     Key("effects", "list", "none", "effects of the catalogue that act"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )
@@ -69,8 +79,27 @@ SENSOR = (
     Key("source", "text", "empty", "where the values come from"),
     Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
+    Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "by how much later still with time"),
 )
-CLOCK = (Key("value", "number", NEEDED), Key("unit", "s", NEEDED))
+CLOCK = (
+    Key("value", "number", NEEDED),
+    Key("unit", "s", NEEDED),
+    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma: a fit looks for the rest"),
+)
+CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
+LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "its targets command the bench")
+_LOOP_MEANINGS = {
+    "k_p": "torque for an error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",
+    "k_i": "for its integral",
+    "k_d": "against the speed",
+    "k_f": "for the speed of the target",
+    "k_pos": "speed asked for an error: u = k_v e_v + k_vi int e_v dt, e_v = k_pos e - dq/dt",
+    "k_v": "torque for an error of the speed",
+    "k_vi": "for its integral",
+    "torque_limit": "largest torque",
+    "velocity_limit": "largest speed of the target (pd), or that is asked (cascade)",
+    "sample_time": "period of the firmware; 0: continuous",
+}
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N m s/rad, >= 0", NEEDED),
@@ -92,15 +121,29 @@ def tables() -> str:
         parts.append(table(group, [*(_key(name, field) for name, field in fields), *SWITCHES.get(group, ())]))
     parts.append(table("sensors.CHANNEL", SENSOR))
     parts.append("Channels and their units: " + ", ".join(f"`{n}` {u}" for n, u in UNITS.items()) + ".\n")
+    parts += [table("sensors.CHANNEL.clock", CLOCK)]
+    parts += [_loop_table(kind) for kind in LOOP_FIELDS]
     parts += [table("controller", CONTROLLER), table("effects[i]", EFFECT), table("GROUP.FIELD", QUANTITY)]
     return "\n".join(parts)
 
 
+def _loop_table(kind: str) -> str:
+    """Return the table of a position loop whose targets command the bench."""
+    keys = [(key, FIELDS[f"controller.{key}"]) for key in (*LOOP_FIELDS[kind], *LOOP_LIMITS)]
+    rows = [Key(key, *_expected(field), _LOOP_MEANINGS[key]) for key, field in keys]
+    return table(f"controller, kind: {kind}", [LOOP_KIND, *rows])
+
+
 def _key(name: str, field: Field) -> Key:
-    bound = f"{'>=' if field.low_allowed else '>'} {field.low:g}"
-    default = (
-        NEEDED if field.default is None else "infinite" if math.isinf(field.default) else f"{field.default:g}"
-    )
+    expects, default = _expected(field)
     if name.endswith("_end.inertia"):
         default = "needed unless clamped"
-    return Key(name.split(".")[1], f"{field.unit}, {bound}", default, _MEANINGS[name])
+    return Key(name.split(".")[1], expects, default, _MEANINGS[name])
+
+
+def _expected(field: Field) -> tuple[str, str]:
+    """Return what a value must be, and what it is where it is not stated."""
+    bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
+    if field.default is None:
+        return f"{field.unit}{bound}", NEEDED
+    return f"{field.unit}{bound}", "infinite" if math.isinf(field.default) else f"{field.default:g}"

@@ -17,14 +17,19 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RigError
 from rsea_ros.model.drive import Drive, drive_from, steps_per_sample
+from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.extent import LARGEST, SMALLEST
-from rsea_ros.model.loop import control
+from rsea_ros.model.loop import STATES, control
+from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
+_AFTER_DELAY = 1
+"""Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
 _SENSORS = 1
 """Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
 
@@ -47,17 +52,28 @@ class Machine:
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
         self.table[[st.POSITION, st.OUTPUT_ANGLE]], self.table[[st.VELOCITY, st.OUTPUT_VELOCITY]] = initial
         self.table[st.FT] = self.linear.outputs[2] @ self.x
+        self.table[st.PLAY], self.table[st.SPRING_ANGLE] = 0.0, self.linear.outputs[3] @ self.x
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
     """Return what a noise-free bench would have measured: each channel of the record at its own stamps.
 
-    The record's `command` drives it, held at its stamps; with `rig.controller` and a `reference` channel
-    the loop is closed in the simulation. refine divides the fixed step.
+    The record's `command` drives it, held at its stamps; with `rig.controller` and a `reference` channel, or
+    with a rig that positions command, the loop is closed in the simulation. refine divides the fixed step.
     """
-    in_loop = rig.controller is not None and "reference" in record
-    from_rest = rig.zero_unknown("position")
-    return simulate_drive(rig, drive_from(record, refine=refine, closed_loop=in_loop, from_rest=from_rest))
+    return simulate_drive(rig, drive_of(record, rig, refine=refine))
+
+
+def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
+    """Return what drives a rig in a record. Raises ChannelError where its commands are missing."""
+    return drive_from(
+        commanded(record, rig),
+        refine=refine,
+        closed_loop=rig.loop is None and rig.controller is not None and "reference" in record,
+        from_rest="position" in record and rig.zero_unknown("position"),
+        targeted=rig.loop is not None,
+        hold=rig.hold,
+    )
 
 
 def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, FloatArray]:
@@ -70,7 +86,7 @@ def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) ->
     machines: dict[tuple[float, float, bool], Machine] = {}
     results = []
     for drive in drives:
-        kind = (drive.step, drive.drift_time, len(drive.reference) > 0)
+        kind = (drive.step, drive.drift_time, len(drive.reference) > 0 or rig.loop is not None)
         if kind not in machines:
             machines[kind] = build(rig, kind[0], kind[1], in_loop=kind[2])
         results.append(_driven(machines[kind], rig, drive, ride))
@@ -82,20 +98,26 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     machine.begin(drive.initial)
     ridden = _middles(drive.angle) * rig["gear.ratio"] if ride else np.empty(0)
     out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
-    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT]]
-    run(machine, drive.command, out[1:], start=drive.origin, reference=drive.reference, ridden=ridden)
+    out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
+    torque, reference = drive.command, drive.reference
+    if rig.loop is not None:
+        torque, reference = np.zeros(len(drive.command)), drive.command
+    run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
     out[0, 2] = out[1, 2]
-    channels = [n for n in drive.at if not (n == "ft" and rig.rigid_spring)]
-    at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.command) for n in channels}
+    channels = [n for n in drive.at if rig.measures(n)]
+    since = {n: drive.origin + drive.step * drive.at[n] for n in channels}
+    at = {n: drive.at[n] + rig.clock(n, since[n]) / drive.step for n in channels}
+    kinks = drive.kinks
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
 
 
 def _kick(machine: Machine, channel: str) -> float:
     """Return what an impulse of the command does to a channel at once, its unit per N m s."""
-    if channel == "motor_torque":
+    if channel == "motor_torque" or machine.table[st.TARGETED] != 0.0:
         return 0.0
-    at_once = machine.linear.outputs[("position", "velocity", "ft").index(channel)] @ machine.linear.g[:, 0]
+    row = ("position", "velocity", "ft", "deflection").index(channel)
+    at_once = machine.linear.outputs[row] @ machine.linear.g[:, 0]
     return float(at_once / machine.table[st.STEP])
 
 
@@ -117,10 +139,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
     """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
-    for effect, parameters in settings:
-        effect.vector(parameters)
-        if effect.structure is not None:
-            rig = effect.structure(rig, parameters)
+    rig = structured(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]
     _check_sensor(rig, active)
     linear = propagator(rig, step, {r for e, _ in active for r in e.reads})
@@ -128,7 +147,9 @@ def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> M
     table = np.zeros(st.SIZE)
     table[[st.STEP, st.DURATION, st.COMMIT]] = step, duration, 1.0
     table[[st.K_S, st.B_S, st.B_M, st.J_SC]] = _constants(rig)
-    table[st.MOBILITY] = linear.spans[0] @ linear.g[:, 0]
+    table[st.TARGETED] = float(rig.loop is not None)
+    table[[st.MOBILITY, st.TURNS]] = linear.spans[0] @ linear.g[:, 0], train_ratio(rig)
+    table[st.SENSED] = 1.0 - rig["spring_end.above_sensor"]
     return Machine(linear, calls, np.zeros(len(linear.phi)), table, np.zeros(states), start_map(rig))
 
 
@@ -154,9 +175,10 @@ def _calls(
     items: list[tuple[st.Port, int, Any, tuple[float, ...], int]] = [
         (e.port, e.order, e.function, e.vector(p), e.states) for e, p in active
     ]
-    if in_loop and rig.controller:
-        c = rig.controller
-        items.append((st.Port.COMMAND, -1, control, (c.k_p, c.k_v, c.limit), 0))
+    if in_loop:
+        items.append(
+            (st.Port.COMMAND, _AFTER_DELAY if rig.loop else -1, control, loop_parameters(rig), STATES)
+        )
     items.sort(key=lambda item: (item[0], item[1]))
     ports = [item[0] for item in items]
     p_sizes, x_sizes = [len(i[3]) for i in items], [i[4] for i in items]
@@ -172,12 +194,26 @@ def _calls(
     return calls, max(1, sum(x_sizes))
 
 
+def _sensed(rig: Rig) -> list[str]:
+    """Return what a bench logs: a joint in a position loop and a spring's encoder only what is listed."""
+    listed = [n for n in OUTPUTS if n in rig.sensors]
+    if rig.loop is not None and listed:
+        return listed
+    return [n for n in OUTPUTS if rig.measures(n) and (n != "deflection" or n in listed)]
+
+
 def synthesize(rig: Rig, command: Channel, *, seed: int = 0, noise: bool = True) -> Record:
     """Return the record that a bench would have logged: measurements stamped at the end of each hold."""
     period = float(command.t[-1] - command.t[0]) / (len(command) - 1)
     stamps, blank = command.t + period, np.zeros(len(command))
-    names = [n for n in OUTPUTS if not (n == "ft" and rig.rigid_spring)]
-    asked = Record({"command": command, **{n: Channel(stamps, blank) for n in names}}, source=rig.name)
+    names = _sensed(rig)
+    asked = Record(
+        {
+            "command" if rig.loop is None else "reference": command,
+            **{n: Channel(stamps, blank) for n in names},
+        },
+        source=rig.name,
+    )
     rng = np.random.default_rng([seed, _SENSORS])
     true = simulate(rig, asked)
     _check_bounded(rig, true)

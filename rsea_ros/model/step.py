@@ -21,7 +21,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.model.call import call
 from rsea_ros.signals import FloatArray, IntArray
 
-OUTPUTS = ("position", "velocity", "motor_torque", "ft")
+OUTPUTS = ("position", "velocity", "motor_torque", "ft", "deflection")
 
 _COMMAND, _MOTOR, _GEAR, _SPRING, _SENSOR = (int(port) for port in st.Port if port != st.Port.STRUCTURE)
 _FORCES = 5
@@ -31,8 +31,8 @@ class Linear(NamedTuple):
     """Propagators of one step and what is read from the state x (order n).
 
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
-    velocity and deflection; outputs (3, n): position, velocity and the linear spring torque; gravity: m g l
-    of the two ends, N m.
+    velocity and deflection; outputs (4, n): position, velocity, the linear torque at the F/T sensor and
+    deflection; gravity (4,): m g l of the ends, N m, then how far from hanging each is at angle zero, rad.
     """
 
     phi: FloatArray
@@ -84,9 +84,9 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
     for i in range(_FORCES):
         s[st.FIRST_FORCE + i] = 0.0
     if linear.gravity[0] != 0.0:
-        s[st.HOUSING_TORQUE] = -linear.gravity[0] * np.sin(s[st.HOUSING_ANGLE])
+        s[st.HOUSING_TORQUE] = -linear.gravity[0] * np.sin(s[st.HOUSING_ANGLE] + linear.gravity[2])
     if linear.gravity[1] != 0.0:
-        s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE])
+        s[st.DISTAL_TORQUE] = -linear.gravity[1] * np.sin(s[st.DISTAL_ANGLE] + linear.gravity[3])
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -103,7 +103,8 @@ def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
     """Put what the sensors of the nominal actuator see into the table."""
     s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs[0], x)
     s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs[1], x)
-    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SPRING_TORQUE]
+    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SENSED] * s[st.SPRING_TORQUE]
+    s[st.SPRING_ANGLE] = _dot(linear.outputs[3], x) + s[st.PLAY]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -112,7 +113,7 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
 
     x, s, own: state of the mechanics, signal table, states of the effects; they go in and come out.
     reference (rad) and ridden (rad, measured rotor angle at the middle of each step) may be empty.
-    out (steps, 4): OUTPUTS at the end of each step. start: s, of the first step.
+    out (steps, 5): OUTPUTS at the end of each step. start: s, of the first step.
     """
     n, h = len(x), s[st.STEP]
     free, end, middle = np.empty(n), np.empty(n), np.empty(n)
@@ -151,4 +152,5 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
             s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
         _read_outputs(linear, x, s)
         call_port(_SENSOR, calls, s_at, p_at, own_at)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT], s[st.FT]
+        out[k, 0], out[k, 1], out[k, 2] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT]
+        out[k, 3], out[k, 4] = s[st.FT], s[st.SPRING_ANGLE]

@@ -27,6 +27,10 @@ NAMES = (
     Parameter("frame", "", "frame_id of joint_states"),
     Parameter("ft_frame", "ft_sensor", "frame_id of ft"),
 )
+SPRING_FRAME = Parameter(
+    "spring_frame", "spring_deflection", "frame_id of ft where it is stiffness times deflection"
+)
+"""Of a bench whose device may measure the spring by a second encoder."""
 """Parameters of every bench."""
 MOST = 100
 """Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
@@ -41,7 +45,9 @@ class Bench:
     def __init__(
         self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False
     ) -> None:
-        """names: values of NAMES. strict: see CommandQueue; then one publisher is obeyed at a time.
+        """names: values of NAMES, and of SPRING_FRAME where it may be.
+
+        strict: see CommandQueue; then one publisher is obeyed at a time.
 
         every_record: ft gets all that came since the last reading, not one.
         """
@@ -56,8 +62,13 @@ class Bench:
             serialize_message(joint_state_message(0, 0.0, 0.0, 0.0, joint, frame)), TYPES["joint_states"],
             "position", "velocity", "effort",
         )  # fmt: skip
-        wrench = serialize_message(wrench_message(0, (0.0,) * 6, frame=ft_frame))
-        self._ft_writer = RawWriter(wrench, TYPES["ft"], "wrench")
+        frames = {False: ft_frame, True: names.get(SPRING_FRAME.name, ft_frame)}
+        self._ft_writers = {
+            inferred: RawWriter(
+                serialize_message(wrench_message(0, (0.0,) * 6, frame=at)), TYPES["ft"], "wrench"
+            )
+            for inferred, at in frames.items()
+        }
         self._wanted = Mailbox(
             node, JOINT_STATE, "torque_command", COMMAND, self.commands.refuse, ("effort", 0), joint=joint,
             admit=self._admit if strict else None,
@@ -78,11 +89,12 @@ class Bench:
         """Publish one reading under its stamps, moved by so many ns."""
         numbers = (state.position, state.velocity, state.motor_torque)
         self._states.publish(self._state_writer.write(state.stamp + shift, numbers))
+        writer = self._ft_writers[state.inferred]
         if self._every_record:
             for stamp, wrench in state.wrenches:
-                self._ft.publish(self._ft_writer.write(stamp + shift, wrench))
+                self._ft.publish(writer.write(stamp + shift, wrench))
         elif state.wrench is not None:
-            self._ft.publish(self._ft_writer.write(state.ft_stamp + shift, state.wrench))
+            self._ft.publish(writer.write(state.ft_stamp + shift, state.wrench))
 
     def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
         """Return the health of a bench that runs in a cycle; warnings are of what is new since the last.

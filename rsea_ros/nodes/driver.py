@@ -8,6 +8,7 @@ node stays active.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -18,29 +19,34 @@ from msg_adapters.ros import Trigger
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.outside import EXTRA_PATH, options_of
 from rsea_ros.nodes._alarm import Alarm
 from rsea_ros.nodes._anchor import Anchor
-from rsea_ros.nodes._bench import NAMES, Bench
+from rsea_ros.nodes._bench import NAMES, SPRING_FRAME, Bench
 from rsea_ros.nodes._cycle import Cycle
-from rsea_ros.nodes._devices import DEVICES, LIMITS, MOTOR, SENSOR, limits_of
+from rsea_ros.nodes._device_parameters import LIMITS, MOTOR, SAFETY, SENSOR
+from rsea_ros.nodes._devices import DEVICES, device_of, limits_of, spring_of
 from rsea_ros.nodes._drive import Drive
 from rsea_ros.nodes._health import ERROR, OK, Health, Report
 from rsea_ros.nodes._jobs import Jobs
 from rsea_ros.nodes._parameters import Parameter
 from rsea_ros.nodes._realtime import REALTIME, keep_time, usual_priority
 from rsea_ros.nodes._run import run_node
+from rsea_ros.wording import printable
 
 TABLE = (
-    Parameter("device", "simulated", "what to drive", choices=tuple(DEVICES)),
+    Parameter("device", "simulated", f"what to drive: {', '.join(DEVICES)}, or one of RSEA_DEVICES"),
     Parameter("rate", 280.0, "cycles a second", "Hz", 10.0, 1000.0),
     Parameter("rig", "paper_high_impedance", "the bench: a name of config/rigs, or a file"),
     Parameter("seed", 0, "seed of the simulated sensors' noise", "", 0, 1_000_000_000),
     Parameter("autostart", False, "whether to configure and activate at once"),
     REALTIME,
+    *SAFETY,
     *MOTOR,
     *SENSOR,
     *LIMITS,
     *NAMES,
+    SPRING_FRAME,
 )
 
 
@@ -56,7 +62,12 @@ class Driver(ManagedEntity):
         self._node, self._values = node, values
         if node.get_parameter("use_sim_time").value:
             raise ParameterError("parameter use_sim_time = true, expected false: the device keeps real time")
-        self._guarded = Guarded(DEVICES[values["device"]](values), limits_of(values), values["rate"])
+        if values["device"] not in DEVICES and (files := os.environ.get(EXTRA_PATH)):
+            text = f"{EXTRA_PATH}={printable(files)}: code from there runs in this node"
+            node.get_logger().warning(text)
+        given = values | {"device_options": options_of(values["device_options"])}
+        device = device_of(given, DEVICES)
+        self._guarded = Guarded(device, limits_of(values), values["rate"], spring_of(values))
         self._cycle: Cycle | None = None
         self._bench: Bench | None = None
         self._drive: Drive | None = None
@@ -76,13 +87,12 @@ class Driver(ManagedEntity):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open the device and begin to publish what it measures."""
         try:
-            self._guarded.device.open()
+            self._guarded.open(unprotected=self._values["allow_no_dead_host_protection"])
         except (RseaError, OSError) as error:
             self._fail(error)
             return TransitionCallbackReturn.FAILURE
         self._ended = ""
         self._health.hardware = _hardware(self._values, self._guarded.device.health())
-        self._guarded.guard.clear()
         self._bench = Bench(self._node, self._values, strict=True, every_record=self._values["ft_all"])
         anchor = Anchor()
         self._drive = Drive(self._guarded, self._bench, anchor, self._values["rate"])
@@ -235,6 +245,8 @@ class Driver(ManagedEntity):
         values = {
             "active": self._guarded.enabled,
             "fault": fault or "none",
+            "dead_host_protection": self._guarded.device.protection,
+            "ft_source": self._guarded.ft_source,
             "limited_commands": self._guarded.guard.limited,
             **cycles,
             **report.values,

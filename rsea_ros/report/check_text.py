@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 from rich.table import Table
 from rich.text import Text
@@ -12,13 +13,15 @@ from rsea_ros.report import words
 
 _STYLES = {"green": "green", "amber": "yellow", "red": "bold red"}
 _KINDS = {
-    "wrong_rig": "right rig",
+    "wrong_rig": "rig fits",
     "dead_channel": "dead channel",
     "clock_offset": "clock offset",
     "clock_drift": "clock drift",
-    "identifiability": "told by data",
+    "identifiability": "determined",
     "missing_topic": "missing",
 }
+_DOUBTED = {"wrong_rig": "wrong rig?", "identifiability": "undetermined"}
+"""Names of kinds whose plain name would say the opposite of an amber or red light."""
 SAID_ELSEWHERE = ("identifiability", "noise", "excitation", "rest")
 """Kinds that identify and diagnose speak of in their results anyway."""
 
@@ -28,7 +31,7 @@ def check_table(findings: Findings) -> Table:
     table = Table(box=None, pad_edge=False, header_style="dim", title_justify="left")
     for name in ("", "what", "channel", "value", "expected", "where, and what would help"):
         table.add_column(name, no_wrap=name in ("", "what", "channel", "value"))
-    for f in findings.findings:
+    for f in _each_remedy_once(findings.findings):
         note = "; ".join(filter(None, (f.detail, f.remedy)))
         row = (Text(f.light, style=_STYLES[f.light]), kind(f), _channel(f), number(f), f.expected, note)
         table.add_row(*(cell if isinstance(cell, Text) else Text(cell) for cell in row))
@@ -40,7 +43,15 @@ def warnings(findings: Findings) -> list[str]:
     told = [f for f in findings.findings if f.light != "green" and f.kind not in SAID_ELSEWHERE]
     reported = {(f.kind, f.channel) for f in findings.faults}
     told = [f for f in told if f.kind == "wrong_rig" or (f.kind, f.channel) not in reported]
-    return [sentence(f) for f in sorted(told, key=lambda f: f.kind != "wrong_rig")]
+    return [sentence(f) for f in _each_remedy_once(sorted(told, key=lambda f: f.kind != "wrong_rig"))]
+
+
+def _each_remedy_once(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Yield findings, each without a remedy that one before it has named."""
+    named: set[str] = set()
+    for f in findings:
+        yield replace(f, remedy="") if f.remedy in named else f
+        named.add(f.remedy)
 
 
 def sentence(f: Finding) -> str:
@@ -53,6 +64,8 @@ def sentence(f: Finding) -> str:
 
 def kind(f: Finding) -> str:
     """Return the plain name of what was looked at."""
+    if f.light != "green" and f.kind in _DOUBTED:
+        return _DOUBTED[f.kind]
     return _KINDS.get(f.kind, f.kind.replace("_", " "))
 
 
@@ -62,7 +75,7 @@ def number(f: Finding) -> str:
         return ""
     shown = words.number(f.value, 3)
     if f.low is not None and f.high is not None:
-        shown = " ± ".join(filter(None, words.with_interval(f.value, f.low, f.high)))
+        shown = "".join(words.with_doubt(f.value, f.low, f.high))
     return f"{shown} {words.unit(f.unit)}".rstrip()
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Rejected
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
@@ -36,11 +36,19 @@ def _gain(cause: Cause) -> str:
 def _sizes(cause: Cause) -> str:
     cells = []
     for name, p in cause.parameters.items():
-        value, half, unit = num.estimate(p)
-        doubt = f" <small>± {half}</small>" if half else ""
-        what = f"{escape(name.replace('_', ' '))}, 95 % interval"
+        value, doubt, unit = num.estimate(p)
+        doubt = f" <small>{doubt.strip()}</small>" if doubt else ""
+        what = f"{escape(name.replace('_', ' '))}, 95 % interval{escape(_model_share(p))}"
         cells.append(f"<div><b>{value}{doubt} {escape(unit)}</b><span>{what}</span></div>")
     return f'<div class="keys">{"".join(cells)}</div>'
+
+
+def _model_share(estimate: Estimate) -> str:
+    """Return how much of an interval the simulation itself adds, `, of which the simulation ± 0.0147 N·m`."""
+    if not estimate.model_sd > 0.0:
+        return ""
+    half, unit = num.model_half_width(estimate)
+    return f", of which the simulation ± {half} {unit}".rstrip()
 
 
 def _rivals(cause: Cause) -> str:
@@ -54,17 +62,17 @@ def tried_section(diagnosis: Diagnosis) -> str:
     """Return all that was tried: causes and fitted rivals with their gains, then the others by reason."""
     if not (diagnosis.causes or diagnosis.rejected):
         return ""
-    fitted = sorted((r for r in diagnosis.rejected if was_fitted(r)), key=lambda r: -r.gain_holdout)
     rows = [_row(c.name, c.gain_holdout, "accepted", strong=True) for c in diagnosis.causes]
-    rows += [_row(r.name, r.gain_holdout, r.why) for r in fitted]
+    rows += [_row(r.name, r.gain_holdout, say.rejection(r)) for r in fitted_rivals(diagnosis)]
     shown = table(("Cause", "#Gain", "", "Outcome"), rows) if rows else ""
-    others = bullets(_by_reason([r for r in diagnosis.rejected if not was_fitted(r)]))
+    others = bullets(_by_reason([r for r in diagnosis.rejected if not r.is_fitted]))
     return section(_tried_title(diagnosis), shown, others, caption=_GAIN)
 
 
-def was_fitted(rejected: Rejected) -> bool:
-    """Tell whether a cause came as far as a gain: one without is exactly zero or not a number."""
-    return math.isfinite(rejected.gain_holdout) and rejected.gain_holdout != 0.0
+def fitted_rivals(diagnosis: Diagnosis) -> list[Rejected]:
+    """Return the effects that were fitted to all training data and rejected, largest gain first."""
+    fitted = (r for r in diagnosis.rejected if r.is_fitted)
+    return sorted(fitted, key=lambda r: -r.gain_holdout if math.isfinite(r.gain_holdout) else math.inf)
 
 
 def _tried_title(diagnosis: Diagnosis) -> str:
@@ -75,7 +83,7 @@ def _tried_title(diagnosis: Diagnosis) -> str:
 def _by_reason(rejected: Sequence[Rejected]) -> list[str]:
     names: dict[str, list[str]] = {}
     for r in rejected:
-        names.setdefault(r.why, []).append(say.effect(r.name))
+        names.setdefault(say.rejection(r), []).append(say.effect(r.name))
     return [f"{words.sentence(say.prose(why))}: {listed(sorted(n))}." for why, n in names.items()]
 
 

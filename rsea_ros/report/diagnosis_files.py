@@ -11,7 +11,8 @@ from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.diagnosis_json import diagnosis_json
 from rsea_ros.report.diagnosis_overlay import overlay_records
 from rsea_ros.report.diagnosis_page import diagnosis_report
-from rsea_ros.report.results import json_text
+from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.results import json_text, with_provenance
 from rsea_ros.signals import Record
 
 OverlayWriter = Callable[[Mapping[str, Record], Path], None]
@@ -20,7 +21,11 @@ JSON, MODEL, OVERLAY, REPORT = NAMES = ("diagnosis.json", "model.yaml", "overlay
 
 
 def write_diagnosis(
-    diagnosis: Diagnosis, record: Record, out: Place | str | Path, write: OverlayWriter
+    diagnosis: Diagnosis,
+    record: Record,
+    out: Place | str | Path,
+    write: OverlayWriter,
+    provenance: Provenance | None = None,
 ) -> Path:
     """Write diagnosis.json, model.yaml, overlay.mcap and report.html, and return the report's path.
 
@@ -28,7 +33,7 @@ def write_diagnosis(
     BagError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(JSON, json_text(diagnosis_json(diagnosis)))
+        new.write(JSON, json_text(with_provenance(diagnosis_json(diagnosis), provenance)))
         new.write(MODEL, rig_text(diagnosis.extended_rig))
         write(overlay_records(diagnosis, record), new.staged(OVERLAY))
-        return new.write(REPORT, diagnosis_report(diagnosis))
+        return new.write(REPORT, diagnosis_report(diagnosis, provenance))

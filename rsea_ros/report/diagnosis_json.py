@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
 
 SCHEMA = 1
@@ -18,6 +20,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "schema": SCHEMA,
         "rig": d.rig_name,
         "verdict": d.verdict,
+        "channel": d.channel,
         "sentence": d.sentence,
         "data": {
             "bags": list(d.sources),
@@ -42,7 +45,14 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(d.statements),
+        "settings": _settings(d.settings),
     }
+
+
+def _settings(settings: DiagnosisSettings) -> dict[str, Any]:
+    """Return every number that steered the verdict, `group.name`: value."""
+    numbers = {s.name: s.value for s in settings.listed()}
+    return {"max_causes": settings.max_causes, "without": list(settings.without), **numbers}
 
 
 def _misfit(m: Misfit) -> dict[str, Any]:
@@ -61,8 +71,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "name": cause.name,
         "channel": cause.channel,
         "parameters": {
-            name: {"value": finite(p.value), "unit": p.unit, "ci95": _pair(p.ci95)}
-            for name, p in cause.parameters.items()
+            name: _estimate(p) for name, p in cause.parameters.items()
         },
         "gain": {
             "train": finite(cause.gain_train),
@@ -75,12 +84,30 @@ def _cause(cause: Cause) -> dict[str, Any]:
     }
 
 
+def _estimate(p: Estimate) -> dict[str, Any]:
+    statistical = None if p.statistical_ci95 is None else _pair(p.statistical_ci95)
+    return {
+        "value": finite(p.value),
+        "unit": p.unit,
+        "ci95": _pair(p.ci95),
+        "statistical_ci95": statistical,
+        "model_sd": finite(p.model_sd),
+    }
+
+
 def _pair(interval: tuple[float, float]) -> list[float | None]:
     return [finite(side) for side in interval]
 
 
 def _rejected(rejected: Rejected) -> dict[str, Any]:
-    return {"name": rejected.name, "gain_holdout": finite(rejected.gain_holdout), "why": rejected.why}
+    return {
+        "name": rejected.name,
+        "gain_holdout": finite(rejected.gain_holdout),
+        "why": say.rejection(rejected),
+        "reason": rejected.reason,
+        "rival": rejected.rival or None,
+        "fitted": rejected.is_fitted,
+    }
 
 
 def _experiment(experiment: Experiment | None) -> dict[str, Any] | None:

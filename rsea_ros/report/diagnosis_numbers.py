@@ -7,6 +7,7 @@ import numpy as np
 from rsea_ros.diagnosis.result import Diagnosis, Estimate
 from rsea_ros.report import words
 from rsea_ros.signals import UNITS
+from rsea_ros.units import in_motion
 
 
 def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
@@ -41,18 +42,24 @@ def residual_change(diagnosis: Diagnosis, channel: str) -> str:
 def rms_change(diagnosis: Diagnosis, channel: str) -> str:
     """Return the same as RMS in the channel's unit beside the noise."""
     before, after, noise = (
-        words.quantity(v[channel], UNITS[channel])
+        words.quantity(v[channel], in_motion(UNITS[channel], linear=diagnosis.baseline_rig.linear))
         for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
     )
     return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"
 
 
 def estimate(estimate: Estimate) -> tuple[str, str, str]:
-    """Return value, half-width of the 95 % interval and unit: ("4.0045", "0.0029", "mrad")."""
+    """Return value, doubt and unit: ("4.0045", " ± 0.0029", "mrad"), or lopsided " −0.1/+1.4"."""
     factor, prefix = _prefix(estimate)
     low, high = estimate.ci95
-    value, half = words.with_interval(estimate.value * factor, low * factor, high * factor)
-    return value, half, prefix + words.unit(estimate.unit)
+    value, doubt = words.with_doubt(estimate.value * factor, low * factor, high * factor)
+    return value, doubt, prefix + words.unit(estimate.unit)
+
+
+def model_half_width(estimate: Estimate) -> tuple[str, str]:
+    """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
+    factor, prefix = _prefix(estimate)
+    return words.number(1.96 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
 
 
 def _prefix(estimate: Estimate) -> tuple[float, str]:

@@ -3,36 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import cause_section, tried_section
 from rsea_ros.report.diagnosis_figures import spectrum_figure, time_figure
 from rsea_ros.report.diagnosis_profile import profiles
+from rsea_ros.report.diagnosis_settings import settings_section
 from rsea_ros.report.diagnosis_tables import channel_section, experiment_section
 from rsea_ros.report.diagnosis_where import where_figure
 from rsea_ros.report.fault_words import fault_lines, faults
-from rsea_ros.report.page import Block, bullets, key_numbers, page, paragraph, section
+from rsea_ros.report.page import Block, bullets, folded, key_numbers, page, paragraph, section
 from rsea_ros.report.palette import AFTER, BEFORE
 from rsea_ros.report.parameters import parameter_table
+from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.sketch import sketch
 
 
-def diagnosis_report(diagnosis: Diagnosis) -> str:
+def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
     """Return the report as HTML that opens without a network."""
     d = diagnosis
     footer = [f"Data: {', '.join(d.sources)}", "rsea diagnose. All values in SI."]
+    footer += provenance.lines if provenance else ()
     return page(say.headline(d), _kicker(d), list(_blocks(d)), footer)
 
 
 def _blocks(d: Diagnosis) -> Iterator[Block]:
     """Yield the page from top to bottom: the verdict first, then what it rests on."""
-    main = say.main_channel(d)
+    main = d.channel
     yield key_numbers(_keys(d, main))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'
+    yield sketch([c.name for c in d.causes])
     yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
     if any(o.channel == main for o in d.before):
         yield time_figure(d, main)
@@ -40,6 +47,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     if where:
         yield where_figure(where, bool(d.causes), AFTER if d.at_noise_floor and not d.causes else BEFORE)
     yield from (cause_section(c) for c in d.causes)
+    yield _final(d)
     yield tried_section(d)
     yield channel_section(d)
     yield _untold(d)
@@ -47,6 +55,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
         yield experiment_section(d.next_experiment)
     yield _faults(d)
     yield _baseline(d)
+    yield settings_section(d.settings)
 
 
 def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
@@ -82,5 +91,23 @@ def _faults(d: Diagnosis) -> str:
 
 
 def _baseline(d: Diagnosis) -> str:
-    title = "The rig's own values, fitted before any cause was looked for"
-    return section(title, parameter_table(d.baseline))
+    """Return the values before the causes, folded: each of them has taken over what the causes do."""
+    title = "The rig's values as fitted before any cause was looked for"
+    return folded(title, parameter_table(d.baseline)) if d.causes else ""
+
+
+def _final(d: Diagnosis) -> str:
+    """Return the rig's values at the end: beside all causes, where there are any."""
+    title = "The rig's values beside the causes" if d.causes else "The rig's values"
+    return section(title, parameter_table(final_values(d)))
+
+
+def final_values(d: Diagnosis) -> list[ParameterEstimate]:
+    """Return the rig's own values in the extended model, with their intervals."""
+    quantities = d.extended_rig.quantities
+    return [
+        replace(p, value=quantities[p.name].value, ci95=quantities[p.name].ci95 or p.ci95)
+        if p.name in quantities
+        else p
+        for p in d.baseline
+    ]

@@ -10,7 +10,7 @@ from rsea_ros.diagnosis.result import Diagnosis, Estimate, Experiment, Misfit
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis_causes import was_fitted
+from rsea_ros.report.diagnosis_causes import fitted_rivals
 from rsea_ros.report.fault_words import fault_lines
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
@@ -25,7 +25,7 @@ def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
 
 
 def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
-    main = say.main_channel(d)
+    main = d.channel
     ratios, rms = num.residual_change(d, main), num.rms_change(d, main)
     yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
     for cause in d.causes:
@@ -34,9 +34,8 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
     if d.misfit:
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
-    rivals = [r for r in d.rejected if was_fitted(r)][:_MOST]
-    for rival in rivals:
-        yield "rejected", f"{rival.name}: {say.prose(rival.why)}"
+    for rival in fitted_rivals(d)[:_MOST]:
+        yield "rejected", f"{rival.name}: {say.prose(say.rejection(rival))}"
     if d.rejected:
         yield "tried", f"{len(d.causes) + len(d.rejected)} causes of the catalogue"
     for sentence in (*say.confusions(d), *d.statements):
@@ -53,8 +52,8 @@ def _next(experiment: Experiment) -> str:
 
 
 def _size(name: str, parameter: Estimate) -> str:
-    value, half, unit = num.estimate(parameter)
-    return f"{name.replace('_', ' ')} {value}{f' ± {half}' if half else ''} {unit}".rstrip()
+    value, doubt, unit = num.estimate(parameter)
+    return f"{name.replace('_', ' ')} {value}{doubt} {unit}".rstrip()
 
 
 def _worst(d: Diagnosis) -> list[Misfit]:

@@ -6,14 +6,25 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
 from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import words
 from rsea_ros.wording import listed
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
-_ORDER = ("ft", "position", "velocity", "motor_torque")
+_REASONS: Mapping[Reason, str] = {
+    "far_behind": "far behind the best on the data of the fit",
+    "at_bound": "its size ran to the bound of what such an effect has",
+    "not_sure": "does not surely lower the residual of data that it was not fitted to",
+    "too_small": "lowers the residual of data that it was not fitted to, but by too little",
+    "explains_less": "{rival} explains more",
+    "no_better_than_simpler": "no better than {rival}, which is simpler",
+    "no_better_than_likelier": "no better than {rival}, which needs less of what is known beforehand",
+    "redundant": "not needed beside the other causes",
+    "leaves_too_much": "helps, but leaves so much that it may stand in for something else",
+}
 _RESPECTS = {
     "frequency_band": "frequency",
     "amplitude": "load",
@@ -23,19 +34,14 @@ _RESPECTS = {
 }
 
 
-def main_channel(diagnosis: Diagnosis) -> str:
-    """Return the channel that verdict and gain speak of."""
-    if diagnosis.causes:
-        return diagnosis.causes[0].channel
-    main = next(n for n in (*_ORDER, *diagnosis.residual_rms) if n in diagnosis.residual_rms)
-    if diagnosis.verdict != "unexplained" or num.times_noise(diagnosis, main)[0] > AT_NOISE:
-        return main
-    return max(diagnosis.residual_rms, key=lambda n: num.times_noise(diagnosis, n)[0])
-
-
 def effect(name: str) -> str:
     """Return the plain name of an effect, as it stands within a sentence."""
     return " ".join(_PROPER.get(word, word) for word in name.split("_"))
+
+
+def rejection(rejected: Rejected) -> str:
+    """Return why an effect is no cause, as a part of a sentence."""
+    return _REASONS[rejected.reason].format(rival=rejected.rival)
 
 
 def respect(what: str) -> str:
@@ -62,11 +68,11 @@ def named(causes: Sequence[Cause]) -> str:
 
 def headline(diagnosis: Diagnosis) -> str:
     """Return the verdict as one short sentence."""
-    d, n = diagnosis, main_channel(diagnosis)
+    d, n = diagnosis, diagnosis.channel
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
-    dead = [words.channel(f.channel) for f in d.faults if f.kind == "dead_channel"]
-    if d.verdict == "nothing_wrong" and dead:
-        return f"{words.sentence(listed(dead))} measures nothing; in the other channels only noise is left"
+    silent = [words.channel(name) for name in silent_channels(d.faults)]
+    if d.verdict == "unexplained" and silent and before <= AT_NOISE:
+        return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
     if d.verdict == "unexplained":

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.result import Identification, Overlay
+from rsea_ros.identification.result import CLOCKS, Identification, Overlay
 from rsea_ros.report import words
 from rsea_ros.report.bode import bode_figure
+from rsea_ros.report.correlation import correlation_section
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
@@ -14,14 +15,15 @@ from rsea_ros.report.overlay import Simulated, overlay_figure
 from rsea_ros.report.page import Block, bullets, code, key_numbers, page, paragraph, section
 from rsea_ros.report.palette import AFTER, MEASURED
 from rsea_ros.report.parameters import clock_sentence, parameter_table, told
+from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.statics_words import statics_sentences
 from rsea_ros.signals import UNITS
 
-_ORDER = ("ft", "position", "velocity")
+_ORDER = ("ft", "deflection", "position", "velocity")
 
 
-def identification_report(identification: Identification) -> str:
+def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:
     """Return the report as HTML that opens without a network."""
     blocks: list[Block] = [
         key_numbers(_keys(identification)),
@@ -34,8 +36,9 @@ def identification_report(identification: Identification) -> str:
     blocks += [bode_figure(r, m) for r, m in zip(responses, models, strict=True)]
     for overlay in _shown(identification):
         blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
-    blocks.append(_untold(identification))
-    return page(verdict_sentence(identification), _kicker(identification), blocks, _footer(identification))
+    blocks += [_untold(identification), _correlation(identification)]
+    footer = [*_footer(identification), *(provenance.lines if provenance else ())]
+    return page(verdict_sentence(identification), _kicker(identification), blocks, footer)
 
 
 def main_channel(identification: Identification) -> str:
@@ -88,7 +91,7 @@ def _statics(identification: Identification) -> str:
 
 
 def _parameter_finding(identification: Identification) -> str:
-    physical = [p for p in identification.parameters if not p.name.startswith("clock.")]
+    physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
     settled = [p for p in physical if told(p) == "yes"]
     if len(settled) == len(physical):
         return f"The data tell all {len(physical)} parameters"
@@ -127,6 +130,14 @@ def _untold(identification: Identification) -> str:
     said = (*doubt_sentences(identification), *identification.statements)
     body = bullets(said) if said else paragraph("Nothing that was asked for.")
     return section(title, body)
+
+
+def _correlation(identification: Identification) -> str:
+    names = [p.name for p in identification.parameters]
+    physical = [i for i, name in enumerate(names) if not name.startswith("clock.")]
+    return correlation_section(
+        [names[i] for i in physical], identification.correlation[np.ix_(physical, physical)]
+    )
 
 
 def _footer(identification: Identification) -> list[str]:

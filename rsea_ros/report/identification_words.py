@@ -16,8 +16,11 @@ def verdict_sentence(identification: Identification) -> str:
         return f"No channel to judge the model by ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
     size = f"{words.channel(worst)} {times(ratios[worst])} times the noise ({rig})"
-    if identification.verdict == "misfit":
+    if not identification.at_noise:
         return f"The model does not fit: {size}"
+    if identification.silent:
+        silent = words.sentence(listed([words.channel(n) for n in identification.silent]))
+        return f"{silent} measures nothing; the model fits the rest: {size}"
     if identification.verdict == "not_identifiable":
         return f"The model fits: {size}; but these data tell none of its values"
     return f"The model fits: {size}"
@@ -30,7 +33,7 @@ def times(ratio: float) -> str:
 
 def next_command(identification: Identification) -> str:
     """Return the command that says what is missing in a model that does not fit; empty for one that does."""
-    if identification.verdict != "misfit":
+    if identification.at_noise:
         return ""
     rig = identification.rig_option or identification.rig.name
     bags = " ".join(shlex.quote(s) for s in identification.sources)
@@ -46,7 +49,7 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
             f"The noise of the {channels} is coloured: its level was taken from the residual, which is "
             "steady, falls with frequency, and agrees with neither command nor motion nor another sensor."
         )
-    if identification.verdict == "misfit":
+    if not identification.at_noise:
         said.append(_misfit_sentence(identification))
     return tuple(said)
 

@@ -65,8 +65,89 @@ function overlay(node, figure) {
   });
 }
 
-for (const node of document.querySelectorAll(".figure")) {
-  const figure = JSON.parse(document.getElementById(node.id + "-data").textContent);
-  const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
-  done.then(() => { node.dataset.drawn = "yes"; });
+/* In the dark the colours of text, grid and background change places; those with a meaning stay. */
+const DARK = { "#1f2933": "#e4e7eb", "#66717d": "#9aa5b1", "#e6e9ec": "#323f4b", "#ffffff": "#1b232b", "#1864ab": "#4dabf7" };
+
+function inTheDark(text) {
+  return matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches
+    ? text.replace(/#[0-9a-f]{6}/g, (colour) => DARK[colour] || colour) : text;
 }
+
+function button(text, about, act) {
+  const made = document.createElement("button");
+  made.type = "button"; made.textContent = text; made.title = about;
+  made.addEventListener("click", () => act(made));
+  return made;
+}
+
+/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve. */
+function csv(node, figure) {
+  const curves = figure.kind === "overlay"
+    ? (({ t, all }) => all.map((s) => ({ name: s.name, x: t, y: s.y })))(traces(figure.extra))
+    : node.data.filter((d) => d.x && d.y && d.name);
+  const quoted = (s) => '"' + String(s).replace(/<[^>]*>/g, "").replace(/"/g, '""') + '"';
+  const head = curves.flatMap((c) => [quoted(c.name + ", x"), quoted(c.name)]).join(",");
+  const rows = Array.from({ length: Math.max(0, ...curves.map((c) => c.x.length)) }, (_, i) =>
+    curves.flatMap((c) => (i < c.x.length ? [+(+c.x[i]).toPrecision(7), +(+c.y[i]).toPrecision(7)] : ["", ""])).join(","));
+  return [head, ...rows].join("\n") + "\n";
+}
+
+function save(name, text) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  link.download = name; link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/* Under a figure: a switch for each named curve, the picture, the numbers. */
+function tools(node, figure) {
+  const bar = document.createElement("div");
+  bar.className = "tools";
+  const names = [...new Set(node.data.map((d) => d.name).filter(Boolean))];
+  if (names.length > 1) for (const name of names) {
+    const curves = node.data.map((d, i) => (d.name === name ? i : -1)).filter((i) => i >= 0);
+    const toggle = button(name.replace(/<[^>]*>/g, ""), "show or hide this curve", (self) => {
+      const hide = self.getAttribute("aria-pressed") === "true";
+      self.setAttribute("aria-pressed", String(!hide));
+      Plotly.restyle(node, { visible: !hide }, curves);
+    });
+    toggle.setAttribute("aria-pressed", "true");
+    bar.append(toggle);
+  }
+  bar.append(
+    button("PNG", "this figure as a picture", () => Plotly.downloadImage(node, {
+      format: "png", scale: 2, width: node.clientWidth, height: node.clientHeight, filename: node.id })),
+    button("CSV", "the numbers of this figure", () => save(node.id + ".csv", csv(node, figure))));
+  node.after(bar);
+}
+
+function draw() {
+  for (const node of document.querySelectorAll(".figure")) {
+    const figure = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
+    const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
+    done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
+  }
+}
+
+/* On a narrow screen each row of a table is a card; its cells say of which column they are. */
+function labelCells() {
+  for (const table of document.querySelectorAll("table")) {
+    const heads = [...table.querySelectorAll("thead th")].map((th) => th.textContent);
+    for (const row of table.tBodies[0]?.rows || []) [...row.cells].forEach((cell, i) => { cell.dataset.label = heads[i] || ""; });
+  }
+}
+
+/* plotly.js lies in the page compressed: a third of its size. */
+async function unpackPlotly() {
+  const packed = Uint8Array.from(atob(document.getElementById("plotly").textContent), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const script = document.createElement("script");
+  script.textContent = await new Response(stream).text();
+  document.head.append(script);
+}
+
+labelCells();
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+if (document.querySelector(".figure")) unpackPlotly().then(draw, (error) => {
+  document.querySelectorAll(".figure").forEach((node) => { node.textContent = "This browser is too old to draw the figures: " + error; });
+});

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import asdict
-from html import escape
+from functools import lru_cache
+from html import escape, unescape
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,12 +25,13 @@ Block = Figure | str
 
 def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
     """Return the document. title: the verdict in a sentence. kicker: what it is about, above the title."""
-    body = "\n".join(_block(block, i) for i, block in enumerate(blocks))
+    body, contents = _numbered("\n".join(_block(block, i) for i, block in enumerate(blocks)))
     foot = "".join(f"<p>{escape(line)}</p>" for line in footer)
     return f"""<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta name="color-scheme" content="light dark">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(title)}</title>
 <link rel="icon" href="data:,">
@@ -34,11 +39,11 @@ def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]
 </head>
 <body>
 <main>
-<header><p class="kicker">{escape(kicker)}</p><h1>{escape(title)}</h1></header>
+<header><p class="kicker">{escape(kicker)}</p><h1>{escape(title)}</h1>{contents}</header>
 {body}
 <footer>{foot}</footer>
 </main>
-<script>{_plotly()}</script>
+<script type="text/plain" id="plotly">{_plotly()}</script>
 <script>{_asset("page.js")}</script>
 </body>
 </html>
@@ -49,6 +54,14 @@ def section(title: str, *blocks: str, caption: str = "") -> str:
     """Return a section of finished HTML under a heading; titles and captions are plain text."""
     under = f'<p class="caption">{escape(caption)}</p>' if caption else ""
     return f"<section><h2>{escape(title)}</h2>{under}{''.join(blocks)}</section>"
+
+
+def folded(title: str, *blocks: str) -> str:
+    """Return a section that opens when its title is clicked, for what few readers need."""
+    return (
+        f'<section class="folded"><details><summary><h2>{escape(title)}</h2></summary>'
+        f"{''.join(blocks)}</details></section>"
+    )
 
 
 def key_numbers(items: Sequence[tuple[str, str]]) -> str:
@@ -77,6 +90,20 @@ def paragraph(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
+def _numbered(body: str) -> tuple[str, str]:
+    """Return a body whose sections have names, and the table of contents that leads to them."""
+    titles: list[str] = []
+
+    def name(match: re.Match[str]) -> str:
+        titles.append(unescape(re.sub("<[^>]*>", "", match[3])))
+        return f'<section id="part-{len(titles)}"{match[1]}>{match[2] or ""}<h2>{match[3]}</h2>'
+
+    numbered = re.sub(r"<section([^>]*)>(<details><summary>)?<h2>(.*?)</h2>", name, body)
+    items = "".join(f'<li><a href="#part-{i}">{escape(t)}</a></li>' for i, t in enumerate(titles, 1))
+    contents = f"<nav><details><summary>Contents</summary><ol>{items}</ol></details></nav>" if items else ""
+    return numbered, contents
+
+
 def _block(block: Block, index: int) -> str:
     if isinstance(block, str):
         return block
@@ -96,10 +123,11 @@ def _asset(name: str) -> str:
     return (_HERE / name).read_text(encoding="utf-8")
 
 
+@lru_cache(maxsize=1)
 def _plotly() -> str:
-    """Return plotly.js as the plotly package carries it, without importing the package."""
+    """Return plotly.js as the plotly package carries it, compressed; page.js unpacks it in the browser."""
     spec = find_spec("plotly")
     if spec is None or not spec.submodule_search_locations:
         raise RseaError("report: package plotly is missing, expected it installed for its plotly.min.js")
     script = Path(spec.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
-    return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
+    return base64.b64encode(gzip.compress(script.read_bytes(), 9, mtime=0)).decode("ascii")

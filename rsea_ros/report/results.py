@@ -12,19 +12,27 @@ from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.identification_json import identification_json
 from rsea_ros.report.identification_page import identification_report
+from rsea_ros.report.provenance import Provenance
 
 JSON, MODEL, REPORT = NAMES = ("identification.json", "model.yaml", "report.html")
 
 
-def write_results(identification: Identification, out: Place | str | Path) -> Path:
+def write_results(
+    identification: Identification, out: Place | str | Path, provenance: Provenance | None = None
+) -> Path:
     """Write identification.json, model.yaml and report.html, and return the report's path.
 
     Raises OutputError for a name that is taken, OSError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(JSON, json_text(identification_json(identification)))
+        new.write(JSON, json_text(with_provenance(identification_json(identification), provenance)))
         new.write(MODEL, rig_text(identification.rig))
-        return new.write(REPORT, identification_report(identification))
+        return new.write(REPORT, identification_report(identification, provenance))
+
+
+def with_provenance(contents: Mapping[str, Any], provenance: Provenance | None) -> dict[str, Any]:
+    """Return the contents of a result file with where they come from, where that is known."""
+    return {**contents, **({"provenance": provenance.json} if provenance else {})}
 
 
 def json_text(contents: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ CHANNELS = {
     "position": "position",
     "velocity": "velocity",
     "ft": "F/T torque",
+    "deflection": "spring deflection",
     "reference": "reference position",
 }
 
@@ -85,6 +86,27 @@ def quantity(value: float, of: str, digits: int = 3) -> str:
         return f"{number(value, digits)} {unit(of)}".strip()
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
     return f"{number(value / factor, digits)} {prefix}{unit(of)}"
+
+
+LOPSIDED = 1.5
+"""Ratio of the sides of an interval, from which each is shown instead of ± their mean."""
+
+
+def with_doubt(value: float, low: float, high: float) -> tuple[str, str]:
+    """Return value and doubt as text: ("4.000", " ± 0.020"), or lopsided ("4.000", " −0.010/+0.14")."""
+    shown, half = with_interval(value, low, high)
+    below, above = value - low, high - value
+    if not half or max(below, above) <= LOPSIDED * min(below, above):
+        return shown, f" ± {half}" if half else ""
+    exact = number(value, max(2, 2 + _digits_between(value, min(s for s in (below, above) if s > 0.0))))
+    return exact, f" −{number(below, 2).lstrip('−')}/+{number(above, 2)}"
+
+
+def _digits_between(value: float, step: float) -> int:
+    """Return by how many decimal places a value is larger than a step."""
+    if value == 0.0:
+        return 0
+    return math.floor(math.log10(abs(value)) + 1e-6) - math.floor(math.log10(step) + 1e-6)
 
 
 def with_interval(value: float, low: float, high: float) -> tuple[str, str]:

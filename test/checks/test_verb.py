@@ -88,10 +88,13 @@ def test_every_verb_refuses_a_senseless_window_in_one_line(bag, verb, options, w
 def test_identify_says_first_what_is_wrong_and_leaves_a_dead_channel_out(bag, good, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["identify", bag(ft=dead(good)), "--out", str(out)]) == 0
-    assert "dead channel in F/T torque" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "F/T torque measures nothing; the model fits the rest: " in printed
+    assert "dead channel in F/T torque" in printed and "next: " not in printed
     said = json.loads((out / "identification.json").read_text(encoding="utf-8"))
     assert {(f["kind"], f["channel"]) for f in said["data"]["faults"]} == {("dead_channel", "ft")}
     assert "ft" not in said["residual_rms"]
+    assert (said["verdict"], said["next"]) == ("misfit", None)
 
 
 def test_identify_asks_whether_it_is_the_right_rig(bag, tmp_path, capsys):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from msg_adapters import TopicMap, read_record
+from msg_adapters.remarks import FAULTS, remarks_of
 from rsea_ros.cli.main import main
 
 MAP = """
@@ -116,3 +117,23 @@ def test_what_is_missing_is_on_the_terminal_and_in_the_bag(inputs, capsys):
     told = "command: 1 of 20 values of u are missing, the first at 0.007 s"
     assert told in capsys.readouterr().out.splitlines()
     assert told in read_record(out).notes
+
+
+@pytest.mark.parametrize("name", ["bag", "bag.mcap"])
+def test_what_is_missing_is_a_fault_of_the_bag(name, inputs, tmp_path):
+    """A single file kept no count of it."""
+    file, mapping, _ = inputs
+    Path(file).write_text(Path(file).read_text().replace("7,3.5,14", "7,,14"))
+    assert main(["import", file, "--map", mapping, "--out", str(tmp_path / name)]) == 0
+    record = read_record(tmp_path / name)
+    (fault,) = (f for f in record.faults if f.kind == "missing_values")
+    assert (fault.channel, fault.share) == ("command", 0.05)
+    assert fault.detail == "1 of 20 values of u are missing, the first at 0.007 s"
+    assert any(note.endswith("imported from run.csv, map.yaml") for note in record.notes)
+
+
+@pytest.mark.parametrize(
+    "text", ["[[[", "7", '[["clipping", "ft", 0.1, "x"]]', '[["missing_values", 1]]', "[" * 9999]
+)
+def test_remarks_of_another_are_passed_by(text):
+    assert remarks_of({FAULTS: text}).faults == []

@@ -35,6 +35,7 @@ def verb(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     def run(action: Callable[[argparse.Namespace], int], *arguments: str) -> int:
         module = types.ModuleType("rsea_ros.cli.fake")
         module.HELP = "fake"
+        module.EXAMPLE = "rsea fake"
         module.add_arguments = lambda parser: parser.add_argument("--number", type=int)
         module.run = action
         monkeypatch.setitem(sys.modules, "rsea_ros.cli.fake", module)
@@ -147,7 +148,7 @@ def test_any_encoding_will_do():
         "import sys, types; from pathlib import Path; from rsea_ros.cli import main as cli\n"
         "from rsea_ros.errors import BagError\n"
         "def run(args): print('3 N·m ± 1 µrad 数'); raise BagError('b\\xe4g')\n"
-        "fake = types.SimpleNamespace(HELP='', add_arguments=lambda parser: 0, run=run)\n"
+        "fake = types.SimpleNamespace(HELP='', EXAMPLE='', add_arguments=lambda parser: 0, run=run)\n"
         "sys.modules['rsea_ros.cli.fake'] = fake\n"
         "cli.verbs = lambda: {'fake': Path('fake.py')}; sys.exit(cli.main(['fake']))"
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -13,6 +14,8 @@ from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.signals import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
+ON_THE_BENCH = [e for e in catalogue().values() if e.name != "gravity_error"]
+"""Every effect that a bench with both ends clamped can have; test_gravity_error.py tests the other."""
 SIGNALS = ("ft", "position", "velocity")
 NOISE = {"ft": 0.03, "position": 6.2e-6, "velocity": 2.1e-4, "motor_torque": 0.06}
 """One sigma of each sensor of the rig, its quantum counted as quantum / sqrt(12)."""

@@ -1,7 +1,8 @@
 """Every effect a second time: its equations of motion as one would write them down, solved by scipy.
 
 Nothing of `rsea_ros.model` or of the effects' functions is used. Each law gets (t, x, u, p), with
-x = (angle, speed, …) and the command u held, and returns (x', torque that the F/T sensor sees).
+x = (angle, speed, …) and the command u held, and returns (x', torque that the F/T sensor sees), and the angle
+and speed that the encoder reads where they are not the first two of x.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -17,7 +19,7 @@ J_M, J_SC, B_M, K_S, B_S, RATIO = 0.953, 0.0040, 23.088, 1530.456, 3.0, 502.0
 CREEP, CONTACT, DURATION = 2e-3, 1e7, 1.5
 J = J_M + J_SC
 
-Law = Callable[[float, np.ndarray, float, Mapping[str, float]], tuple[list[float], float]]
+Law = Callable[[float, np.ndarray, float, Mapping[str, float]], Any]
 
 
 def sign(w: float) -> float:
@@ -115,6 +117,39 @@ def backlash(t, x, u, p):
     return [w, (u - B_M * w - contact) / J_M, v, (contact - torque) / J_SC], torque
 
 
+def lugre(t, x, u, p):
+    level = p["coulomb_torque"] + p["stribeck_torque"] * math.exp(-((x[1] / p["stribeck_velocity"]) ** 2))
+    slip = x[1] - p["bristle_stiffness"] * abs(x[1]) * x[2] / level
+    w, a, torque = motion(x[:2], u, p["bristle_stiffness"] * x[2] + p["bristle_damping"] * slip)
+    return [w, a, slip], torque
+
+
+def overshoot(t, x, u, p):
+    log, tau = math.log(p["overshoot"]), p["time_constant"]
+    zeta = -log / math.hypot(math.pi, log)
+    w, a, torque = motion(x[:2], x[2])
+    return [w, a, x[3], (u - x[2]) / tau**2 - 2 * zeta * x[3] / tau], torque
+
+
+def sag(t, x, u, p):
+    share = x[1] / p["no_load_speed"]
+    return min(max(u, -p["limit"] * (1 + share)), p["limit"] * (1 - share)), 0.0, 0.0
+
+
+def directional(t, x, u, p):
+    load = K_S * x[0] + B_S * x[1]
+    size = abs(p["motor_coefficient"] * u + p["load_coefficient"] * load)
+    size += p["quadratic"] * min(abs(u), abs(load)) ** 2 * (u * load > 0)
+    return u, size * sign(x[1]), 0.0
+
+
+def eccentricity(t, x, u, p):
+    w, a, torque = motion(x, u)
+    wave = p["cycles_per_revolution"] * RATIO
+    error, slope = (p["amplitude"] * f(wave * x[0] + p["phase"]) for f in (math.sin, math.cos))
+    return [w, a], torque, x[0] + error, x[1] + wave * slope * x[1]
+
+
 LAWS: dict[str, tuple[int, Law]] = {
     "asymmetric_friction": (
         2, plain(lambda t, x, u, p: (u, p["offset"] + p["viscous_difference"] * abs(x[1]) / 2, 0.0))),
@@ -123,8 +158,13 @@ LAWS: dict[str, tuple[int, Law]] = {
     "command_delay": (2, plain(lambda t, x, u, p: (u, 0.0, 0.0))),
     "coulomb_friction": (2, plain(lambda t, x, u, p: (u, p["torque"] * sign(x[1]), 0.0))),
     "current_loop_lag": (3, current_lag),
+    "current_loop_overshoot": (4, overshoot),
     "damping_drift": (
         2, plain(lambda t, x, u, p: (u, B_M * p["relative_change"] * t / DURATION * x[1], 0.0))),
+    "dead_zone": (
+        2, plain(lambda t, x, u, p: (math.copysign(max(abs(u) - p["width"], 0.0), u), 0.0, 0.0))),
+    "directional_load_friction": (2, plain(directional)),
+    "encoder_eccentricity": (2, eccentricity),
     "ft_bias": (2, sensor(lambda torque, t, p: torque + p["bias"])),
     "ft_drift": (2, sensor(lambda torque, t, p: torque + p["drift"] * t / DURATION)),
     "ft_gain_error": (2, sensor(lambda torque, t, p: torque * p["gain"])),
@@ -132,19 +172,25 @@ LAWS: dict[str, tuple[int, Law]] = {
     "gear_compliance": (4, gear),
     "hard_stop": (2, plain(stop)),
     "load_dependent_friction": (2, plain(load_dependent)),
+    "lopsided_spring": (2, plain(lambda t, x, u, p: (u, 0.0, K_S * p["quadratic"] * x[0] ** 2))),
+    "lugre_friction": (3, lugre),
     "mains_interference": (
         2, sensor(lambda torque, t, p: torque
                   + p["amplitude"] * math.sin(2 * math.pi * p["frequency"] * t + p["phase"]))),
     "nonlinear_spring": (2, plain(lambda t, x, u, p: (u, 0.0, K_S * p["cubic"] * x[0] ** 3))),
+    "quadratic_drag": (2, plain(lambda t, x, u, p: (u, p["coefficient"] * x[1] * abs(x[1]), 0.0))),
     "spring_hysteresis": (3, hysteresis),
     "stiffness_drift": (
         2, plain(lambda t, x, u, p: (u, 0.0, K_S * p["relative_change"] * t / DURATION * x[0]))),
     "stribeck_friction": (2, plain(stribeck)),
     "structural_resonance": (4, resonance),
+    "torque_constant_drift": (
+        2, plain(lambda t, x, u, p: ((1 + p["relative_change"] * t / DURATION) * u, 0.0, 0.0))),
     "torque_constant_error": (2, plain(lambda t, x, u, p: (p["gain"] * u, 0.0, 0.0))),
     "torque_ripple": (2, plain(ripple)),
     "torque_saturation": (
         2, plain(lambda t, x, u, p: (math.copysign(min(abs(u), p["limit"]), u), 0.0, 0.0))),
+    "voltage_sag": (2, plain(sag)),
 }  # fmt: skip
 """For each effect how many states its equations have, and the equations."""
 
@@ -160,6 +206,7 @@ def solve(name: str, p: Mapping[str, float], held: np.ndarray, period: float) ->
         u = held[hold] if hold >= 0 else 0.0
         x = solve_ivp(lambda t, x, u=u: law(t, x, u, p)[0], (begin, end), x, method="LSODA",
                       rtol=1e-8, atol=1e-11).y[:, -1]  # fmt: skip
-        rows.append((law(end, x, u, p)[1], x[0], x[1]))
+        torque, *read = law(end, x, u, p)[1:]
+        rows.append((torque, *(read or x[:2])))
     kept = np.array(rows)[np.isin(times[1:], ends)]
     return dict(zip(("ft", "position", "velocity"), kept.T, strict=True))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from effect_bench import RIG, SIGNALS, command, difference, drive, record_of, rms, simulate
+from effect_bench import ON_THE_BENCH, RIG, SIGNALS, command, difference, drive, record_of, rms, simulate
 
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.effects.effect import Effect
@@ -47,7 +47,7 @@ CONTRACT = {
 HALF_STEP = {"ft": 3e-3, "position": 1.2e-6, "velocity": 6e-5}
 """What halving the step may change: a tenth of the torque's noise, a fifth and a third of the others'."""
 
-every_effect = pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
+every_effect = pytest.mark.parametrize("effect", ON_THE_BENCH, ids=lambda e: e.name)
 every_rig = pytest.mark.parametrize(
     "rig", ["paper_high_impedance", "paper_moving_output", "prototype_knee", "bare_drive", "pendulum"]
 )
@@ -191,7 +191,7 @@ def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, 
 def test_measured_current_shows_what_is_done_to_the_command_only():
     driven = drive(duration=1.0)
     nominal = simulate(driven)["motor_torque"]
-    shown = {e.name for e in catalogue().values()
+    shown = {e.name for e in ON_THE_BENCH
              if not np.array_equal(simulate(driven, e.name, e.typical)["motor_torque"], nominal)}  # fmt: skip
     assert shown == {e.name for e in catalogue().values() if e.port == Port.COMMAND}
 

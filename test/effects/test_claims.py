@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_bench import NOISE, RIG, command, difference, drive, record_of, rms, simulate
+from effect_bench import NOISE, ON_THE_BENCH, RIG, command, difference, drive, record_of, rms, simulate
 from scipy.optimize import least_squares
 
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.model.drive import Drive, drive_from
 
-every_effect = pytest.mark.parametrize("effect", catalogue().values(), ids=lambda e: e.name)
-PASSIVE = [e for e in catalogue().values() if e.claims.passive]
-PAIRS = [(e, rival) for e in catalogue().values() for rival in e.claims.confusable_with]
+every_effect = pytest.mark.parametrize("effect", ON_THE_BENCH, ids=lambda e: e.name)
+PASSIVE = [e for e in ON_THE_BENCH if e.claims.passive]
+PAIRS = [(e, rival) for e in ON_THE_BENCH for rival in e.claims.confusable_with]
 NOMINAL = ("rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness", "spring.damping")
 
 
@@ -81,7 +81,7 @@ def _misfit(driven: Drive, measured: dict[str, np.ndarray], other: Effect | None
     parameters = other.parameters if other else ()
     low = np.concatenate([0.3 * nominal, [p.low for p in parameters]])
     high = np.concatenate([3.0 * nominal, [p.high for p in parameters]])
-    scale = np.concatenate([nominal, [abs(p.typical) for p in parameters]])
+    scale = np.concatenate([nominal, [abs(p.typical) or 1.0 for p in parameters]])
 
     def residual(theta: np.ndarray) -> np.ndarray:
         rig = RIG.with_values(dict(zip(NOMINAL, theta[:4], strict=True)))

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from rsea_ros.hardware.dynamixel.motor import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits
@@ -20,11 +20,11 @@ LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 """s; a machine that is busy with other tests must not look like a fault."""
 
 
-def device_on(bench, limits=None, **motor):
+def device_on(bench, limits=None, *, absolute=False, **motor):
     """The driver's device on a bench."""
     settings = MotorSettings(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
     sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
-    return DynamixelNetft(settings, sensor, limits or Limits(68.0), STIFFNESS)
+    return DynamixelNetft(settings, sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
 
 
 class Loop:
@@ -33,8 +33,8 @@ class Loop:
     def __init__(self, bench, limits=None, **motor):
         self.bench = bench
         self.device = device_on(bench, limits, **motor)
-        self.device.open()
         self.guarded = Guarded(self.device, limits or Limits(68.0), 1.0 / PERIOD)
+        self.guarded.open()
         self.states = []
 
     def cycle(self, torque, age=0.0):
@@ -71,6 +71,7 @@ def benches(tmp_path_factory):
         if model not in made:
             path = tmp_path_factory.mktemp("bench") / f"tty{model}"
             made[model] = RemoteBench(path, "--model", model)
+            made[model].volts = 120 if model in (1020, 1170) else 240
         return made[model]
 
     yield bench
@@ -104,5 +105,5 @@ def well_behaved(bench):
     bench.ask("appear")
     calm = dict.fromkeys(("drop", "delay", "corrupt", "truncate", "wrong_crc", "ft_drop"), 0.0)
     bench.ask("misbehave", unstuffed=False, silent=False, ft_silent=False, **calm)
-    bench.ask("set", hardware_error=0, voltage=240, temperature=32)
+    bench.ask("set", hardware_error=0, voltage=bench.volts, temperature=32)
     bench.ask("ft_status", bits=0)

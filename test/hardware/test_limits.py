@@ -8,6 +8,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, Refused, State
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault, Guard, Limits
+from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01
 
@@ -83,6 +84,8 @@ def test_the_first_fault_is_the_one_that_is_told():
 
 class Flaky:
     """A device whose next answers are given; None is a reading."""
+
+    protection = Protection(NONE)
 
     def __init__(self):
         self.answers, self.written = [], []

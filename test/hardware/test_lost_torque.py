@@ -34,6 +34,13 @@ def test_registers_that_the_torque_hangs_on_are_read_once_a_second(loop, registe
         assert loop.guarded.fault is None and loop.bench.torque()[1]
 
 
+@pytest.mark.parametrize(
+    ("loop", "kind"), [(54024, "supervisor"), (54025, "bus watchdog")], indirect=["loop"]
+)
+def test_motors_say_what_protects_them(loop, kind):
+    assert loop.device.protection.kind == kind
+
+
 def test_a_motor_away_when_its_fault_is_cleared_is_there_the_next_time(loop):
     """An emergency stop: the port was opened again, the motor not set up, and it was 'not open' for ever."""
     loop.bench.ask("misbehave", silent=True)
@@ -50,14 +57,14 @@ def test_a_motor_away_when_its_fault_is_cleared_is_there_the_next_time(loop):
 
 
 def test_a_dead_supervisor_is_a_fault_and_clear_fault_starts_another(loop):
-    process = loop.device._motor._supervisor._end._process
+    process = loop.device.protection._supervisor._end._process
     process.kill()
     process.wait()
     loop.until_fault(10.0)
     assert loop.guarded.fault.cause == "supervisorlost"
     loop.guarded.clear()
     loop.cycles(40, 10.0)
-    assert loop.guarded.fault is None and loop.device._motor._supervisor.alive()
+    assert loop.guarded.fault is None and loop.device.protection._supervisor.alive()
 
 
 @pytest.fixture

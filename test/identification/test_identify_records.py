@@ -175,6 +175,33 @@ def test_stamps_that_scatter_about_the_clock_of_a_sensor_are_put_on_it(case):
     agree(result, true)
 
 
+@pytest.mark.parametrize("clocks", [("command",), ("command", "ft", "joint")], ids=["commands", "all"])
+def test_so_are_the_stamps_of_commands(case, clocks):
+    """The model was driven at wrong instants: 29 times the noise, and nothing explained it."""
+    nominal, true, record = case
+    rng = np.random.default_rng(12)
+    off = {c: rng.uniform(-3e-4, 3e-4, len(record["command"])) for c in clocks}
+    names = {n: n if n in ("command", "ft") else "joint" for n in record.channels}
+    scattered = {
+        n: Channel(c.t + off[names[n]], c.y) for n, c in record.channels.items() if names[n] in off
+    }
+    result = identify([record.with_channels(**scattered)], nominal)
+    assert result.verdict == "adequate"
+    assert "command by 0.17 ms RMS" in result.statements[0]
+    agree(result, true)
+
+
+def test_commands_that_did_act_at_scattered_stamps_stay(case):
+    nominal, true, record = case
+    rng = np.random.default_rng(13)
+    command = record["command"]
+    late = Channel(command.t + rng.uniform(0.0, 6e-4, len(command)), command.y)
+    stamps = {n: record[n].t for n in ("ft", "position", "velocity")}
+    result = identify([sampled(true, record.with_channels(command=late), stamps, 13)], nominal)
+    assert result.statements == ()
+    agree(result, true)
+
+
 def test_stamps_at_which_a_sensor_did_measure_stay_however_they_scatter(case):
     nominal, true, record = case
     rng = np.random.default_rng(10)

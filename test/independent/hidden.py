@@ -50,38 +50,57 @@ CATALOGUE = MappingProxyType(
 MAIN_PARAMETER = {name: next(iter(parameters)) for name, parameters in CATALOGUE.items()}
 """The parameter that says how large an effect is, or where: the first of the contract's row."""
 
+BESIDE_THE_CONTRACT = MappingProxyType(
+    {
+        "quadratic_drag": ({"coefficient": 12.0}, {"coefficient": "quadratic_drag"}),
+        "dead_zone": ({"width": 4.0, "jump": 1.0}, {"width": "deadband"}),
+        "torque_constant_drift": ({"relative_change": -0.2}, {"relative_change": "torque_fade"}),
+        "lopsided_spring": ({"quadratic": 8.0}, {"quadratic": "quadratic"}),
+        "lugre_friction": (
+            {
+                "coulomb_torque": 2.0,
+                "bristle_stiffness": 2500.0,
+                "stribeck_torque": 1.0,
+                "stribeck_velocity": 0.03,
+                "bristle_damping": 5.0,
+            },
+            {
+                "coulomb_torque": "lugre_coulomb",
+                "bristle_stiffness": "bristle_k",
+                "stribeck_torque": "lugre_stribeck",
+                "stribeck_velocity": "stribeck_v",
+                "bristle_damping": "bristle_b",
+            },
+        ),
+        "encoder_eccentricity": (
+            {"amplitude": 8.0e-5, "cycles_per_revolution": 1.0},
+            {"amplitude": "eccentricity", "cycles_per_revolution": "eccentricity_cycles"},
+        ),
+        "current_loop_overshoot": (
+            {"time_constant": 1.0 / (2.0 * np.pi * 45.0), "overshoot": 0.4443},
+            {"time_constant": "current_time", "overshoot": "current_overshoot"},
+        ),
+        "ft_drift": (
+            {"drift": 1.0, "time_constant": 8.0},
+            {"drift": "ft_thermal", "time_constant": "ft_thermal_tau"},
+        ),
+    }
+)
+"""Effects of the catalogue that the contract's table lacks (and a drift that settles): medium parameters in
+the catalogue's units, and the values of the bench that they are."""
+
 OFF_CATALOGUE = MappingProxyType(
     {
-        "quadratic_drag": ({"quadratic_drag": 12.0}, ("damping_drift",)),
         "friction_by_angle": (
             {"angle_friction": 4.0, "angle_period": 0.015},
             ("coulomb_friction", "stribeck_friction", "load_dependent_friction", "asymmetric_friction"),
         ),
-        "command_deadband": ({"deadband": 4.0}, ("coulomb_friction",)),
         "command_rate_limit": ({"rate_limit": 2500.0}, ("current_loop_lag", "torque_saturation")),
-        "torque_constant_fade": ({"torque_fade": -0.2}, ("torque_constant_error", "ft_gain_error")),
         "quadratic_ft": ({"ft_quadratic": 0.004}, ()),
         "coarse_ft": ({"ft_quantum": 1.0}, ()),
         "impacts": ({"impact_torque": 25.0, "impact_rate": 1.5}, ()),
         "ft_random_walk": ({"ft_walk": 0.12}, ("ft_drift", "ft_bias")),
-        "lugre_friction": (
-            {
-                "bristle_k": 2500.0,
-                "bristle_b": 5.0,
-                "lugre_coulomb": 2.0,
-                "lugre_stribeck": 1.0,
-                "stribeck_v": 0.03,
-            },
-            ("coulomb_friction", "stribeck_friction", "spring_hysteresis", "load_dependent_friction"),
-        ),
-        "encoder_eccentricity": ({"eccentricity": 8.0e-5, "eccentricity_cycles": 1.0}, ()),
-        "ft_thermal": ({"ft_thermal": 1.0, "ft_thermal_tau": 8.0}, ("ft_drift", "ft_bias")),
         "ft_crosstalk": ({"ft_crosstalk": 0.35}, ()),
-        "current_overshoot": (
-            {"current_omega": 2.0 * np.pi * 45.0, "current_zeta": 0.25},
-            ("current_loop_lag", "command_delay"),
-        ),
-        "lopsided_spring": ({"quadratic": 8.0}, ("nonlinear_spring",)),
     }
 )
 """Effect outside the table: values of the bench at medium size, and effects that it can be taken for."""
@@ -95,6 +114,18 @@ def hide(bench, effect, parameters):
         values["encoder_on_chassis"] = 1.0  # the encoder reads the gear's output, its compliance is before it
     if "resonance_omega" in values:
         values["resonance_omega"] *= 2.0 * np.pi
+    return bench.having(**values)
+
+
+def hide_beside_the_contract(bench, effect, factor=1.0):
+    """Return the bench with an effect that the contract's table lacks; `factor` scales its main parameter."""
+    parameters, fields = BESIDE_THE_CONTRACT[effect]
+    main = next(iter(parameters))
+    values = {fields[n]: v * (factor if n == main else 1.0) for n, v in parameters.items() if n in fields}
+    if "current_time" in values:
+        log = np.log(values.pop("current_overshoot"))
+        values["current_omega"] = 1.0 / values.pop("current_time")
+        values["current_zeta"] = -log / np.hypot(np.pi, log)
     return bench.having(**values)
 
 

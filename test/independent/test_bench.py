@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 from independent.faults import FAULTS
-from independent.hidden import CATALOGUE, OFF_CATALOGUE, hide, hide_off_catalogue
+from independent.hidden import (
+    BESIDE_THE_CONTRACT,
+    CATALOGUE,
+    OFF_CATALOGUE,
+    hide,
+    hide_beside_the_contract,
+    hide_off_catalogue,
+)
 from independent.plant import Bench, Plant
 from independent.severities import SEVERITIES, drawn_parameters
 
@@ -68,6 +75,11 @@ def test_a_hidden_effect_shows_and_a_stronger_one_shows_more(effect):
         parameters = drawn_parameters(effect, severity, np.random.default_rng(0))
         shown.append(_change(hide(Bench(), effect, parameters)))
     assert 1.0 < shown[0] < shown[1] < shown[2]
+
+
+@pytest.mark.parametrize("effect", BESIDE_THE_CONTRACT)
+def test_an_effect_beside_the_contract_shows(effect):
+    assert _change(hide_beside_the_contract(Bench(), effect)) > 2.0
 
 
 @pytest.mark.parametrize("effect", OFF_CATALOGUE)

@@ -105,15 +105,32 @@ def test_stamps_may_count_from_any_epoch():
         ([0.0, 1.0], {"command": [1.0]}, "command has shape"),
         ([0.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "command has 3 values for 2 stamps"),
         ([0.0, 1.0, 1.0], {"command": [1.0, 2.0, 3.0]}, "t[2] = 1 s after 1 s, expected stamps that rise"),
-        ([0.0, 1.0], {"command": ["a", "b"]}, "command is not an array of numbers"),
+        ([0.0, 1.0], {"command": ["a", "b"]}, "command holds <U1, expected real numbers in N m"),
+        ([0.0, 1.0], {"command": [1.0, object()]}, "command is not an array of numbers"),
         ([0.0, 1.0], {"command": [1, 2], "u": [1, 2]}, "name a channel twice"),
         ([0.0, 1.0], {}, "no channel, expected one or more of command"),
+        ([0.0, np.nan], {"command": [1, 2]}, "t[1] = nan, expected a finite value in s"),
+        ([0.0, np.inf], {"command": [1, 2]}, "t[1] = inf, expected a finite value in s"),
+        ([0.0, 1.0], {"u": [1, np.nan]}, "command[1] = nan, expected a finite value in N m"),
+        ([0.0, 1.0], {"command": [1, -np.inf]}, "command[1] = -inf, expected a finite value in N m"),
+        ([0.0, 1.0], {"command": [1, 2j]}, "command holds complex128, expected real numbers in N m"),
+        (np.array([0, 1j]), {"command": [1, 2]}, "t holds complex128, expected real numbers in s"),
+        ([0.0, 1.0], {"position": [True, False]}, "position holds bool, expected real numbers in rad"),
+        ([0.0, 1.0], {"q": ["1", "2"]}, "q holds <U1, expected real numbers in rad"),
+        (np.array([0, 1], "m8[ms]"), {"u": [1, 2]}, "t holds timedelta64[ms], expected real numbers in s"),
+        (np.array([0, 1], "M8[s]"), {"u": [1, 2]}, "t holds datetime64[s], expected real numbers in s"),
     ],
 )
 def test_arrays_that_make_no_record_are_refused(t, channels, says):
     with pytest.raises(ChannelError) as error:
         rsea.Record.from_arrays(t, **channels)
     assert says in str(error.value)
+
+
+def test_a_masked_measurement_is_missing():
+    q = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+    record = rsea.Record.from_arrays([0.0, 1.0, 2.0], command=[0, 0, 0], q=q)
+    np.testing.assert_array_equal(record["position"].y, [1.0, np.nan, 3.0])
 
 
 def test_a_table_gives_its_columns():
@@ -158,8 +175,32 @@ def test_arguments_of_the_wrong_kind_are_named(record):
         rsea.identify([np.ones(3)], "paper_high_impedance")
     with pytest.raises(ParameterError, match="command: shape"):
         rsea.simulate("paper_high_impedance", [[1.0]])
+    with pytest.raises(ParameterError, match=r"command: shape \(\) of object, expected \(n,\) finite"):
+        rsea.simulate("paper_high_impedance", record)
+    with pytest.raises(ParameterError, match=r"of complex128, expected \(n,\) finite torques"):
+        rsea.simulate("paper_high_impedance", [1j, 2.0])
     with pytest.raises(ParameterError, match="rate = nan Hz"):
         rsea.simulate("paper_high_impedance", [1.0, 2.0], rate=float("nan"))
+
+
+def test_a_rig_may_be_given_where_its_name_is_expected():
+    rig = rsea.load_rig("paper_high_impedance")
+    assert rsea.load_rig(rig) is rig
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        (None, "rig None: expected the name of a rig, or of a YAML file"),
+        ({"name": "x"}, "rig {'name': 'x'}: expected the name of a rig"),
+        ("a\0b.yaml", r"rig 'a\x00b.yaml': expected the name of a rig"),
+        ("", "rig '' not found, expected a YAML file or one of"),
+    ],
+)
+def test_what_is_no_rig_is_refused(name, says):
+    with pytest.raises(rsea.RseaError) as error:
+        rsea.load_rig(name)
+    assert says in str(error.value)
 
 
 def test_the_catalogue_shows_equation_parameters_and_source():

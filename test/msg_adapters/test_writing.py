@@ -17,7 +17,8 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader, StoragePlugin
 
 from msg_adapters import BagWriter, TopicMap, iterate, read_record, write_record, write_records
-from rsea_ros.errors import BagError
+from msg_adapters.overlay import write_overlay
+from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.signals import Channel, Record
 
 STORAGES = ["mcap", "sqlite3"]
@@ -130,6 +131,58 @@ def test_a_type_that_nobody_knows_is_recorded_all_the_same(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         bag.write("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")
     assert list(iterate(tmp_path / "bag")) == [("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")]
+
+
+BAD_TOPICS = {
+    "a blank": TopicMap(namespace="a b"),
+    "a digit first": TopicMap(namespace="1abc"),
+    "a minus": TopicMap().renamed(["ft=left-wrist"]),
+    "a letter of another alphabet": TopicMap(namespace="\N{GREEK SMALL LETTER OMEGA}"),
+    "a slash at the end": TopicMap().renamed(["ft=/wrist/"]),
+    "a tilde": TopicMap(namespace="~bench"),
+    "too many letters": TopicMap(namespace="n" * 250),
+    "two types": TopicMap().renamed(["ft=torque_command"]),
+    "two roles": TopicMap().renamed(["joint_states=torque_command"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_TOPICS)
+def test_a_topic_that_ros_cannot_have_is_not_written(tmp_path, record, name):
+    says = r"^topic .*/.*: is (no name of ROS, expected|both \w+ and \w+, expected)"
+    with pytest.raises(BagError, match=says):
+        write_record(record, tmp_path / "bag", BAD_TOPICS[name])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_has_one_type_a_topic(tmp_path):
+    says = "/a: is std_msgs/msg/Bool and std_msgs/msg/Int8, expected one type"
+    with pytest.raises(BagError, match=says), BagWriter(tmp_path / "bag", recording=False) as bag:
+        for kind in ("Bool", "Int8"):
+            bag.write("/a", f"std_msgs/msg/{kind}", 1, BOOL)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("field", ["namespace", "ft", "joint"])
+@pytest.mark.parametrize("name", ["a\0b", "a\nb"])
+def test_a_name_that_cannot_be_printed_is_refused(field, name):
+    with pytest.raises(ParameterError, match=f"^{field} 'a.+b': cannot be printed, expected a name of ROS"):
+        TopicMap(**{field: name})
+
+
+@pytest.mark.parametrize("by", [-1e9, 3e9])
+def test_stamps_that_no_header_can_hold_are_refused(tmp_path, record, by):
+    moved = {n: Channel(c.t + by, c.y) for n, c in record.channels.items()}
+    says = r"^record: command: stamp 0 is .* s since 1970, expected 0 to 2147483648"
+    with pytest.raises(BagError, match=says):
+        write_record(Record(moved), tmp_path / "bag")
+
+
+def test_an_overlay_of_stamps_before_1970_begins_there(tmp_path, record):
+    early = replace(record, epoch_ns=-(10**18))
+    write_overlay({"/rsea": early, "/simulated": early}, tmp_path / "overlay.mcap")
+    for namespace in ("/rsea", "/simulated"):
+        got = read_record(tmp_path / "overlay.mcap", topics=TopicMap(namespace=namespace))
+        assert_same(got, replace(record, epoch_ns=0))
 
 
 def test_an_empty_recording_is_a_bag(tmp_path):

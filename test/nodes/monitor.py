@@ -6,6 +6,7 @@ from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, State
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._drive import Drive
@@ -35,6 +36,8 @@ class Monitor:
 
 class FakeMotor:
     """A device without a wire: it makes what it is told at once. broken: raised by every answer."""
+
+    protection = Protection(BUS_WATCHDOG, WATCHDOG)
 
     def __init__(self):
         self.goal, self.on, self.away, self.refusing = 0.0, False, False, ""

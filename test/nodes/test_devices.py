@@ -21,6 +21,12 @@ def test_the_default_slew_limit_limits_within_a_cycle():
     assert limits().soft_start / DEFAULTS["rate"] < 2.0
 
 
+@pytest.mark.parametrize(("rate", "cycles"), [(280.0, 3), (1000.0, 10), (100.0, 3)])
+def test_a_motor_may_be_unheard_as_long_at_any_rate(rate, cycles):
+    """Three cycles at 1 kHz are 3 ms: any stall of the line was a fault, and 1 kHz never drove."""
+    assert limits(rate=rate).lost_cycles == cycles
+
+
 def test_a_spring_with_a_free_end_is_limited_by_what_ft_measures():
     clamped, free = limits(), limits(rig="paper_moving_output", deflection_limit=0.05)
     assert (clamped.deflection, clamped.ft) == (0.0873, 110.0)

@@ -17,17 +17,10 @@ from rsea_ros.nodes._alarm import Alarm
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._publishers import Obeyed
 from rsea_ros.nodes._qos import COMMAND
+from test.nodes.clock_shim import in_python, preloaded, set_clock
 
 ROOT = Path(__file__).resolve().parents[2]
-SHIM = """
-import sys, time
-from pathlib import Path
-true, step = time.time_ns, Path(sys.argv.pop(1))
-time.time_ns = lambda: true() + int(step.read_text())
-from rsea_ros.nodes.driver import main
-sys.exit(main())
-"""
-"""A driver whose system clock is set by a file."""
+DRIVER = "import sys\nfrom rsea_ros.nodes.driver import main\nsys.exit(main())\n"
 
 
 class Shimmed:
@@ -36,11 +29,14 @@ class Shimmed:
     def __init__(self, bench, listener, folder):
         self.bench, self.listener, self.off, self.step = bench, listener, 0, folder / "step"
         self.set_clock(0)
+        self.preloaded = preloaded(folder, self.step)
+        program = DRIVER if self.preloaded else in_python() + DRIVER
         values = {**bench.parameters(), "baud": 4_000_000, "autostart": True, "joint": "left_knee"}
         words = [w for k, v in values.items() for w in ("-p", f"{k}:={str(v).lower() if v is True else v}")]
         self.process = subprocess.Popen(
-            [sys.executable, "-c", SHIM, self.step, "--ros-args", *words, "-r", "__ns:=/honest"],
-            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
+            [sys.executable, "-c", program, "--ros-args", *words, "-r", "__ns:=/honest"],
+            env={**os.environ, "PYTHONPATH": str(ROOT), "SHIMMED_CLOCK": str(self.step), **self.preloaded},
+            stdin=subprocess.DEVNULL,
         )  # fmt: skip
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = listener.hear(JointState, "/honest/joint_states", QoSProfile(depth=10))
@@ -51,9 +47,7 @@ class Shimmed:
     def set_clock(self, by):
         """Set the process's system clock by so many seconds against the true one."""
         self.off = by * 10**9
-        aside = self.step.with_suffix(".new")
-        aside.write_text(str(self.off))
-        aside.replace(self.step)
+        set_clock(self.step, self.off)
 
     def status(self):
         """The newest status."""
@@ -119,6 +113,14 @@ def test_a_system_clock_that_is_set_ends_the_torque_and_is_told(driver, step):
     driver.listener.until(lambda: "clock_step" in driver.value("fault") or "timeout" in driver.value("fault"))
     driver.listener.until(lambda: driver.value("clock_steps") == ("1" if step else "2"))
     driver.drive()
+
+
+def test_the_clock_was_set_below_every_library(driver):
+    """Else the middleware's own stamps were the true ones."""
+    if not driver.preloaded:
+        pytest.skip("no C compiler here: the clock was set in Python alone")
+    loaded = Path(f"/proc/{driver.process.pid}/maps").read_text()
+    assert driver.preloaded["LD_PRELOAD"] in loaded
 
 
 def test_a_default_subscription_hears_measurements(driver):

@@ -64,6 +64,16 @@ def test_json_names_the_cause_with_size_and_gain(diagnosed) -> None:
     assert isinstance(cause["confusable_with"], list)
 
 
+def test_json_keeps_the_noise_and_the_simulation_s_own_error_apart(diagnosed) -> None:
+    """0.25 % of the simulation made nearly every interval, and neither file nor page said so."""
+    (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
+    torque = cause["parameters"]["torque"]
+    noise = torque["statistical_ci95"][1] - torque["value"]
+    assert 0.0 < noise < torque["ci95"][1] - torque["value"]
+    assert np.hypot(noise, 1.96 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
+
+
 def test_what_is_not_a_number_is_null(diagnosed) -> None:
     unbounded = replace(
         diagnosed.diagnosis.causes[0],

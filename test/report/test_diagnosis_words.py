@@ -5,16 +5,21 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 from rich.console import Console
 
-from rsea_ros.diagnosis.result import Estimate, Misfit, Rejected
+from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis_json import diagnosis_json
 from rsea_ros.report.diagnosis_profile import BINS, Profile, profiles
+from rsea_ros.report.diagnosis_settings import settings_section
 from rsea_ros.report.diagnosis_terminal import terminal_lines
 from rsea_ros.report.diagnosis_where import finding, where_figure
 from rsea_ros.signals import Fault
@@ -41,7 +46,7 @@ def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
     d = replace(
         d,
         causes=(replace(d.causes[0], confusable_with=("stribeck_friction",)),),
-        rejected=(Rejected("backlash", 0.25, "coulomb_friction explains more"),),
+        rejected=(Rejected("backlash", 0.25, "explains_less", "coulomb_friction"),),
         faults=(Fault("frozen_samples", "ft", 0.05),),
         misfit=(Misfit("velocity", -0.1, 0.0, "rad/s", 48.0, "ft"),),
     )
@@ -52,13 +57,43 @@ def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
     assert "wrong at    speed −0.10 to 0 rad/s (48 times)" in lines
 
 
+def test_the_terminal_lists_the_fitted_rivals_with_the_largest_gains(diagnosed):
+    """Effects that were only screened came first, for their gain was not exactly zero."""
+    screened = [Rejected(n, 0.001, "far_behind", is_fitted=False) for n in ("hard_stop", "ft_drift")]
+    fitted = [Rejected(n, g, "explains_less", "coulomb_friction") for n, g in (("backlash", 0.25),
+              ("command_delay", 0.1), ("nonlinear_spring", 0.8), ("ft_bias", 0.0))]  # fmt: skip
+    lines = terminal(replace(diagnosed.diagnosis, rejected=(*screened, *fitted)))
+    rejected = [line.split()[1].rstrip(":") for line in lines if line.startswith("rejected")]
+    assert rejected == ["nonlinear_spring", "backlash", "command_delay"]
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+def test_every_reason_has_words(reason):
+    assert say.rejection(Rejected("backlash", 0.28, reason, "hard_stop"))
+
+
+def test_a_gain_that_is_too_small_is_not_said_to_be_none():
+    """Beside a gain of 28 % stood: does not lower the residual of data that it was not fitted to."""
+    assert say.rejection(Rejected("backlash", 0.28, "too_small")).startswith("lowers the residual")
+
+
+def test_json_sentence_and_page_speak_of_one_channel(diagnosed):
+    """The sentence spoke of the F/T torque where the headline spoke of the first cause's channel."""
+    d = diagnosed.diagnosis
+    assert d.channel == d.causes[0].channel
+    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in d.sentence
+    elsewhere = terminal(replace(d, channel="position"))
+    assert elsewhere[1].startswith("residual    position ")
+
+
 @pytest.mark.parametrize(
     ("estimate", "text"),
     [
-        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", "0.0030", "mrad")),
-        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", "20", "µs")),
-        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", "0.50", "N·m")),
-        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", "0.010", "")),
+        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", " ± 0.0030", "mrad")),
+        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", " ± 20", "µs")),
+        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", " ± 0.50", "N·m")),
+        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", " ± 0.010", "")),
+        (Estimate(3.0, "N m", (2.9, 4.4)), ("3.00", " −0.10/+1.4", "N·m")),
     ],
 )
 def test_small_angles_and_times_have_a_prefix(estimate, text):
@@ -119,3 +154,14 @@ def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():
         warnings.simplefilter("error")
         figure = where_figure([profile], changed=True)
     assert np.isfinite(figure.layout["yaxis"]["range"]).all()
+
+
+def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnosed):
+    changed = DiagnosisSettings(without=("ft_bias",), acceptance=AcceptanceSettings(fall=0.25))
+    diagnosis = replace(diagnosed.diagnosis, settings=changed)
+    written = diagnosis_json(diagnosis)["settings"]
+    assert (written["acceptance.fall"], written["max_causes"]) == (0.25, 4)
+    assert written["without"] == ["ft_bias"]
+    section = settings_section(changed)
+    assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
+    assert section.count("<b>") == 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from typing import TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
@@ -12,6 +13,9 @@ from rsea_ros.hardware.dynamixel.handler import PacketHandler
 from rsea_ros.hardware.dynamixel.port import Port
 from rsea_ros.hardware.dynamixel.tables import Item
 
+T = TypeVar("T")
+ATTEMPTS, PATIENCE = 5, 0.02
+"""Of a transaction outside the cycle: how often it is tried, and how late a reply may be each time, s."""
 ALERT = 0x80
 REFUSALS = {
     1: "failed", 2: "unknown instruction", 3: "CRC wrong", 4: "value out of range", 5: "length wrong",
@@ -62,6 +66,18 @@ class Bus:
         )
         self._check(f"write of {value} at {item.address}", result, error)
 
+    def patiently(self, transaction: Callable[[], T]) -> T:
+        """Return what a transaction outside the cycle returns: it has time for several attempts."""
+        usual, self.port.latency = self.port.latency, max(self.port.latency, PATIENCE)
+        try:
+            return _repeated(transaction)
+        finally:
+            self.port.latency = usual
+
+    def set(self, item: Item, value: int) -> None:
+        """Write an item outside the cycle, patiently."""
+        self.patiently(lambda: self.put(item, value))
+
     def reboot(self) -> None:
         """Reboot the motor."""
         self.handler.expected = 0
@@ -78,3 +94,13 @@ class Bus:
             self._failed["refused"] += 1
             why = REFUSALS.get(error & ~ALERT, f"error {error & ~ALERT}")
             raise Refused(f"motor ID {self._id}: {what} refused: {why}")
+
+
+def _repeated(transaction: Callable[[], T]) -> T:
+    """Return what a transaction returns, tried again when a reply is lost."""
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return transaction()
+        except NoReply:
+            continue
+    return transaction()

@@ -1,13 +1,21 @@
-"""Control tables of the motors that the driver knows, by model number. Source: facts.md section 4."""
+"""Control tables of the motors that the driver knows, by model number; the numbers are in `models/*.yaml`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
+from rsea_ros import strict_yaml
+
+FOLDER = Path(__file__).with_name("models")
+HARDWARE_ERRORS = ("voltage", "hall sensor", "overheating", "encoder", "electrical shock", "overload")
+"""Bits of the hardware error status, from bit 0 on, of every series."""
 _RPM = 2.0 * math.pi / 60.0
+_MEASURED = ("position", "velocity", "current", "voltage", "temperature")
 
 
 @dataclass(frozen=True)
@@ -29,93 +37,91 @@ class Item:
 
 
 @dataclass(frozen=True)
-class ControlTable:
-    """A motor's items, and what counts are worth: A, rad/s, and pulses per revolution.
+class TorqueConstant:
+    """Torque at the output for a current, N m/A: value, and what the sources give at least and at most."""
 
-    bus_watchdog, tick: None on the model that has none. sample: first address and size of the one read that
-    holds everything that is measured; spare: bytes more that may be read with it.
+    value: float
+    low: float
+    high: float
+    source: str
+
+    def __str__(self) -> str:
+        return f"{self.value:g} N m/A ({self.low:g} to {self.high:g}: {self.source})"
+
+
+@dataclass(frozen=True)
+class ControlTable:
+    """A motor's items, and what counts are worth: A, rad/s, and pulses per revolution of the output.
+
+    bus_watchdog, drive_mode, startup: None on a model that has none. watchdog_firmware: the first that has
+    the bus watchdog. torque_limit and goal_torque are currents, which the maker of later series calls them.
+    torque_constant: None where no source gives one.
     """
 
     model: int
     name: str
-    return_delay: Item
-    operating_mode: Item
-    torque_limit: Item
-    torque_enable: Item
-    goal_torque: Item
-    position: Item
-    velocity: Item
-    current: Item
-    voltage: Item
-    temperature: Item
-    hardware_error: Item
-    status_level: Item
-    bus_watchdog: Item | None
-    sample: tuple[int, int]
+    series: str
+    items: Mapping[str, Item]
     ampere: float
     radian_per_second: float
     pulses: int
+    torque_constant: TorqueConstant | None
+    watchdog_firmware: int = 0
 
+    def __getattr__(self, name: str) -> Item:
+        try:
+            return self.items[name]
+        except KeyError:
+            raise AttributeError(name) from None
 
-H54 = ControlTable(
-    model=54024,
-    name="H54-200-S500-R",
-    return_delay=Item(9, 1),
-    operating_mode=Item(11, 1),
-    torque_limit=Item(30, 2),
-    torque_enable=Item(562, 1),
-    goal_torque=Item(604, 2, signed=True),
-    position=Item(611, 4, signed=True),
-    velocity=Item(615, 4, signed=True),
-    current=Item(621, 2, signed=True),
-    voltage=Item(623, 2),
-    temperature=Item(625, 1),
-    hardware_error=Item(892, 1),
-    status_level=Item(891, 1),
-    bus_watchdog=None,
-    sample=(611, 15),
-    ampere=33.0 / 2048.0,
-    radian_per_second=0.00199234 * _RPM,
-    pulses=501_923,
-)
+    def optional(self, name: str) -> Item | None:
+        """Return an item, None on a model without it."""
+        return self.items.get(name)
 
+    @property
+    def sample(self) -> tuple[int, int]:
+        """First address and size of the one read that holds everything that is measured."""
+        return self.span(_MEASURED)
 
-def _second_generation(model: int, name: str) -> ControlTable:
-    return ControlTable(
-        model=model,
-        name=name,
-        return_delay=Item(9, 1),
-        operating_mode=Item(11, 1),
-        torque_limit=Item(38, 2),
-        torque_enable=Item(512, 1),
-        goal_torque=Item(550, 2, signed=True),
-        position=Item(580, 4, signed=True),
-        velocity=Item(576, 4, signed=True),
-        current=Item(574, 2, signed=True),
-        voltage=Item(592, 2),
-        temperature=Item(594, 1),
-        hardware_error=Item(518, 1),
-        status_level=Item(516, 1),
-        bus_watchdog=Item(546, 1, signed=True),
-        sample=(574, 21),
-        ampere=1e-3,
-        radian_per_second=0.01 * _RPM,
-        pulses=1_003_846,
-    )
-
-
-TABLES: Mapping[int, ControlTable] = MappingProxyType(
-    {
-        54024: H54,
-        54025: _second_generation(54025, "H54-200-S500-R(A)"),
-        2020: _second_generation(2020, "PH54-200-S500-R"),
-    }
-)
-
-HARDWARE_ERRORS = ("voltage", "hall sensor", "overheating", "encoder", "electrical shock", "overload")
-"""Bits of the hardware error status, from bit 0 on."""
+    def span(self, names: tuple[str, ...]) -> tuple[int, int]:
+        """Return first address and size of the one read that holds some items."""
+        items = [self.items[name] for name in names if name in self.items]
+        start = min(item.address for item in items)
+        return start, max(item.address + item.size for item in items) - start
 
 
 def error_names(status: int) -> str:
     """Return the names of the bits of a hardware error status."""
     return ", ".join(name for bit, name in enumerate(HARDWARE_ERRORS) if status >> bit & 1) or "none"
+
+
+def _tables() -> dict[int, ControlTable]:
+    found = {}
+    for path in sorted(FOLDER.glob("*.yaml")):
+        series = strict_yaml.read(path).content
+        items = {name: Item(at[0], at[1], at[2:] == ["signed"]) for name, at in series["items"].items()}
+        for number, body in series["models"].items():
+            found[int(number)] = _table(int(number), path.stem, items, {**series, **body})
+    return dict(sorted(found.items()))
+
+
+def _table(number: int, series: str, items: Mapping[str, Item], body: Mapping[str, Any]) -> ControlTable:
+    constant = None
+    if "torque_constant" in body:
+        value, low, high = body["torque_constant"]
+        constant = TorqueConstant(value, low, high, body["source"])
+    return ControlTable(
+        model=number,
+        name=body["name"],
+        series=series,
+        items=items,
+        ampere=body["ampere"],
+        radian_per_second=body["rpm"] * _RPM,
+        pulses=body["pulses"],
+        torque_constant=constant,
+        watchdog_firmware=body.get("watchdog_firmware", 0),
+    )
+
+
+TABLES: Mapping[int, ControlTable] = MappingProxyType(_tables())
+"""By model number."""

@@ -6,6 +6,7 @@ import os
 import secrets
 import tty
 from collections import deque
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,16 +25,16 @@ BOOT_TIME = 300_000_000
 
 
 class Bus:
-    """A line with one motor on it, at `path` (a link to the terminal).
+    """A line with motors on it, at `path` (a link to the terminal).
 
     sent: data of every reply with measurements that went out whole, as (clock in ns, address, bytes).
     """
 
-    def __init__(self, path: Path, motor: Motor, misbehaviour: Misbehaviour) -> None:
-        self._path, self._motor, self._wrong = path, motor, misbehaviour
+    def __init__(self, path: Path, motors: Sequence[Motor], misbehaviour: Misbehaviour) -> None:
+        self._path, self._motors, self._wrong = path, motors, misbehaviour
         self._listener = Listener()
         self._waiting: list[tuple[int, bytes]] = []
-        self._busy_until = 0
+        self._busy_until = [0] * len(motors)
         self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=KEPT)
         self.unknown = 0
         self.descriptor = -1
@@ -84,92 +85,117 @@ class Bus:
 
     def _answer(self, now: int, request: Request) -> None:
         self.unknown += not request.whole
-        if not request.whole or now < self._busy_until:
+        if not request.whole:
             return
-        own = self._motor.get("id")
-        if request.identity not in (own, EVERYONE):
-            return
-        single = request.identity == own
-        handlers = {PING: self._ping, READ: self._read, WRITE: self._write, REBOOT: self._reboot}
         groups = {
             SYNC_READ: self._sync_read, FAST_SYNC_READ: self._sync_read, SYNC_WRITE: self._sync_write,
             BULK_READ: self._bulk_read, FAST_BULK_READ: self._bulk_read,
         }  # fmt: skip
         if request.instruction in groups:
-            groups[request.instruction](now, request)
-        elif request.instruction in handlers:
-            handlers[request.instruction](now, request)
-        elif single:
-            self._reply(now, UNKNOWN)
+            return groups[request.instruction](now, request)
+        handlers = {PING: self._ping, READ: self._read, WRITE: self._write, REBOOT: self._reboot}
+        for motor in self._awake(now):
+            if request.identity in (motor.get("id"), EVERYONE):
+                if request.instruction in handlers:
+                    handlers[request.instruction](now, motor, request)
+                elif request.identity != EVERYONE:
+                    self._reply(now, motor, UNKNOWN)
 
-    def _ping(self, now: int, request: Request) -> None:
-        self._reply(now, 0, bytes(self._motor.memory[0:2] + self._motor.memory[6:7]))
+    def _awake(self, now: int) -> list[Motor]:
+        """Return the motors that are not booting."""
+        return [motor for motor, end in zip(self._motors, self._busy_until, strict=True) if now >= end]
 
-    def _read(self, now: int, request: Request) -> None:
+    def _named(self, now: int, identity: int) -> Motor | None:
+        return next((motor for motor in self._awake(now) if motor.get("id") == identity), None)
+
+    def _ping(self, now: int, motor: Motor, request: Request) -> None:
+        self._reply(now, motor, 0, bytes(motor.memory[0:2] + motor.memory[6:7]))
+
+    def _read(self, now: int, motor: Motor, request: Request) -> None:
         if len(request.parameters) != 4:
-            return self._reply(now, LENGTH)
+            return self._reply(now, motor, LENGTH)
         address, length = _pair(request.parameters)
-        error, data = self._motor.read(now, address, length)
-        self._reply(now, error, data, address)
+        error, data = motor.read(now, address, length)
+        self._reply(now, motor, error, data, address)
 
-    def _write(self, now: int, request: Request) -> None:
+    def _write(self, now: int, motor: Motor, request: Request) -> None:
         if len(request.parameters) < 3:
-            return self._reply(now, LENGTH)
+            return self._reply(now, motor, LENGTH)
         address = int.from_bytes(request.parameters[:2], "little")
-        error = self._motor.write(now, address, request.parameters[2:])
-        if request.identity != EVERYONE and self._motor.get("status_level") == 2:
-            self._reply(now, error)
+        error = motor.write(now, address, request.parameters[2:])
+        if request.identity != EVERYONE and motor.get("status_level") == 2:
+            self._reply(now, motor, error)
 
-    def _reboot(self, now: int, request: Request) -> None:
-        self._reply(now, 0)
-        self._busy_until = now + BOOT_TIME
-        self._motor.reboot(now)
+    def _reboot(self, now: int, motor: Motor, request: Request) -> None:
+        self._reply(now, motor, 0)
+        self._busy_until[self._motors.index(motor)] = now + BOOT_TIME
+        motor.reboot(now)
 
     def _sync_read(self, now: int, request: Request) -> None:
         address, length = _pair(request.parameters)
-        if self._motor.get("id") in request.parameters[4:]:
-            self._group(now, request, address, length, fast=request.instruction == FAST_SYNC_READ)
+        wanted = [(identity, address, length) for identity in request.parameters[4:]]
+        self._group(now, wanted, fast=request.instruction == FAST_SYNC_READ)
 
     def _bulk_read(self, now: int, request: Request) -> None:
-        for at in range(0, len(request.parameters) - 4, 5):
-            if request.parameters[at] == self._motor.get("id"):
-                address, length = _pair(request.parameters[at + 1 : at + 5])
-                self._group(now, request, address, length, fast=request.instruction == FAST_BULK_READ)
+        blocks = [request.parameters[at : at + 5] for at in range(0, len(request.parameters) - 4, 5)]
+        wanted = [(block[0], *_pair(block[1:])) for block in blocks]
+        self._group(now, wanted, fast=request.instruction == FAST_BULK_READ)
 
-    def _group(self, now: int, request: Request, address: int, length: int, *, fast: bool) -> None:
-        error, data = self._motor.read(now, address, length)
-        if not fast:
-            return self._reply(now, error, data, address)
-        size = len(data) + 5
+    def _group(self, now: int, wanted: Sequence[tuple[int, int, int]], *, fast: bool) -> None:
+        """Answer in the order of the request: each with a packet of its own, or all in one.
+
+        A motor that does not answer ends a joint packet: those behind it wait for its part.
+        """
+        parts = []
+        for identity, address, length in wanted:
+            motor = self._named(now, identity)
+            if motor is None:
+                break
+            error, data = motor.read(now, address, length)
+            if fast:
+                parts.append((motor, address, bytes((_error(motor, error), identity)) + data))
+            else:
+                self._reply(now, motor, error, data, address)
+        if fast and len(parts) == len(wanted):
+            self._joint(now, parts)
+
+    def _joint(self, now: int, parts: Sequence[tuple[Motor, int, bytes]]) -> None:
+        """Send the joint reply: error, ID, data and the CRC of all before it, of each motor."""
+        size = 1 + sum(len(part) + 2 for _, _, part in parts)
         packet = bytes((0xFF, 0xFF, 0xFD, 0, EVERYONE, size & 255, size >> 8, 0x55))
-        packet += bytes((self._error(error), self._motor.get("id"))) + data
-        remainder = checksum(packet)
-        self._send(now, packet + bytes((remainder & 255, remainder >> 8)), address, data)
+        for _, _, part in parts:
+            packet += part
+            remainder = checksum(packet)
+            packet += bytes((remainder & 255, remainder >> 8))
+        motor, address, part = parts[0]
+        self._send(now, motor, packet, address, part[2:])
 
     def _sync_write(self, now: int, request: Request) -> None:
         address, length = _pair(request.parameters)
         items = request.parameters[4:]
         for at in range(0, len(items) - length, length + 1):
-            if items[at] == self._motor.get("id"):
-                self._motor.write(now, address, items[at + 1 : at + 1 + length])
+            motor = self._named(now, items[at])
+            if motor is not None:
+                motor.write(now, address, items[at + 1 : at + 1 + length])
 
-    def _error(self, error: int) -> int:
-        return error | (0x80 if self._motor.alert else 0)
-
-    def _reply(self, now: int, error: int, data: bytes = b"", address: int = -1) -> None:
-        own = self._motor.get("id")
+    def _reply(self, now: int, motor: Motor, error: int, data: bytes = b"", address: int = -1) -> None:
         escaped = not self._wrong.happens("unstuffed")
-        self._send(now, status(own, self._error(error), data, escaped=escaped), address, data)
+        packet = status(motor.get("id"), _error(motor, error), data, escaped=escaped)
+        self._send(now, motor, packet, address, data)
 
-    def _send(self, now: int, packet: bytes, address: int, data: bytes) -> None:
+    def _send(self, now: int, motor: Motor, packet: bytes, address: int, data: bytes) -> None:
         packet = self._wrong.damaged(packet)
-        when = now + self._motor.get("return_delay") * RETURN_DELAY_UNIT
+        when = now + motor.get("return_delay") * RETURN_DELAY_UNIT
         if self._wrong.happens("delay"):
             when += round(self._wrong.late * 1e9)
         if packet:
             self._waiting.append((when, packet))
         if packet and address >= 0:
             self.sent.append((now, address, data))
+
+
+def _error(motor: Motor, error: int) -> int:
+    return error | (0x80 if motor.alert else 0)
 
 
 def _pair(parameters: bytes) -> tuple[int, int]:

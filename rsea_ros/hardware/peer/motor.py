@@ -14,6 +14,7 @@ TORQUE_MODE = 0
 WATCHDOG_UNIT = 20_000_000
 """ns"""
 TRIPPED = -1
+FIRMWARE = 45
 KEPT = 60_000
 """Entries of each log: a minute at 1 kHz. A bench that runs for days does not grow."""
 
@@ -29,21 +30,21 @@ class Plant(Protocol):
 
 
 class Motor:
-    """One motor. torque_constant: N m at the gear output per A. origin: counts where the plant is at 0 rad.
+    """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
     history: every change of the torque that acts, as (clock in ns, goal in counts, whether torque is on).
     """
 
-    def __init__(self, number: int, plant: Plant, torque_constant: float, origin: int = 1234) -> None:
+    def __init__(self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234) -> None:
         self.model, self._plant = MODELS[number], plant
-        self._constant, self._origin = torque_constant, origin
+        self._constant, self._origin = torque_constant or self.model.constant, origin
         self.memory = bytearray(TABLE_SIZE)
         self.history: deque[tuple[int, int, bool]] = deque(maxlen=KEPT)
         self._touched = 0
         for name, register in self.model.registers.items():
             self.put(name, register.start)
         self.memory[0:2] = number.to_bytes(2, "little")
-        self.memory[6] = 38
+        self.memory[6] = FIRMWARE
 
     def get(self, name: str) -> int:
         """Return an item, signed."""
@@ -140,7 +141,8 @@ class Motor:
     def _measure(self, now: int) -> None:
         state = self._plant.read()
         model = self.model
-        self.put("position", self._origin + round(state.position / (2 * math.pi) * model.counts_per_turn))
+        counts = round(state.position / (2 * math.pi) * model.counts_per_turn)
+        self.put("position", self._origin + self.get("homing_offset") + counts)
         self.put("velocity", round(state.velocity / model.radian_per_second))
         self.put("current", round(state.motor_torque / self._constant / model.ampere))
         if "tick" in model.registers:

@@ -23,13 +23,17 @@ class Register:
 
 @dataclass(frozen=True)
 class Model:
-    """A motor: its number, its items by name, and what a count is worth in A, rad/s and rad."""
+    """A motor: its number, its items by name, and what a count is worth in A, rad/s and rad.
+
+    constant: N m at the output per A, as this motor has it.
+    """
 
     number: int
     registers: dict[str, Register]
     ampere: float
     radian_per_second: float
     counts_per_turn: int
+    constant: float = 6.826
 
 
 _RPM = 2.0 * 3.141592653589793 / 60.0
@@ -39,6 +43,10 @@ _PRO = {
     "baud": Register(8, 1, EEPROM, 0, 8, 3),
     "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
     "mode": Register(11, 1, EEPROM, 0, 4, 3),
+    "homing_offset": Register(13, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
+    "temperature_limit": Register(21, 1, EEPROM, 0, 100, 80),
+    "max_voltage": Register(22, 2, EEPROM, 0, 400, 400),
+    "min_voltage": Register(24, 2, EEPROM, 0, 400, 150),
     "torque_limit": Register(30, 2, EEPROM, 0, 1860, 620),
     "shutdown": Register(48, 1, EEPROM, 0, 63, 58),
     "torque_enable": Register(562, 1, RAM, 0, 1),
@@ -56,8 +64,14 @@ _PRO_A = {
     "id": Register(7, 1, EEPROM, 0, 252, 1),
     "baud": Register(8, 1, EEPROM, 0, 9, 3),
     "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
+    "drive_mode": Register(10, 1, EEPROM, 0, 13),
     "mode": Register(11, 1, EEPROM, 0, 16, 3),
+    "homing_offset": Register(20, 4, EEPROM, -(2**31), 2**31 - 1, signed=True),
+    "temperature_limit": Register(31, 1, EEPROM, 0, 100, 80),
+    "max_voltage": Register(32, 2, EEPROM, 150, 350, 350),
+    "min_voltage": Register(34, 2, EEPROM, 150, 350, 150),
     "torque_limit": Register(38, 2, EEPROM, 0, 22740, 22740),
+    "startup": Register(60, 1, EEPROM, 0, 3),
     "shutdown": Register(63, 1, EEPROM, 0, 63, 58),
     "torque_enable": Register(512, 1, RAM, 0, 1),
     "status_level": Register(516, 1, RAM, 0, 2, 2),
@@ -72,8 +86,62 @@ _PRO_A = {
     "temperature": Register(594, 1, READ_ONLY, start=32),
 }
 
-MODELS = {
-    54024: Model(54024, _PRO, 33.0 / 2048.0, 0.00199234 * _RPM, 501_923),
-    54025: Model(54025, _PRO_A, 1e-3, 0.01 * _RPM, 1_003_846),
-    2020: Model(2020, _PRO_A, 1e-3, 0.01 * _RPM, 1_003_846),
-}
+
+def _x(current: int, voltage: tuple[int, int, int]) -> dict[str, Register]:
+    """Return the table of an X motor: its largest current; lowest, highest and present voltage, 0.1 V."""
+    low, high, now = voltage
+    return {
+        "id": Register(7, 1, EEPROM, 0, 252, 1),
+        "baud": Register(8, 1, EEPROM, 0, 7, 1),
+        "return_delay": Register(9, 1, EEPROM, 0, 254, 250),
+        "drive_mode": Register(10, 1, EEPROM, 0, 13),
+        "mode": Register(11, 1, EEPROM, 0, 16, 3),
+        "homing_offset": Register(20, 4, EEPROM, -1_044_479, 1_044_479, signed=True),
+        "temperature_limit": Register(31, 1, EEPROM, 0, 100, 80),
+        "max_voltage": Register(32, 2, EEPROM, low, high, high),
+        "min_voltage": Register(34, 2, EEPROM, low, high, low),
+        "torque_limit": Register(38, 2, EEPROM, 0, current, current),
+        "startup": Register(60, 1, EEPROM, 0, 3),
+        "shutdown": Register(63, 1, EEPROM, 0, 63, 52),
+        "torque_enable": Register(64, 1, RAM, 0, 1),
+        "status_level": Register(68, 1, RAM, 0, 2, 2),
+        "hardware_error": Register(70, 1, READ_ONLY),
+        "watchdog": Register(98, 1, RAM, 0, 127, signed=True),
+        "goal": Register(102, 2, RAM, -current, current, signed=True),
+        "tick": Register(120, 2, READ_ONLY),
+        "current": Register(126, 2, READ_ONLY, signed=True),
+        "velocity": Register(128, 4, READ_ONLY, signed=True),
+        "position": Register(132, 4, READ_ONLY, signed=True),
+        "voltage": Register(144, 2, READ_ONLY, start=now),
+        "temperature": Register(146, 1, READ_ONLY, start=32),
+    }
+
+
+_V12, _V24 = (95, 160, 120), (110, 300, 240)
+"""Lowest, highest and present voltage, 0.1 V."""
+
+
+def _models() -> dict[int, Model]:
+    """Return every motor of the X and P series and the Pro, with the constant that a count is worth."""
+    made = {54024: Model(54024, _PRO, 33.0 / 2048.0, 0.00199234 * _RPM, 501_923)}
+    for number, turn, constant in (
+        (2000, 607_500, 9.143), (2010, 1_003_846, 6.424), (2020, 1_003_846, 6.826), (2100, 526_374, 2.8),
+        (2110, 502_834, 6.724), (2120, 502_834, 5.771), (43289, 526_374, 2.8), (46097, 502_834, 6.724),
+        (46353, 502_834, 5.771), (51201, 607_500, 9.143), (53769, 1_003_846, 6.424),
+        (54025, 1_003_846, 6.826),
+    ):  # fmt: skip
+        made[number] = Model(number, _PRO_A, 1e-3, 0.01 * _RPM, turn, constant)
+    for number, unit, current, voltage, constant in (
+        (1000, 2.69e-3, 648, _V12, 2.615), (1010, 2.69e-3, 648, _V12, 1.923),
+        (1020, 2.69e-3, 1193, _V12, 1.783), (1030, 2.69e-3, 1193, _V12, 1.304),
+        (1040, 1.34e-3, 689, _V24, 4.714), (1050, 1.34e-3, 689, _V24, 3.714),
+        (1100, 2.69e-3, 2047, _V12, 2.020), (1110, 2.69e-3, 2047, _V12, 1.449),
+        (1120, 2.69e-3, 2047, _V12, 2.409), (1130, 2.69e-3, 2047, _V12, 1.659),
+        (1140, 2.69e-3, 2047, _V24, 3.833), (1150, 2.69e-3, 2047, _V24, 2.667),
+        (1170, 2.69e-3, 2047, _V12, 1.939), (1180, 2.69e-3, 2047, _V12, 1.408),
+    ):  # fmt: skip
+        made[number] = Model(number, _x(current, voltage), unit, 0.229 * _RPM, 4096, constant)
+    return made
+
+
+MODELS = _models()

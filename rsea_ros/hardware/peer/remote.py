@@ -46,9 +46,16 @@ class RemoteBench:
             "ft_port": self.ft_port, "ft_page_port": self.page_port,
         }  # fmt: skip
 
-    def hurry(self, priority: int) -> None:
-        """Let it answer at SCHED_FIFO: it stands for hardware, which has processors of its own."""
-        os.sched_setscheduler(self._process.pid, os.SCHED_FIFO, os.sched_param(priority))
+    def hurry(self, priority: int = 50) -> bool:
+        """Let it answer at SCHED_FIFO: it stands for hardware, which has processors of its own.
+
+        Return whether that is permitted.
+        """
+        try:
+            os.sched_setscheduler(self._process.pid, os.SCHED_FIFO, os.sched_param(priority))
+        except PermissionError:
+            return False
+        return True
 
     def ask(self, do: str, **values: object) -> dict[str, Any]:
         """Send a request and return its answer. Raises DeviceError for one that it cannot do."""
@@ -65,10 +72,15 @@ class RemoteBench:
         result: dict[str, Any] = self.ask("log", since=since)["result"]
         return result
 
-    def torque(self) -> tuple[int, bool]:
-        """Return the goal in counts and whether torque is on."""
-        goal, on = self.ask("torque")["result"]
+    def torque(self, motor: int = 0) -> tuple[int, bool]:
+        """Return the goal in counts and whether torque is on, of a motor by its place on the line."""
+        goal, on = self.ask("torque", motor=motor)["result"]
         return int(goal), bool(on)
+
+    def stood_still(self, since: int) -> float:
+        """Return for how long the bench itself was held up at most since an instant, ms."""
+        pauses = self.ask("pauses", since=since)["result"]
+        return max((length for _, length in pauses), default=0) / 1e6
 
     def close(self) -> None:
         """End the process."""

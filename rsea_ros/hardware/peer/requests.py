@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import SATURATED, ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import Motor
+from rsea_ros.hardware.peer.motor import KEPT, Motor
 
 Request = Mapping[str, Any]
 LOWEST_VOLTAGE, VOLTAGE_ERROR = 18.0, 1
@@ -21,22 +22,35 @@ class LineRequests:
     """`{"do": NAME, …}`; the answer has `t`, the clock (ns) at which it was done, or `error`.
 
     misbehave (fields of Misbehaviour), set (items of the control table), alert (bits), sag (voltage in V),
-    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model (number), watch (keep F/T records),
-    torque (goal, whether it is on), log, quit.
+    vanish, appear, ft_gap (records), ft_restart, ft_status (bits), model, firmware (number),
+    watch (keep F/T records), torque (goal, whether it is on), log, pauses, quit.
+
+    pauses: when the bench itself was held up until, and for how long, ns. `motor` in any request: its place
+    on the line, 0 where it is not said.
     """
 
     def __init__(
-        self, motor: Motor, bus: Bus, sensor: ForceSensor, wrong: Misbehaviour, inlet: int, outlet: int
+        self,
+        motors: Sequence[Motor],
+        bus: Bus,
+        sensor: ForceSensor,
+        wrong: Misbehaviour,
+        inlet: int,
+        outlet: int,
     ) -> None:
-        self._motor, self._bus, self._sensor, self._wrong = motor, bus, sensor, wrong
+        self._motors, self._motor = motors, motors[0]
+        self._bus, self._sensor, self._wrong = bus, sensor, wrong
         self.descriptor, self._outlet, self._text = inlet, outlet, b""
+        self.pauses: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._does: dict[str, Callable[[int, Request], object]] = {
             "misbehave": self._misbehave, "set": self._set, "alert": self._alert, "sag": self._sag,
             "vanish": lambda now, r: bus.vanish(), "appear": lambda now, r: bus.appear(),
             "ft_gap": lambda now, r: sensor.gap(int(r["records"])),
             "ft_restart": lambda now, r: sensor.restart(),
-            "ft_status": self._ft_status, "model": self._model, "watch": self._watch, "log": self._log,
-            "torque": lambda now, r: [motor.get("goal"), bool(motor.get("torque_enable"))],
+            "ft_status": self._ft_status, "model": self._model, "firmware": self._firmware,
+            "watch": self._watch, "log": self._log,
+            "pauses": lambda now, r: [pause for pause in self.pauses if pause[0] >= int(r.get("since", 0))],
+            "torque": lambda now, r: [self._motor.get("goal"), bool(self._motor.get("torque_enable"))],
         }  # fmt: skip
 
     def serve(self, now: int) -> bool:
@@ -61,8 +75,9 @@ class LineRequests:
             request = json.loads(line)
             if request["do"] == "quit":
                 return None
+            self._motor = self._motors[int(request.pop("motor", 0))]
             return {"t": now, "result": self._does[request["do"]](now, request)}
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
             known = ", ".join(self._does)
             return {"error": f"{line.decode(errors='replace')}: {error!r}, expected one of {known}, quit"}
 
@@ -91,6 +106,9 @@ class LineRequests:
     def _model(self, now: int, request: Request) -> None:
         """Answer pings with another model number; the table stays."""
         self._motor.memory[0:2] = int(request["number"]).to_bytes(2, "little")
+
+    def _firmware(self, now: int, request: Request) -> None:
+        self._motor.memory[6] = int(request["number"])
 
     def _watch(self, now: int, request: Request) -> None:
         self._sensor.keep = bool(request.get("on", True))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import select
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.motor import Motor, Plant
 
+STILL = 10_000_000
+"""ns between two turns from which on the bench itself was held up: it turns at least every TICK."""
 TICK = 5_000_000
 """ns; the plant's steps until now are worked off whenever somebody looks, and at least so often."""
 
@@ -19,33 +22,51 @@ class Requests(Protocol):
     """Where requests come from."""
 
     descriptor: int
+    pauses: deque[tuple[int, int]]
 
     def serve(self, now: int) -> bool:
         """Do what is asked; return False when the bench shall end."""
 
 
 class Station:
-    """Runs until its requests say so. Clocks are monotonic, ns."""
+    """Runs until its requests say so. Clocks are monotonic, ns.
 
-    def __init__(self, plant: Plant, motor: Motor, bus: Bus, sensor: ForceSensor, requests: Requests) -> None:
-        self._plant, self._motor, self._bus, self._sensor = plant, motor, bus, sensor
+    Where the machine holds it up, it notes in the requests' `pauses` when that ended and how long it was: a
+    motor does not stand still, and what came late then is not the driver's.
+    """
+
+    def __init__(
+        self,
+        plants: Sequence[Plant],
+        motors: Sequence[Motor],
+        bus: Bus,
+        sensor: ForceSensor,
+        requests: Requests,
+    ) -> None:
+        self._plants, self._motors, self._bus, self._sensor = plants, motors, bus, sensor
         self._requests = requests
         self._tick = 0
 
     def run(self, clock: Callable[[], int] = time.monotonic_ns) -> None:
         """Serve everybody."""
+        turned = clock()
         while True:
             ready = self._wait(clock)
             now = clock()
+            if now - turned > STILL:
+                self._requests.pauses.append((now, now - turned))
+            turned = now
             if self._bus.descriptor in ready:
                 self._bus.serve(now)
             if self._sensor.descriptor in ready:
                 self._sensor.serve(now)
             advanced = self._sensor.tick(now)
             self._bus.flush(now)
-            self._motor.serve(now)
-            if now >= self._tick and not advanced:
-                self._plant.read()
+            for motor in self._motors:
+                motor.serve(now)
+            if now >= self._tick and not (advanced and len(self._plants) == 1):
+                for plant in self._plants:
+                    plant.read()
                 advanced = True
             if advanced:
                 self._tick = now + TICK

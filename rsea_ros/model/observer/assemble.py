@@ -9,11 +9,12 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, Model, State, disturbance
-from rsea_ros.model.observer.linear import linear_model, structured
+from rsea_ros.model.observer.linear import linear_model
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build
 from rsea_ros.model.step import Calls
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import FloatArray
 
 _GEAR = int(st.Port.GEAR)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.outputs import Output
@@ -60,15 +59,6 @@ def linear_model(rig: Rig) -> LinearModel:
     half = n // 2
     start = np.array([ANGLE] * half + [SPEED] * half + [0.0] + [ANGLE] * zero)
     return LinearModel(a, block, estimated, torques, start)
-
-
-def structured(rig: Rig) -> Rig:
-    """Return the rig with what its effects change of its structure (a gear or a base that gives)."""
-    for setting in rig.effects:
-        effect = effect_named(setting.name)
-        if effect.structure is not None:
-            rig = effect.structure(rig, setting.parameters)
-    return rig
 
 
 def _rows(system: StateSpace, output: Output) -> tuple[FloatArray, FloatArray]:

@@ -292,6 +292,8 @@ def test_values_of_a_map_are_refused_with_their_line(files, line):
     ("old", "new", "message"),
     [
         ("scale: 6.8", "scale: .nan", r"line 5: channels.command\[0\].scale is nan, expected a number"),
+        ("scale: 6.8", "scale: 0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
+        ("scale: 6.8", "scale: -0.0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
         ("scale: 6.8", "scale: .inf", r"line 5: channels.command\[0\].scale is inf, expected a number"),
         ("scale: 6.8", "scale: 0x10", r"line 5: channels.command.0.scale: '0x10' is hexadecimal"),
         ("scale: 6.8", "scale: true", r"line 5: channels.command\[0\].scale is True, expected a number"),

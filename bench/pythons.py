@@ -1,0 +1,94 @@
+"""Every supported Python: the locked environment, the wheel and the suite's fast part on each.
+
+    python bench/pythons.py                    all that this machine has of 3.10 to 3.14
+    python bench/pythons.py --only 3.13
+
+Nodes are left out: the wheels of ROS 2 come for one Python. A version that is missing here counts as untried.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+VERSIONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
+FAST = (
+    "test_units.py", "test_strict_yaml.py", "test_stamps.py", "test_imports.py",
+    "effects", "model", "library", "checks", "msg_adapters",
+)  # fmt: skip
+NODES = re.compile(r"rclpy|msg_adapters\.ros|rsea_ros\.nodes")
+USE = "import rsea_ros as rsea; rsea.simulate('paper_high_impedance', [0.0, 1.0] * 300, rate=280.0)"
+
+
+def main() -> int:
+    """Try each version and print a line for it; status 1 when one fails."""
+    formatter = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
+    parser.add_argument("--only", nargs="+", choices=VERSIONS, default=list(VERSIONS))
+    results = [tried(version) for version in parser.parse_args().only]
+    return 1 if "failed" in results else 0
+
+
+def tried(version: str) -> str:
+    """Try a version, print what became of it, and return passed, failed or untried."""
+    interpreter = interpreter_of(version)
+    if interpreter is None:
+        print(f"{version}: untried, this machine has none")
+        return "untried"
+    begun = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        failed = next((name for name, command in steps(interpreter, Path(folder)) if not runs(command)), None)
+    took = f"{time.monotonic() - begun:.0f} s"
+    print(f"{version}: {f'failed at: {failed}' if failed else 'passed'} ({took})", flush=True)
+    return "failed" if failed else "passed"
+
+
+def interpreter_of(version: str) -> str | None:
+    """Return a command that is this version, of the PATH or of pyenv."""
+    names = [f"python{version}", *map(str, Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
+    code = f"import sys; sys.exit('{version}' != '%d.%d' % sys.version_info[:2])"
+    return next((name for name in names if runs([name, "-c", code], show=False)), None)
+
+
+def steps(interpreter: str, folder: Path) -> list[tuple[str, list[str]]]:
+    """Return name and command of each step, in a folder of their own."""
+    source = folder / "source"
+    python = str(folder / "environment" / "bin" / "python")
+    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    return [
+        ("environment", [interpreter, "-m", "venv", str(folder / "environment")]),
+        ("lock", [*pip, "--require-hashes", "-r", str(ROOT / "requirements.lock")]),
+        ("source", ["sh", "-c", f"mkdir {source} && git -C {ROOT} archive HEAD | tar -x -C {source}"]),
+        ("wheel", [*pip, "--no-deps", str(source)]),
+        ("use of the wheel", ["sh", "-c", f'cd {folder} && {python} -c "{USE}"']),
+        ("tests", ["sh", "-c", f"cd {source} && {python} -m pytest -q -x -n 2 {' '.join(fast_tests())}"]),
+    ]
+
+
+def fast_tests() -> list[str]:
+    """Return the test files of the fast part that need no ROS, relative to the root."""
+    parts = [ROOT / "test" / name for name in FAST]
+    files = [f for part in parts for f in ([part] if part.is_file() else sorted(part.rglob("test_*.py")))]
+    without_ros = (f for f in files if not NODES.search(f.read_text(encoding="utf-8")))
+    return [str(f.relative_to(ROOT)) for f in without_ros]
+
+
+def runs(command: list[str], *, show: bool = True) -> bool:
+    """Run a command and tell whether it succeeded; show the end of what a failed one wrote."""
+    try:
+        done = subprocess.run(command, capture_output=True, text=True)
+    except FileNotFoundError:
+        return False
+    if done.returncode and show:
+        print(f"{done.stdout[-1500:]}{done.stderr[-1500:]}", file=sys.stderr)
+    return done.returncode == 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""The docs site: `.ci/docs` builds it, warnings are errors. Pages that follow from the code are made here."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from rsea_ros import DOOR  # noqa: E402
+from rsea_ros.effects._page import EffectPage  # noqa: E402
+from rsea_ros.effects.catalogue import catalogue  # noqa: E402
+
+project = "rsea_ros"
+author = "The rsea_ros founders"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_copybutton"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+html_theme = "furo"
+html_title = "rsea_ros"
+exclude_patterns = ["figures"]
+autodoc_typehints = "description"
+autodoc_member_order = "bysource"
+suppress_warnings = ["myst.xref_missing"]
+"""Links to files of the repository beside the docs, such as SECURITY.md, lead nowhere on the site."""
+
+
+def effects_page() -> str:
+    """Return the catalogue: meaning, equation, parameters and source of each effect."""
+    parts = ["# The effects", "", "What a diagnosis can name. `rsea effects NAME` shows the same.", ""]
+    for name, effect in sorted(catalogue().items()):
+        page = EffectPage(effect)
+        rows = [
+            f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} |"
+            for p in page.parameters.values()
+        ]
+        alike = ", ".join(f"[`{n}`](#{n.replace('_', '-')})" for n in effect.claims.confusable_with)
+        parts += [
+            f"## {name}", "", f"{effect.about[:1].upper()}{effect.about[1:]}.", "",
+            "```text", effect.equation, "```", "",
+            "| parameter | unit | typical | vanishes at | fitted within |", "|---|---|---|---|---|",
+            *rows, "",
+            *([f"May be confused with {alike}.", ""] if alike else []),
+            prose(page.description), "",
+        ]  # fmt: skip
+    return "\n".join(parts)
+
+
+def prose(docstring: str) -> str:
+    """Return a docstring as Markdown: indented lines stay as they are, the rest is plain text."""
+    lines = docstring.splitlines()
+    return "\n".join(s if s.startswith("    ") else re.sub(r"([*_<>|$\[\]`\\])", r"\\\1", s) for s in lines)
+
+
+def api_page() -> str:
+    """Return the reference of the door: every name that `import rsea_ros` offers."""
+    parts = ["# Python API", "", "Everything that `import rsea_ros as rsea` offers.", ""]
+    for name, module in DOOR.items():
+        if name == "effects":
+            parts += ["## effects", "", "A mapping of the [catalogue](effects.md) by name.", ""]
+            continue
+        kind = "autofunction" if name[0].islower() else "autoclass"
+        members = [":members:"] if kind == "autoclass" else []
+        parts += [f"## {name}", "", "```{eval-rst}", f".. {kind}:: rsea_ros.{module}.{name}",
+                  *(f"   {m}" for m in members), "```", ""]  # fmt: skip
+    return "\n".join(parts)
+
+
+def decisions_page() -> str:
+    """Return the list of decisions."""
+    names = sorted(path.stem for path in (ROOT / "docs" / "decisions").glob("0*.md"))
+    return "\n".join(["# Decisions", "", "```{toctree}", ":maxdepth: 1", "", *names, "```", ""])
+
+
+PAGES = {"effects.md": effects_page, "api.md": api_page, "decisions/index.md": decisions_page}
+
+
+def write_pages(app: object) -> None:
+    """Write the pages that follow from the code beside the others."""
+    for name, text in PAGES.items():
+        path = ROOT / "docs" / name
+        content = text()
+        if not path.exists() or path.read_text(encoding="utf-8") != content:
+            path.write_text(content, encoding="utf-8")
+
+
+def setup(app: object) -> None:
+    """Have the pages written before Sphinx looks for sources."""
+    write_pages(app)

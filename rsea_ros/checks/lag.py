@@ -1,0 +1,104 @@
+"""How late a channel comes against the rig's simulation, where that is more than phases can tell: seconds.
+
+The lag at which measured and predicted values agree best, by their correlation within +-2 s. It counts only
+where no other lag does nearly as well: a periodic command has many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+
+from rsea_ros.checks.expected import Side
+from rsea_ros.checks.finding import Finding
+from rsea_ros.signals import Channel, FloatArray, Record
+
+REACH = 2.0
+"""s, either way."""
+NEAR = 0.05
+"""s. Smaller lags are found by their phases (shape.py, linear.py), and another rig's response looks so."""
+_PEAK = 0.5
+"""Correlation that the best lag must reach."""
+_BESIDE = 0.7
+"""Of the best correlation: what other lags reach, none included, must be less."""
+_AROUND = 0.1
+"""s about the best lag that belongs to its peak."""
+_TOGETHER = 0.02
+"""s. Channels whose lags lie so close share one."""
+_SHORTEST = 4.0
+"""Times the reach, down to which a record lasts long enough for all of it."""
+
+
+def lags(compared: Mapping[str, Side]) -> dict[str, float]:
+    """Return the lag of every channel that clearly comes later (positive) or earlier than predicted, s."""
+    found = {n: lag_of(side) for n, side in compared.items()}
+    return {n: lag for n, lag in found.items() if abs(lag) > NEAR}
+
+
+def lag_of(side: Side) -> float:
+    """Return how much later than predicted a channel comes, s; 0 where no single lag stands out."""
+    period = float(np.median(np.diff(side.t)))
+    even = np.arange(side.t[0], side.t[-1], period)
+    if len(even) < 64:
+        return 0.0
+    reach = min(REACH, period * len(even) / _SHORTEST)
+    y, p = (np.interp(even, side.t, v) for v in (side.y, side.p))
+    lag, alike = _correlation(y, p, period, reach)
+    best = int(np.argmax(alike))
+    aside = alike[np.abs(lag - lag[best]) > _AROUND]
+    unclear = abs(lag[best]) <= NEAR or alike[best] < _PEAK or len(aside) == 0
+    return 0.0 if unclear or aside.max() > _BESIDE * alike[best] else float(lag[best])
+
+
+def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Return lags (s) within the reach, and the size of the correlation of y with p so much earlier."""
+    y, p = y - y.mean(), p - p.mean()
+    most = int(reach / period)
+    size = next_fast_len(len(y) + most)
+    both = irfft(rfft(y, size) * rfft(p, size).conj(), size)
+    alike = np.abs(np.concatenate([both[-most:], both[: most + 1]]))
+    scale = float(np.linalg.norm(y) * np.linalg.norm(p))
+    lag = period * np.arange(-most, most + 1, dtype=np.float64)
+    return lag, np.asarray(alike / max(scale, 1e-300))
+
+
+def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
+    """Return a finding for each lag, one for the command where all of so many channels share it."""
+    all_of_them = shared(found, channels)
+    off = {"command": -all_of_them} if all_of_them else found
+    against = "all that was measured" if all_of_them else "the command"
+    return [
+        Finding(
+            "red",
+            "clock_offset",
+            name,
+            late,
+            "s",
+            expected="0",
+            detail=f"stamped {abs(late):.3g} s {'late' if late > 0.0 else 'early'} against {against}",
+            remedy=f"stamp all by one clock, or move these stamps with --shift {name}={-late:.4g}",
+        )
+        for name, late in off.items()
+    ]
+
+
+def shared(found: Mapping[str, float], channels: int) -> float:
+    """Return the lag that all of so many channels share, s: the command's stamps are off; 0 for none.
+
+    The motor torque, where it is measured, repeats the command and tells it best.
+    """
+    values = list(found.values())
+    together = len(values) == channels and len(values) > 0 and max(values) - min(values) <= _TOGETHER
+    return found.get("motor_torque", float(np.median(values))) if together else 0.0
+
+
+def in_step(record: Record, found: Mapping[str, float]) -> Record:
+    """Return the record with the stamps of some channels so much (s) earlier, within the commands."""
+    moved = {n: Channel(record[n].t - lag, record[n].y) for n, lag in found.items()}
+    record = record.with_channels(**moved)
+    begin = max(c.t[0] for c in record.channels.values() if len(c))
+    end = min(c.t[-1] for c in record.channels.values() if len(c))
+    return replace(record.between(float(begin), float(end)), faults=record.faults)

@@ -1,0 +1,99 @@
+"""The graph of launch/graph.yaml: which nodes a launch starts, and with which parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rsea_ros import strict_yaml
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig_file import rig_folders
+from rsea_ros.wording import did_you_mean, listed
+
+
+@dataclass(frozen=True)
+class NodeCall:
+    """A node to start. parameters win over the parameter file."""
+
+    name: str
+    namespace: str
+    file: Path
+    parameters: Mapping[str, str]
+
+    @property
+    def arguments(self) -> list[str]:
+        """The ROS arguments of the process."""
+        given = [word for name, value in self.parameters.items() for word in ("-p", f"{name}:={value}")]
+        namespace = f"__ns:=/{self.namespace.strip('/')}"
+        return ["--ros-args", "-r", namespace, "--params-file", str(self.file), *given]
+
+
+def graph_names() -> Sequence[str]:
+    """Return the names of the graphs: simulation, hardware, replay."""
+    return tuple(_graph()["graphs"])
+
+
+def arguments_of_graphs() -> Mapping[str, tuple[str, str]]:
+    """Return default and meaning of every argument by name."""
+    return {
+        name: (default.format(config=_config()), about)
+        for name, (default, about) in _graph()["arguments"].items()
+    }
+
+
+def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
+    """Return the nodes that a graph starts with some arguments, `name:=value` each.
+
+    Raises ParameterError for a graph or an argument that does not exist.
+    """
+    names = graph_names()
+    if graph not in names:
+        raise ParameterError(f"graph {graph!r}, expected {listed(names, 'or')}{did_you_mean(graph, names)}")
+    values = {name: default for name, (default, _) in arguments_of_graphs().items()} | _given(assignments)
+    content = _graph()
+    first = content["graphs"][graph]
+    chosen = {first: content["first"][first]}
+    chosen |= {name: own for name, own in content["others"].items() if _is_true(name, values[name])}
+    return [_call(name, own, values) for name, own in chosen.items()]
+
+
+def _given(assignments: Sequence[str]) -> dict[str, str]:
+    known = arguments_of_graphs()
+    given: dict[str, str] = {}
+    for assignment in assignments:
+        name, sign, value = assignment.partition(":=")
+        if not sign:
+            raise ParameterError(f"argument {assignment!r}, expected NAME:=VALUE")
+        if name not in known:
+            near = did_you_mean(name, known)
+            raise ParameterError(f"argument {name!r}, expected one of {', '.join(known)}{near}")
+        given[name] = value
+    return given
+
+
+def _call(name: str, own: Mapping[str, str], values: Mapping[str, str]) -> NodeCall:
+    file = Path(values["params"]) if name == "driver" else _config() / f"{name}.yaml"
+    parameters = {parameter: values[argument] for parameter, argument in own.items()}
+    return NodeCall(name, values["namespace"], file, parameters)
+
+
+def _is_true(name: str, value: str) -> bool:
+    if value.lower() not in ("true", "false"):
+        raise ParameterError(f"{name}:={value}, expected true or false")
+    return value.lower() == "true"
+
+
+def _graph() -> Mapping[str, Any]:
+    content: Mapping[str, Any] = strict_yaml.read(_share() / "launch" / "graph.yaml").content
+    return content
+
+
+def _config() -> Path:
+    return _share() / "config" / "nodes"
+
+
+def _share() -> Path:
+    """Return where config/ and launch/ lie: the clone, or the share of the installed package."""
+    return next(folder.parents[1] for folder in rig_folders())

@@ -1,0 +1,34 @@
+"""Import maps by name: those in config/imports, beside the rigs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.model.rig_file import rig_folders
+from rsea_ros.wording import did_you_mean
+
+
+def map_names() -> list[str]:
+    """Return the names of the maps that come with the package."""
+    return sorted({path.stem for folder in _folders() for path in folder.glob("*.yaml")})
+
+
+def map_path(name: str) -> Path:
+    """Return the file of a map given by path, or by the bare name of one in config/imports.
+
+    Raises ParameterError for a name that is neither.
+    """
+    path = Path(name)
+    if path.suffix or path.exists():
+        return path
+    for folder in _folders():
+        if (folder / f"{name}.yaml").exists():
+            return folder / f"{name}.yaml"
+    known = map_names()
+    near = did_you_mean(name, known)
+    raise ParameterError(f"map {name!r} not found, expected a YAML file or one of {', '.join(known)}{near}")
+
+
+def _folders() -> list[Path]:
+    return [folder.parent / "imports" for folder in rig_folders()]

@@ -1,0 +1,29 @@
+"""`rsea effects`: the catalogue of what a simulation may lack."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "the effects that a diagnosis can name: equation, parameters, units, typical sizes, source"
+EXAMPLE = "rsea effects backlash"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    parser.add_argument("name", nargs="?", help="one of them in full (default: a line for each)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the catalogue, or one effect with the description in its file."""
+    from rsea_ros import effects
+    from rsea_ros.effects._page import EffectPage
+    from rsea_ros.effects.catalogue import effect_named
+
+    if args.name is None:
+        print(repr(effects))
+        print("\nrsea effects NAME shows equation, parameters and source.")
+        return 0
+    page = EffectPage(effect_named(args.name))
+    print(page)
+    print(f"\n{page.description}")
+    return 0

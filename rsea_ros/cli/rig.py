@@ -1,0 +1,83 @@
+"""`rsea rig`: begin a rig of one's own, and see whether it is right."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._output import add_force
+from rsea_ros.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rsea_ros.model.rig import Rig
+
+HELP = "begin a rig of your own (new), or show what a rig says and what it lacks (check)"
+EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare `new` and `check`."""
+    actions = parser.add_subparsers(dest="action", required=True, metavar="new|check")
+    new = actions.add_parser("new", help="write a rig with every common key explained, to be filled in")
+    new.add_argument("name", help="of the rig; the file is NAME.yaml unless --out says otherwise")
+    new.add_argument("--out", type=Path, help="file to be written")
+    add_force(new)
+    check = actions.add_parser("check", help="read a rig and show its values with units, and what is free")
+    check.add_argument("rig", help="a file, or the name of a rig that comes with the package")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what is asked for."""
+    return _new(args) if args.action == "new" else _check(args)
+
+
+def _new(args: argparse.Namespace) -> int:
+    from rsea_ros.model.rig_file import load_rig, rig_folders
+    from rsea_ros.new_files import check_free, write_text
+
+    if not args.name.isidentifier():
+        raise ParameterError(f"name {args.name!r}, expected letters, digits and _, such as left_knee")
+    template = next(folder.parent / "templates" / "rig.yaml" for folder in rig_folders())
+    out = args.out or Path(f"{args.name}.yaml")
+    check_free([out], force=args.force)
+    write_text(out, template.read_text(encoding="utf-8").replace("NAME", args.name), force=args.force)
+    load_rig(out)
+    print(f"{out}: fill in the values, then: rsea rig check {out}")
+    return 0
+
+
+def _check(args: argparse.Namespace) -> int:
+    from rsea_ros.cli._columns import columns
+    from rsea_ros.model.rig_file import load_rig
+
+    rig = load_rig(args.rig)
+    print(f"{rig.name}: {rig.about}" if rig.about else rig.name)
+    rows = [_row(rig, name) for name in sorted(rig.quantities)]
+    print(columns([("", "value", "unit", "known to", "source"), *rows]))
+    for line in remarks(rig):
+        print(line)
+    return 0
+
+
+def _row(rig: Rig, name: str) -> tuple[str, ...]:
+    """Return a value's name, number, unit, how well it is known, and where it comes from."""
+    doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"
+    return name, f"{rig[name]:.6g}", rig.unit(name), doubt, rig.quantities[name].source
+
+
+def remarks(rig: Rig) -> list[str]:
+    """Return what a reader of the rig should know: what moves, what is fitted, which sensors it has."""
+    from rsea_ros.model.rig import END_NAMES
+    from rsea_ros.wording import listed
+
+    ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]
+    noisy = [f"{name} ({sensor.noise:g})" for name, sensor in rig.sensors.items() if sensor.noise > 0.0]
+    lines = [
+        f"ends: {listed(ends)}",
+        f"identify fits: {listed(rig.free()) if rig.free() else 'nothing: every value is fixed'}",
+        f"noise stated for: {listed(noisy) if noisy else 'no channel; it is estimated from each record'}",
+    ]
+    if not rig.free():
+        lines.append("give values a spread (0.3: known to 30 %) where identify shall find them")
+    return lines

@@ -1,0 +1,22 @@
+"""`rsea rigs`: the rigs that come with the package."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "the rigs that come with the package: name and what each bench is"
+EXAMPLE = "rsea rigs"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Take no arguments."""
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print a line for each rig."""
+    from rsea_ros.cli._columns import columns
+    from rsea_ros.model.rig_file import load_rig, rig_names
+
+    print(columns([(name, load_rig(name).about) for name in rig_names()]))
+    print("\nrsea rig check NAME shows a rig's values; rsea rig new NAME begins one of your own.")
+    return 0

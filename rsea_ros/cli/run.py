@@ -1,0 +1,72 @@
+"""`rsea run`: one node, for those who have no `ros2 run`."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from rsea_ros.cli._ros import need_ros
+from rsea_ros.errors import ParameterError
+from rsea_ros.wording import did_you_mean
+
+HELP = "start one node, as `ros2 run rsea_ros NODE` does, or a program of your own that uses rclpy"
+EXAMPLE = "rsea run plant rig:=pendulum rate:=500.0"
+_NODES = Path(__file__).resolve().parents[1] / "nodes"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments; what it does not know goes on to the node."""
+    parser.add_argument("node", metavar="NODE", help=f"{', '.join(node_names())}, or a file .py of your own")
+    parser.add_argument(
+        "parameters",
+        nargs="*",
+        metavar="NAME:=VALUE",
+        help="parameters of the node (rsea run NODE --params lists them)",
+    )
+    parser.add_argument(
+        "--params", action="store_true", help="show the node's parameters with unit and range"
+    )
+    parser.set_defaults(pass_on=[])
+
+
+def run(args: argparse.Namespace) -> int:
+    """Become the node's process."""
+    need_ros()
+    names = node_names()
+    words = [*(["--help"] if args.params else []), *ros_arguments(args.parameters), *args.pass_on]
+    if args.node.endswith(".py"):
+        _become([_script(args.node), *words])
+    if args.node not in names:
+        near = did_you_mean(args.node, names)
+        raise ParameterError(f"node {args.node!r}, expected one of {', '.join(names)}{near}")
+    _become(["-m", f"rsea_ros.nodes.{args.node}", *words])
+
+
+def _become(words: Sequence[str]) -> NoReturn:
+    """Replace this process by Python with some arguments: signals reach the node itself."""
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, *words])
+
+
+def _script(name: str) -> str:
+    """Return a file that there is. Raises ParameterError for one that there is not."""
+    if not Path(name).is_file():
+        raise ParameterError(f"{name}: no such file, expected a Python program or a node")
+    return name
+
+
+def node_names() -> list[str]:
+    """Return the names of all nodes."""
+    return sorted(path.stem for path in _NODES.glob("[!_]*.py"))
+
+
+def ros_arguments(parameters: list[str]) -> list[str]:
+    """Return parameters as ROS arguments. Raises ParameterError for a word that is no assignment."""
+    for word in parameters:
+        if ":=" not in word:
+            raise ParameterError(f"parameter {word!r}, expected NAME:=VALUE")
+    return ["--ros-args", *(part for word in parameters for part in ("-p", word)), "--"] if parameters else []

@@ -1,0 +1,56 @@
+"""`rsea topics`: what is published now, for those who have no `ros2 topic`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._numbers import positive, seed
+from rsea_ros.cli._ros import need_ros
+
+if TYPE_CHECKING:
+    from rsea_ros.nodes._listener import Listener
+
+HELP = "what is published now: list, rate of a topic, its messages (echo)"
+EXAMPLE = "rsea topics rate /rsea/ft"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare list, rate and echo."""
+    actions = parser.add_subparsers(dest="action", metavar="list|rate|echo")
+    listing = actions.add_parser("list", help="every topic with type and publishers (the default)")
+    rate = actions.add_parser("rate", help="messages a second, and the longest time between two")
+    echo = actions.add_parser("echo", help="messages as text")
+    for action in (rate, echo):
+        action.add_argument("topic", help="name, /rsea/ft or ft")
+    for action, usual in ((parser, 1.0), (listing, 1.0), (rate, 3.0)):
+        action.add_argument(
+            "--seconds", type=positive, default=usual, help="s to listen (default %(default)s)"
+        )
+    echo.add_argument("--count", type=seed, default=1, help="messages to show (default %(default)s)")
+    echo.add_argument(
+        "--seconds", type=positive, default=10.0, help="s to wait at most (default %(default)s)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Listen, and print."""
+    need_ros()
+    from rsea_ros.nodes._listener import Listener
+
+    with Listener() as listener:
+        if args.action == "rate":
+            print(listener.rate(args.topic, args.seconds))
+        elif args.action == "echo":
+            for text in listener.messages(args.topic, args.count, args.seconds):
+                print(text, end="---\n", flush=True)
+        else:
+            _list(listener, args.seconds)
+    return 0
+
+
+def _list(listener: Listener, seconds: float) -> None:
+    from rsea_ros.cli._columns import columns
+
+    rows = listener.topics(seconds)
+    print(columns([("topic", "type", "publishers", "subscribers"), *rows]) if rows else "no topic")

@@ -1,0 +1,155 @@
+"""Backward elimination: no cause stays that the others make redundant, or that a simpler one replaces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_candidate
+from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
+from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
+from rsea_ros.diagnosis.screening import screen, without_effect
+from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import effect_named, look_alikes
+from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.workers import Pools
+from rsea_ros.signals import FloatArray
+
+
+def eliminate_backwards(
+    selection: Selection, effects: Sequence[Effect], pools: Pools, settings: DiagnosisSettings
+) -> Selection:
+    """Return the selection with no cause more than the data need, and its models as they nest."""
+    models = ReducedModels(effects, pools, settings)
+    selection = without_redundant(selection, models)
+    selection = with_replacements(selection, models)
+    return nested_sequence(selection, models)
+
+
+@dataclass(frozen=True)
+class ReducedModels:
+    """Fits models again without one of their causes, or with another in its place; each only once."""
+
+    effects: Sequence[Effect]
+    pools: Pools
+    settings: DiagnosisSettings
+    fitted: dict[tuple[str, ...], dict[str, Candidate]] = field(default_factory=dict)
+
+    def without(self, model: Candidate) -> dict[str, Candidate]:
+        """Return by cause the model without it."""
+        if model.causes not in self.fitted:
+            models = self.pools.fits.map(partial(self._without, model), model.causes)
+            self.fitted[model.causes] = dict(zip(model.causes, models, strict=True))
+        return self.fitted[model.causes]
+
+    def with_rivals(self, model: Candidate) -> list[tuple[str, str, Candidate]]:
+        """Return cause, another effect that it is said to be confused with, and the model with that.
+
+        The other is simpler, or as simple where the choice between them was made without the other causes
+        and the model is near the floor: far from it priors say nothing.
+        """
+        as_simple = len(model.causes) > 1 and not self._is_far(model)
+        pairs = [
+            (name, rival)
+            for name in model.causes
+            for rival in look_alikes(name, self.effects)
+            if rival.name not in model.problem.acting
+            and effect_size(rival.name) < effect_size(name) + as_simple
+        ]
+        rests = self.without(model) if pairs else {}
+        models = self.pools.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
+        return [
+            (name, rival.name, m) for (name, rival), m in zip(pairs, models, strict=True) if m is not None
+        ]
+
+    def is_needed(self, model: Candidate, without: Candidate) -> bool:
+        """Tell whether a model is better than one without a cause of it, or with another in its place."""
+        extra, rule = model.parameters - without.parameters, self.settings.acceptance
+        return preference(model.validation, without.validation, extra, rule).better
+
+    def _without(self, model: Candidate, name: str) -> Candidate:
+        """Fit a model again without one of its causes."""
+        return self._fit(model, *without_effect(model.problem, model.solution.theta, name))
+
+    def _with(self, model: Candidate, rest: Candidate, name: str, rival: Effect) -> Candidate | None:
+        """Fit a model again with a rival, of the same size where that is one, in the place of a cause."""
+        old, solution = effect_named(name).main, rest.solution
+        same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
+        rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
+        guesses = initial_guesses(rival, ResidualView(model.cases[0], rig, rest.outputs[0]))
+        guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
+        screened = screen(solution, rival, guesses)
+        return None if screened is None else self._fit(model, screened.problem, screened.theta)
+
+    def _fit(self, model: Candidate, problem: Problem, theta: FloatArray) -> Candidate:
+        """Fit a problem as a model was fitted from which it was made."""
+        setup = FitSetup(model.cases, self.settings.fits, self.pools.run, model.validation)
+        return fit_candidate(replace(setup, is_quick=self._is_far(model)), problem, theta)
+
+    def _is_far(self, model: Candidate) -> bool:
+        return is_far_from_floor(model, self.settings)
+
+
+def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
+    """Take out every accepted cause without which the others do as well."""
+    last = selection.last
+    for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
+        if not models.is_needed(last, rest):
+            trial = trial_of(last, name, rest, "redundant")
+            return without_redundant(_replaced(selection, rest, trial), models)
+    return selection
+
+
+def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
+    """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
+    last = selection.last
+    for name, rival, other in models.with_rivals(last):
+        if models.is_needed(last, other):
+            continue
+        without = models.without(last)[name]
+        if other.size < last.size:
+            trial = trial_of(last, name, without, "no_better_than_simpler", rival)
+            return with_replacements(_replaced(selection, other, trial), models)
+        if costs_priors_less(other, last, models.settings):
+            trial = trial_of(last, name, without, "no_better_than_likelier", rival)
+            swapped = _replaced(selection, other, trial)
+            equal = _ordered(last, [*(c for c in last.causes if c != name), name])
+            rivals = {**selection.rivals, rival: (equal,)}
+            return with_replacements(replace(swapped, rivals=rivals), models)
+    return selection
+
+
+def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
+    """Return the selection with nested models: from all causes back, the least useful goes first."""
+    nested = [selection.last]
+    while len(nested[-1].causes) > 1:
+        largest = nested[-1]
+        rests = models.without(largest).values()
+        nested.append(min(rests, key=lambda m: float(m.validation.loss(largest.validation).sum())))
+    nominal = [selection.models[0]] if selection.last.causes else []
+    return replace(selection, models=(*nominal, *_in_order(list(reversed(nested)))))
+
+
+def _in_order(models: list[Candidate]) -> list[Candidate]:
+    """Return nested models with the effects of each rig in the order in which they come in."""
+    order: list[str] = []
+    for m in models:
+        order += [name for name in m.causes if name not in order]
+    return [_ordered(m, order) for m in models]
+
+
+def _ordered(model: Candidate, order: Sequence[str]) -> Candidate:
+    """Return a model with its causes in an order, after the effects that the rig states."""
+    problem = model.problem
+    stated = [name for name in problem.acting if name in problem.stated]
+    place = {name: k for k, name in enumerate([*stated, *order])}
+    rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: place[e.name]))
+    return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig)))
+
+
+def _replaced(selection: Selection, last: Candidate, trial: Trial) -> Selection:
+    return replace(selection, models=(selection.models[0], last), trials=(*selection.trials, trial))

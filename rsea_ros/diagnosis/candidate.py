@@ -1,0 +1,211 @@
+"""A candidate: a model fitted to the training blocks and scored on the validation blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION, part
+from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.settings import DEFAULT, FitSettings
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.model.drive import Drive, coarser
+from rsea_ros.signals import FloatArray
+
+DELAY = "command_delay.delay"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fitted model with its simulated channels on every case and its score on the validation blocks.
+
+    cases: every sample, with the noise against which the candidate is scored.
+    """
+
+    solution: Solution
+    outputs: list[dict[str, FloatArray]]
+    validation: Score
+    cases: tuple[Case, ...]
+
+    @property
+    def problem(self) -> Problem:
+        """The rig with its effects and what may move."""
+        return self.solution.problem
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Names of the effects beside the nominal model, in the order in which they were added."""
+        return self.problem.added
+
+    @property
+    def newest(self) -> str:
+        """Name of the effect that was added last. Raises IndexError for the nominal model."""
+        return self.causes[-1]
+
+    @property
+    def size(self) -> int:
+        """How many numbers describe the effects, optional ones not counted."""
+        return sum(effect_size(name) for name in self.causes)
+
+    @property
+    def parameters(self) -> int:
+        """How many unknowns the model has."""
+        return len(self.solution.theta)
+
+    @property
+    def prior_cost(self) -> float:
+        """What the fit paid for leaving the values that were known beforehand."""
+        return prior_cost(self.problem, self.solution.theta)
+
+    @property
+    def is_at_bound(self) -> bool:
+        """Whether the newest effect's main parameter has run to its bound: then it is no such effect."""
+        return bool(self.causes) and is_at_bound(self.solution, self.newest)
+
+
+@dataclass(frozen=True)
+class FitSetup:
+    """On which samples candidates are fitted, in which units, how far, and by which means.
+
+    weights: a score whose misfit counts as noise. iterations, gain: other limits than those of `limits`.
+    run: how derivatives are made, one after another or in a pool. is_quick: on steps twice as long.
+    """
+
+    cases: tuple[Case, ...]
+    limits: FitSettings = DEFAULT.fits
+    run: Map = serial
+    weights: Score | None = None
+    blocks: tuple[int, ...] = TRAIN
+    iterations: int | None = None
+    gain: float | None = None
+    is_quick: bool = False
+
+    def masked(self, problem: Problem) -> Problem:
+        """Return a problem on the samples and in the units of this setup."""
+        masked = on_blocks(problem, self.cases, self.blocks, self.weights)
+        return with_doubled_step(masked) if self.is_quick else masked
+
+    def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:
+        """Fit the unknowns of a masked problem. matrix: derivatives to begin with."""
+        gain = self.limits.gain if self.gain is None else self.gain
+        iterations = self.limits.iterations if self.iterations is None else self.iterations
+        gain *= _distance(self.weights, self.limits.farthest)
+        return solve(problem, theta, iterations=iterations, gain=gain, run=self.run, matrix=matrix)
+
+
+def fit_candidate(
+    setup: FitSetup, problem: Problem, theta: FloatArray | None = None, near: Solution | None = None
+) -> Candidate:
+    """Fit a problem's unknowns and score the result.
+
+    near: a solution on the same blocks, with other noise, whose derivatives the fit begins with.
+    """
+    masked = setup.masked(problem)
+    solution = setup.solve(masked, theta, None if near is None else _reweighted(near, masked))
+    moved = with_common_clock_in_delay(solution)
+    if moved is not None:
+        solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
+    outputs = solution.problem.outputs(solution.theta)
+    validation = score_on(solution.problem, setup.cases, VALIDATION, outputs)
+    return Candidate(solution, outputs, validation, setup.cases)
+
+
+def refit(model: Candidate, setup: FitSetup) -> Candidate:
+    """Fit a candidate again with each channel in units of what the candidate leaves of it."""
+    setup = replace(setup, cases=model.cases, weights=model.validation)
+    return fit_candidate(setup, model.problem, model.solution.theta, near=model.solution)
+
+
+def with_noise_reestimated(model: Candidate) -> Candidate:
+    """Return a candidate with the noise that its own residual shows, scored against that."""
+    ratio = model.problem.rig["gear.ratio"]
+    runs = zip(model.cases, model.outputs, strict=True)
+    return scored_against(model, tuple(reestimate_noise(c, out, ratio) for c, out in runs))
+
+
+def scored_against(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
+    """Return a candidate with its score against the noise of other cases of the same records."""
+    validation = score_on(model.problem, cases, VALIDATION, model.outputs)
+    return replace(model, cases=cases, validation=validation)
+
+
+def leaves_only_noise(model: Candidate, limit: float = DEFAULT.floor.only_noise) -> bool:
+    """Tell whether the residual of every channel is noise, on all blocks but the test blocks."""
+    score = score_on(model.problem, model.cases, (*TRAIN, *VALIDATION), model.outputs)
+    return score.missed == 0.0 and all(score.ratio(n) < limit for n in score.sums)
+
+
+def effect_size(name: str) -> int:
+    """Return how many numbers describe an effect, optional ones not counted."""
+    return sum(not p.optional for p in effect_named(name).parameters)
+
+
+def prior_cost(problem: Problem, theta: FloatArray) -> float:
+    """Return what a fit paid for leaving the values that were known beforehand."""
+    known = ((t, u) for t, u in zip(theta, problem.unknowns, strict=True) if np.isfinite(u.doubt))
+    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in known))
+
+
+def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
+    """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
+    main = effect_named(name).main
+    value, span = solution.values[f"{name}.{main.name}"], main.high - main.low
+    return not main.low + near * span < value < main.high - near * span
+
+
+def on_blocks(
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], weights: Score | None
+) -> Problem:
+    """Return a problem on some blocks of the cases. weights: a score whose misfit counts as noise."""
+    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks), weights) for c in cases))
+
+
+def with_misfit_as_noise(case: Case, weights: Score | None) -> Case:
+    """Return a case in which what a model leaves of a channel counts as its noise, where that is more."""
+    if weights is None:
+        return case
+    noise = {n: s * max(1.0, weights.ratio(n)) if n in weights.sums else s for n, s in case.noise.items()}
+    return replace(case, noise=noise)
+
+
+def with_doubled_step(problem: Problem) -> Problem:
+    """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
+    drives = (coarser(c.drive) if isinstance(c.drive, Drive) else c.drive for c in problem.cases)
+    return replace(
+        problem, cases=tuple(replace(c, drive=d) for c, d in zip(problem.cases, drives, strict=True))
+    )
+
+
+def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
+    """Return theta with the clock error that all sensors share turned into delay of the command.
+
+    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
+    rest in the clocks. None for a model without a delay.
+    """
+    names = [u.name for u in solution.problem.unknowns]
+    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
+    if DELAY not in names or not clocks:
+        return None
+    theta = solution.theta.copy()
+    common = float(np.mean(theta[clocks]))
+    theta[clocks] -= common
+    theta[names.index(DELAY)] -= common
+    return np.asarray(theta)
+
+
+def _distance(weights: Score | None, farthest: float) -> float:
+    """Return the RMS of a residual over the noise in its worst channel, at least 1."""
+    ratios = [] if weights is None else [weights.ratio(n) for n in weights.sums]
+    return min(max([1.0, *ratios]), farthest)
+
+
+def _reweighted(solution: Solution, problem: Problem) -> FloatArray:
+    """Return the derivatives of a solution in units of the noise of another problem on the same samples."""
+    new, old = (p.by_row(lambda case, n: case.noise[n]) for p in (problem, solution.problem))
+    result: FloatArray = solution.jacobian * (old / new)[:, None]
+    return result

@@ -1,0 +1,168 @@
+"""The acceptance rule: when a candidate is better than the present model, and which of several to accept.
+
+A candidate is preferred when it is surely better on the validation blocks, to which neither model was fitted,
+and when that matters. Sure: the block bootstrap of the difference of the losses lies above zero at 95 %, each
+parameter paid for by the loss that a useless one would gain (Akaike, IEEE TAC 19, 1974). It matters: the
+residual of some channel falls by more than a few percent, or a response that noise hides is no longer missed.
+It is accepted when, besides, it takes away enough. All numbers are in DiagnosisSettings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from rsea_ros.diagnosis.result import Reason
+from rsea_ros.diagnosis.score import Score, bootstrap_means
+from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings
+
+
+class Scored(Protocol):
+    """What the criteria ask of a model.
+
+    validation: its score on the validation blocks. parameters: its unknowns. size: numbers that describe its
+    effects. prior_cost: what its fit paid for leaving what is known beforehand. is_at_bound: its newest
+    effect has run to a bound.
+    """
+
+    @property
+    def validation(self) -> Score: ...
+    @property
+    def causes(self) -> tuple[str, ...]: ...
+    @property
+    def parameters(self) -> int: ...
+    @property
+    def size(self) -> int: ...
+    @property
+    def prior_cost(self) -> float: ...
+    @property
+    def is_at_bound(self) -> bool: ...
+
+
+M = TypeVar("M", bound=Scored)
+
+
+@dataclass(frozen=True)
+class Preference:
+    """Whether a model is surely better than another, and whether that matters."""
+
+    sure: bool
+    matters: bool
+
+    @property
+    def better(self) -> bool:
+        """Tell whether the model is to be preferred."""
+        return self.sure and self.matters
+
+
+def preference(
+    model: Score, other: Score, extra_parameters: int = 0, rule: AcceptanceSettings = DEFAULT.acceptance
+) -> Preference:
+    """Compare a model with another by their scores. extra_parameters: how many more the model has."""
+    difference = other.loss(other) - model.loss(other)
+    price = rule.price * extra_parameters / len(difference)
+    means = bootstrap_means(difference - price, rule.resamples)
+    shows_response = model.missed < rule.response_left * other.missed
+    return Preference(
+        sure=bool(np.quantile(means, rule.doubt) > 0.0),
+        matters=max(falls(model, other), default=0.0) > rule.matters or shows_response,
+    )
+
+
+def falls(model: Score, other: Score) -> list[float]:
+    """Return by how much the residual of each channel falls from another model to this one, relatively."""
+    return [1.0 - model.ratio(n) / max(other.ratio(n), 1e-12) for n in model.sums]
+
+
+def is_acceptable(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether a model may take the place of the present one."""
+    return refusal(model, present, settings) is None
+
+
+def refusal(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
+    """Return why a model may not take the place of the present one; None where it may.
+
+    An effect that has run to a bound bends to something else. A pair, a replacement, and one more cause
+    beside several that leave much are in doubt: they must take away more, and from the worst channel.
+    """
+    rule = settings.acceptance
+    if model.is_at_bound:
+        return "at_bound"
+    over_present = preference(
+        model.validation, present.validation, model.parameters - present.parameters, rule
+    )
+    if not over_present.better:
+        return "too_small" if over_present.sure else "not_sure"
+    if worst_ratio(model) < settings.floor.only_noise:
+        return None
+    is_one_more = len(model.causes) == len(present.causes) + 1
+    is_late = len(present.causes) >= rule.causes_in_doubt and is_far_from_floor(model, settings)
+    if not is_one_more or is_late:
+        is_enough = worst_ratio(model) < (1.0 - rule.fall_in_doubt) * worst_ratio(present)
+    else:
+        is_enough = max(falls(model.validation, present.validation)) > rule.fall
+    return None if is_enough else "too_small"
+
+
+def break_tie(
+    models: Sequence[M], present: Score, settings: DiagnosisSettings = DEFAULT
+) -> tuple[M | None, tuple[M, ...]]:
+    """Return the model to accept and those that do as well with no more parameters.
+
+    Of all that are not surely and materially worse than the best the simplest; of equals, the one that needs
+    the least of what is known beforehand.
+    """
+    if not models:
+        return None, ()
+    best = min(models, key=lambda m: float(m.validation.loss(present).sum()))
+
+    def contends(m: M) -> bool:
+        over = preference(best.validation, m.validation, rule=settings.acceptance)
+        return not over.better or is_nearly_as_good(m, best, settings)
+
+    contenders = [m for m in models if m is best or contends(m)]
+    chosen = min(contenders, key=lambda m: (m.size, m.prior_cost + loss_excess(m, best)))
+    return chosen, tuple(m for m in contenders if m is not chosen and m.size <= chosen.size)
+
+
+def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether a simpler model does nearly as well as the best, which is far from the floor.
+
+    What the best leaves is no noise, and more parameters always bend a model a little nearer to it.
+    """
+    if not is_far_from_floor(best, settings):
+        return False
+    room = 1.0 + settings.acceptance.room * (best.size - model.size)
+    return _loss(model, best) < room**2 * _loss(best, best)
+
+
+def is_equally_good(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether a model loses no more than another on the validation blocks, within a tenth."""
+    return _loss(model, other) < (1.0 + settings.acceptance.room) * _loss(other, other)
+
+
+def costs_priors_less(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether a model that does as well as another needs clearly less of what is known beforehand."""
+    return model.prior_cost + loss_excess(model, other) < other.prior_cost - settings.acceptance.prior_gain
+
+
+def is_far_from_floor(model: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether a model is far from the noise floor in its worst channel."""
+    return worst_ratio(model) >= settings.floor.far
+
+
+def worst_ratio(model: Scored) -> float:
+    """Return the RMS of the residual over the noise in the worst channel."""
+    return max(model.validation.ratio(n) for n in model.validation.sums)
+
+
+def loss_excess(model: Scored, best: Scored) -> float:
+    """Return how much more a model loses than the best on the validation blocks, in the best's units."""
+    return _loss(model, best) - _loss(best, best)
+
+
+def _loss(model: Scored, against: Scored) -> float:
+    return float(model.validation.loss(against.validation).sum())

@@ -1,0 +1,135 @@
+"""A forward step: every effect tried beside the present model, at a cost that grows as few remain.
+
+All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
+training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
+measured rotor angle, then two at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from rsea_ros.diagnosis.candidate import Candidate
+from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
+from rsea_ros.diagnosis.screening import ScreenedEffect
+from rsea_ros.diagnosis.selection import Trial, trial_of
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.step_fits import StepFits
+from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.workers import Pools
+from rsea_ros.progress import Progress
+
+
+class StepResult(NamedTuple):
+    """The model to accept, if any, all other trials, and the models that do as well as it."""
+
+    accepted: Candidate | None
+    trials: list[Trial]
+    equals: tuple[Candidate, ...]
+
+
+NO_STEP = StepResult(None, [], ())
+
+
+@dataclass(frozen=True)
+class ForwardStep:
+    """What a step starts from: the present model, the effects to try, and how many steps were before."""
+
+    present: Candidate
+    effects: Sequence[Effect]
+    number: int
+    pools: Pools
+    tell: Progress
+    settings: DiagnosisSettings
+
+    def run(self) -> StepResult:
+        """Try every effect, and two at once where none helps alone."""
+        screened = self.fits.screened(self.fits.on_pieces)
+        finalists = self._finalists(screened)
+        models = self.fits.fit_all(finalists)
+        if not self._acceptable(models):
+            overlooked = self.fits.overlooked(_others(screened, finalists))
+            finalists += overlooked
+            models += self.fits.fit_all(overlooked)
+        if self.fits.is_far and all(self._is_far(m) for m in self._acceptable(models)):
+            models += self.fits.on_measured_angle()
+        chosen, equals = break_tie(
+            self._acceptable(models) or self._pairs(finalists), self.present.validation, self.settings
+        )
+        trials = [self._far_behind(s) for s in _others(screened, finalists)]
+        trials += [self._refused(m, chosen) for m in models if m is not chosen]
+        return StepResult(chosen, trials, equals)
+
+    @cached_property
+    def fits(self) -> StepFits:
+        """The fits beside the present model."""
+        return StepFits(self.present, self.effects, self.pools, self.settings, self._say)
+
+    def _acceptable(self, models: Sequence[Candidate]) -> list[Candidate]:
+        return [m for m in models if is_acceptable(m, self.present, self.settings)]
+
+    def _is_far(self, model: Candidate) -> bool:
+        return is_far_from_floor(model, self.settings)
+
+    def _finalists(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+        """Return the best on the pieces, and the effects that are said to be confused with the very best."""
+        rule, present = self.settings.forward, self.fits.on_pieces.cost
+        worth = [s for s in screened if s.cost < present][: rule.piece_fits]
+        close = sorted(self.fits.fit_pieces(worth), key=lambda s: s.cost)
+        if not close:
+            return []
+        best, alike = close[0].cost, close[0].effect.claims.confusable_with
+        if self.fits.is_far:
+            close = [s for s in close if s.cost < rule.hope_one * present] or close[:1]
+        first, following = close[: rule.full_fits], close[rule.full_fits : 2 * rule.full_fits]
+        near = [s for s in first if s.cost < rule.behind_first * best]
+        near += [s for s in following if s.cost < rule.behind_next * best]
+        fitted = {s.name: s for s in close}
+        rivals = {s.name: s for s in (*reversed(screened), *close) if s.name in alike}
+        rivals = {name: s for name, s in rivals.items() if name not in {n.name for n in near}}
+        late = [
+            fitted[name] if name in fitted else self.fits.fit_pieces([s])[0] for name, s in rivals.items()
+        ]
+        return [*near, *(s for s in late if s.cost < rule.behind_first * best)]
+
+    def _pairs(self, firsts: Sequence[ScreenedEffect]) -> list[Candidate]:
+        """Return acceptable models with two more effects, for where none helps alone and much is left."""
+        rule, fits = self.settings.forward, self.fits
+        if len(self.present.causes) > rule.causes_beside_a_pair or not fits.is_far:
+            return []
+        pairs: list[ScreenedEffect] = []
+        for first in firsts[: rule.paired]:
+            seconds = fits.screened(fits.with_typical(first.effect))[: rule.paired]
+            pairs += fits.fit_pieces(seconds)
+        hopeful = sorted(
+            (p for p in pairs if p.cost < rule.hope_two * fits.on_pieces.cost), key=lambda p: p.cost
+        )
+        return self._acceptable(fits.fit_all(hopeful[: rule.paired_fits]))
+
+    def _far_behind(self, screened: ScreenedEffect) -> Trial:
+        problem, theta = self.fits.complete(screened)
+        return Trial(screened.name, self.present, problem, theta, is_full=False, reason="far_behind")
+
+    def _refused(self, model: Candidate, chosen: Candidate | None) -> Trial:
+        """Return the trial of a model that was not accepted, with the reason."""
+        reason = refusal(model, self.present, self.settings)
+        if reason is not None or chosen is None:
+            return trial_of(model, model.newest, self.present, reason or "not_sure")
+        loss = float(chosen.validation.loss(chosen.validation).sum())
+        is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
+        is_larger = model.parameters > chosen.parameters and is_alike
+        reason = "no_better_than_simpler" if is_larger else "explains_less"
+        return trial_of(model, model.newest, self.present, reason, chosen.newest)
+
+    def _say(self, what: str, within: float) -> None:
+        """Report what is being tried; each step is taken to halve what is left of the work."""
+        share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
+        self.tell(f"step {self.number + 1}: {what}", share)
+
+
+def _others(screened: Sequence[ScreenedEffect], chosen: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+    names = {s.name for s in chosen}
+    return [s for s in screened if s.name not in names]

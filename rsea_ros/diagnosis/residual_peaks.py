@@ -1,0 +1,125 @@
+"""Peaks of the residual: over frequency, and of the missing torque over the rotor's angle.
+
+The missing torque is the torque that a model lacks for the measured motion:
+
+    J_m a + b_m v + T,   of the residuals: measured less simulated motion and load
+
+What the model has right, the command with its lags included, is in both. A simulated rotor angle of a 502:1
+gear loses its phase; the measured one does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
+from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+_FEWEST_PERIODS = 2.0
+"""As often a ripple must have repeated over the rotor's travel to be one."""
+_FEWEST, _MOST = 0.5, 60.0
+"""Cycles per revolution of a ripple."""
+_REVOLUTIONS = 8
+"""After so many every whole multiple of 1/8 cycle repeats."""
+_BINS = 1 << 13
+_MOST_PEAKS = 2
+
+
+def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
+    """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats most."""
+    found = missing_torque(case, rig, outputs)
+    if found is None:
+        return []
+    return _repeating(found[0] * rig["gear.ratio"], found[1])
+
+
+def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
+    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of what repeats most.
+
+    Of the measured angle less the simulated one.
+    """
+    if not isinstance(case.drive, Drive) or "position" not in case.measured:
+        return []
+    keep = case.mask["position"]
+    angle = train_ratio(rig) * case.measured["position"][keep]
+    return _repeating(angle, residual_of(case, outputs, "position")[keep])
+
+
+def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
+    """Return cycles per revolution, amplitude and phase of what repeats most with an angle (rad)."""
+    values = values - np.mean(values)
+    cycles, power = _periodogram(angle, values)
+    seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
+    power = np.where(seen & (cycles < _MOST), power, 0.0)
+    at = [refined(cycles, power, k) for k in peaks(power, apart=6)]
+    return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in at]
+
+
+def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return cycles per revolution and their power: a sum over bins of the angle, folded where all repeat."""
+    folded = (angle / (2.0 * math.pi * _REVOLUTIONS) % 1.0 * _BINS).astype(np.int64) % _BINS
+    power = np.abs(np.fft.rfft(np.bincount(folded, torque, _BINS))) ** 2
+    return np.arange(len(power)) / _REVOLUTIONS, power
+
+
+def missing_torque(
+    case: Case, rig: Rig, outputs: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the measured position (rad) and the torque that is missing there, N m.
+
+    outputs: simulated channels of the case. None without a position, or for a free housing.
+    """
+    if (
+        not isinstance(case.drive, Drive)
+        or "position" not in case.measured
+        or "housing_end" not in rig.clamped
+    ):
+        return None
+    t, q = case.t["position"], residual_of(case, outputs, "position")
+    v, load = (
+        np.interp(t, case.t[n], residual_of(case, outputs, n)) if n in case.measured else otherwise
+        for n, otherwise in (("velocity", np.gradient(q, t)), ("ft", rig["spring.stiffness"] * q))
+    )
+    acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
+    inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
+    torque = inertia * acceleration + rig["rotor.reflected_damping"] * v[1:-1] + load[1:-1]
+    keep = case.mask["position"][1:-1]
+    return case.measured["position"][1:-1][keep], torque[keep]
+
+
+def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
+    """Return what is measured less what is simulated, zero where that is masked."""
+    return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
+
+
+def peaks(level: FloatArray, apart: int) -> list[int]:
+    """Return the places of the largest values that are more than so many bins apart."""
+    level, found = level.copy(), []
+    for _ in range(_MOST_PEAKS):
+        k = int(np.argmax(level))
+        if level[k] <= 0.0:
+            break
+        found.append(k)
+        level[max(k - apart, 0) : k + apart + 1] = 0.0
+    return found
+
+
+def refined(bins: FloatArray, level: FloatArray, k: int) -> float:
+    """Return where between the bins a peak is, by a parabola through the logarithms."""
+    if not 0 < k < len(level) - 1 or min(level[k - 1 : k + 2]) <= 0.0:
+        return float(bins[k])
+    a, b, c = np.log(level[k - 1 : k + 2])
+    return float(bins[k] + 0.5 * (a - c) / (a - 2.0 * b + c) * (bins[1] - bins[0]))
+
+
+def sine_at(x: FloatArray, y: FloatArray, pulsation: float) -> dict[str, float]:
+    """Return amplitude and phase (rad) of the sine of a pulsation in y(x)."""
+    basis = np.column_stack([np.sin(pulsation * x), np.cos(pulsation * x)])
+    a, b = np.linalg.lstsq(basis, y, rcond=None)[0]
+    return {"amplitude": float(math.hypot(a, b)), "phase": float(math.atan2(b, a))}

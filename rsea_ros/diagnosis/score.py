@@ -1,0 +1,104 @@
+"""The score of a model: its squared residuals over the noise, by channel and block, and what it gains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.diagnosis.coherence import missed_response
+from rsea_ros.diagnosis.data_split import block_length, blocks_of, part
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.signals import FloatArray, IntArray
+
+RESAMPLES = 1000
+"""Draws of a bootstrap over blocks: 25 of them lie beyond each end of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """Squared weighted residuals summed by channel and block, and how many samples that were.
+
+    sums, counts: by channel, shape (blocks,), of the blocks that have samples. missed: coherence^2 of the F/T
+    torque's residual with the command where the model misses a response (coherence.py), the largest of all.
+    """
+
+    sums: dict[str, FloatArray]
+    counts: dict[str, FloatArray]
+    missed: float = 0.0
+
+    def loss(self, against: Score) -> FloatArray:
+        """Return the loss of each block in the units of another score, shape (blocks,).
+
+        Every channel counts in units of what the other model leaves of it, or of its noise where that is more
+        (maximum likelihood with unknown noise): the finest sensor does not drown the others.
+        """
+        scaled = [s / max(1.0, against.ratio(n)) ** 2 for n, s in self.sums.items()]
+        return np.asarray(np.sum(scaled, axis=0))
+
+    @property
+    def worst(self) -> str:
+        """The channel with the largest RMS of the residual over its noise."""
+        return max(self.sums, key=self.ratio)
+
+    def ratio(self, channel: str) -> float:
+        """RMS of the residual over the noise of a channel."""
+        return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))
+
+
+def score_on(
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], outputs: list[dict[str, FloatArray]]
+) -> Score:
+    """Return the score of simulated outputs on some sets of the blocks of `cases`."""
+    return score(problem, tuple(part(c, blocks) for c in cases), outputs)
+
+
+def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, FloatArray]]) -> Score:
+    """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
+    runs = list(zip(cases, outputs, strict=True))
+    missed = [missed_response(c, o["ft"], "ft", blocks_of(c, "ft")) for c, o in runs if _has_ft(c, o)]
+    sums, counts = {}, {}
+    for n in problem.channels:
+        by_case = [_by_block(case, out, n) for case, out in runs]
+        sums[n], counts[n] = (np.concatenate(parts) for parts in zip(*by_case, strict=True))
+    used = np.sum(list(counts.values()), axis=0) > 0
+    present = [n for n in problem.channels if counts[n].sum() > 0]
+    sums, counts = ({n: by_block[n][used] for n in present} for by_block in (sums, counts))
+    return Score(sums, counts, max(missed, default=0.0))
+
+
+def _has_ft(case: Case, outputs: Mapping[str, FloatArray]) -> bool:
+    return "ft" in case.measured and "ft" in outputs
+
+
+def _by_block(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> tuple[FloatArray, FloatArray]:
+    """Return sums of squares over the noise and numbers of samples of a channel, shape (blocks,) each."""
+    length = int(case.duration / block_length(case)) + 2
+    if channel not in case.t or channel not in outputs:
+        return np.zeros(length), np.zeros(length)
+    keep = case.mask[channel]
+    squares = ((outputs[channel] - case.measured[channel]) / case.noise[channel])[keep] ** 2
+    block = blocks_of(case, channel)[keep]
+    sums = np.asarray(np.bincount(block, squares, length)[:length], dtype=np.float64)
+    return sums, np.bincount(block, minlength=length)[:length].astype(np.float64)
+
+
+def bootstrap_means(values: FloatArray, resamples: int = RESAMPLES) -> FloatArray:
+    """Return the means of resampled blocks, shape (resamples,)."""
+    means: FloatArray = values[_draws(len(values), resamples)].mean(axis=1)
+    return means
+
+
+def gain(with_it: Score, without: Score, channel: str) -> tuple[float, tuple[float, float]]:
+    """Return 1 - RMS(residual with) / RMS(residual without) of a channel, and its 95 % bootstrap interval."""
+    a, b = with_it.sums[channel], without.sums[channel]
+    draws = _draws(len(a), RESAMPLES)
+    resampled = 1.0 - np.sqrt(a[draws].sum(axis=1) / np.maximum(b[draws].sum(axis=1), 1e-300))
+    low, high = np.quantile(resampled, [0.025, 0.975])
+    return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
+
+
+def _draws(blocks: int, resamples: int) -> IntArray:
+    """Return which blocks make up each resample, the same in every call, shape (resamples, blocks)."""
+    return np.random.default_rng(0).integers(0, blocks, (resamples, blocks))

@@ -1,0 +1,191 @@
+"""The fits of a forward step: effects screened and fitted on short pieces, then on all training blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rsea_ros.diagnosis.candidate import (
+    Candidate,
+    FitSetup,
+    fit_candidate,
+    refit,
+    with_doubled_step,
+    with_misfit_as_noise,
+)
+from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
+from rsea_ros.diagnosis.data_split import VALIDATION
+from rsea_ros.diagnosis.initial_guess import InitialGuess, ResidualView, initial_guesses
+from rsea_ros.diagnosis.score import score_on
+from rsea_ros.diagnosis.screening import ScreenedEffect, screen
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.short_pieces import short_pieces_of
+from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.signal_table import ROTOR_ANGLE
+from rsea_ros.identification.alternatives import extended
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.solver import Solution, power, solve
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.identification.workers import Pools
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class StepFits:
+    """Fits effects beside the present model, as cheaply as each stage of a forward step allows.
+
+    say: hears what is fitted, and which share of the step is done.
+    """
+
+    present: Candidate
+    effects: Sequence[Effect]
+    pools: Pools
+    settings: DiagnosisSettings
+    say: Callable[[str, float], None]
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the present model is far from the noise floor."""
+        return is_far_from_floor(self.present, self.settings)
+
+    @cached_property
+    def on_pieces(self) -> Solution:
+        """The present model fitted to short pieces, with clocks taken as right."""
+        runs = zip(self.present.cases, self.present.outputs, strict=True)
+        pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings.pieces))
+        cases = tuple(with_misfit_as_noise(p, self.present.validation) for p in pieces)
+        solution = self.present.solution
+        problem, theta = without_clocks(replace(solution.problem, cases=cases), solution.theta)
+        problem = with_doubled_step(problem) if self.is_far else problem
+        return solve(problem, theta, iterations=self.settings.fits.present_iterations)
+
+    @cached_property
+    def guesses(self) -> dict[str, list[InitialGuess]]:
+        """Where fits of every effect that does not act yet begin."""
+        solution = self.present.solution
+        rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+        view = ResidualView(self.present.cases[0], rig, self.present.outputs[0])
+        effects = [e for e in self.effects if e.name not in solution.problem.acting]
+        guesses = self.pools.fits.map(lambda e: initial_guesses(e, view), effects)
+        return {e.name: g for e, g in zip(effects, guesses, strict=True)}
+
+    def screened(self, solution: Solution) -> list[ScreenedEffect]:
+        """Return what two cheap steps of every other effect reach beside a solution, best first."""
+        effects = [e for e in self.effects if e.name not in solution.problem.acting]
+        guesses = self.guesses
+
+        def tried(i: int) -> ScreenedEffect | None:
+            self.say(effects[i].name, 0.4 * i / len(effects))
+            return screen(solution, effects[i], guesses[effects[i].name])
+
+        screened = self.pools.fits.map(tried, range(len(effects)))
+        return sorted((s for s in screened if s is not None), key=lambda s: s.cost)
+
+    def with_typical(self, effect: Effect) -> Solution:
+        """Return the present model on the pieces with an effect of typical size, not fitted."""
+        base = self.on_pieces
+        return solve(*extended(base.problem, base.theta, effect, dict(effect.typical)), iterations=0)
+
+    def fit_pieces(self, screened: Iterable[ScreenedEffect]) -> list[ScreenedEffect]:
+        """Fit screened effects to the short pieces."""
+        return list(self.pools.fits.map(self._fit_pieces, screened))
+
+    def fit_all(self, screened: Iterable[ScreenedEffect]) -> list[Candidate]:
+        """Fit screened effects to all training blocks."""
+        return list(self.pools.fits.map(self._fit_all, screened))
+
+    def overlooked(self, left_out: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
+        """Return those of the effects left out that surely help on the validation blocks, as fitted so far.
+
+        The pieces are few: where an effect is small, it is chance in which of them it shows.
+        """
+        helps = self.pools.fits.map(self._surely_helps, left_out)
+        return [s for s, is_sure in zip(left_out, helps, strict=True) if is_sure]
+
+    def on_measured_angle(self) -> list[Candidate]:
+        """Return models with an effect of the rotor's angle, simulated on the measured angle.
+
+        A free simulation, a gear ratio away from the output, may settle in other detents. But the measured
+        angle knows what every other cause has done to the motion, so such a model counts only where it leaves
+        little: otherwise it bends to whatever else is missing.
+        """
+        base, most = self.on_pieces, self.settings.forward.hope_on_angle
+        on_angle = replace(base, problem=replace(base.problem, ride=True))
+        effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in base.problem.acting]
+        screened = (screen(on_angle, e, self.guesses[e.name]) for e in effects)
+        fitted = [self._fit_pieces(s) for s in screened if s is not None]
+        models = [self._fit_all(s) for s in fitted if s.cost < most * base.cost]
+        return [m for m in models if not is_far_from_floor(m, self.settings)]
+
+    def complete(self, screened: ScreenedEffect) -> tuple[Problem, FloatArray]:
+        """Return the problem of a screened effect on every sample, clocks included, and its theta."""
+        problem = replace(screened.problem, cases=self.present.cases)
+        return with_clocks(problem, screened.theta, self.present.problem)
+
+    def _fit_pieces(self, screened: ScreenedEffect) -> ScreenedEffect:
+        self.say(f"fitting {screened.name}", 0.5)
+        iterations = self.settings.fits.piece_iterations
+        solution = solve(screened.problem, screened.theta, iterations=iterations)
+        return replace(screened, theta=solution.theta, cost=solution.cost)
+
+    def _fit_all(self, screened: ScreenedEffect) -> Candidate:
+        self.say(f"fitting {screened.name} on everything", 0.8)
+        present, fits = self.present, self.settings.fits
+        setup = FitSetup(
+            present.cases, fits, self.pools.run, present.validation, iterations=fits.full_iterations,
+            is_quick=self.is_far,
+        )  # fmt: skip
+        problem, theta = self.complete(screened)
+        masked = setup.masked(problem)
+        start = min(self._starts(problem, theta), key=lambda t: power(masked.residual(t)))
+        first = fit_candidate(setup, problem, start)
+        if problem.ride:
+            free = fit_candidate(setup, replace(problem, ride=False), first.solution.theta)
+            first = free if is_equally_good(free, first, self.settings) else first
+        if not self._has_moved(first):
+            return first
+        is_quick = is_far_from_floor(first, self.settings)
+        return refit(first, replace(setup, iterations=None, is_quick=is_quick))
+
+    def _surely_helps(self, screened: ScreenedEffect) -> bool:
+        """Tell whether an effect as it was fitted to the pieces does better on the validation blocks."""
+        problem, theta = self.complete(screened)
+        outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
+        scores = [score_on(problem, self.present.cases, VALIDATION, simulated) for simulated in outputs]
+        extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
+        return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
+
+    def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
+        """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.
+
+        The pieces were fitted without clocks: what these do, other values have taken over on the pieces.
+        """
+        names = [u.name for u in self.present.problem.unknowns]
+        present = dict(zip(names, self.present.solution.theta, strict=True))
+        mixed = [present.get(u.name, float(t)) for u, t in zip(problem.unknowns, theta, strict=True)]
+        return [theta, np.array(mixed)]
+
+    def _has_moved(self, model: Candidate) -> bool:
+        """Tell whether a model leaves much more or less of a channel than the present one, its weight."""
+        scores, channels = (model.validation, self.present.validation), model.validation.sums
+        now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
+        return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
+
+
+def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with all clocks taken as right.
+
+    Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
+    """
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
+def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with the clocks of another problem free again, at zero."""
+    clocks = tuple(u for u in model.unknowns if u.is_clock)
+    larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
+    return larger, np.concatenate([theta, np.zeros(len(clocks))])

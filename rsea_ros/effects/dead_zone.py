@@ -1,0 +1,42 @@
+"""Dead zone of the drive: a command that is too small makes no torque.
+
+    T_m = sign(u) (|u| - (1 - jump) width)   for |u| > width, else 0
+
+jump 0: the torque begins at zero (a dead zone); jump 1: it begins with all that is commanded (a dead band,
+as firmware has it). A jump is a ramp over 1/1000 of the width. Source: Tao, Kokotovic, Adaptive Control
+of Systems with Actuator and Sensor Nonlinearities, 1996, section 2.1.
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
+
+RAMP = 0.001
+"""Of the width. A fit needs a slope where samples cross the edge."""
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Take the zone out of the command, and out of the current that shows it."""
+    if p[0] == 0.0:
+        return
+    for signal in (COMMAND, CURRENT):
+        beyond = abs(s[signal]) - p[0]
+        begun = p[1] * p[0] * min(max(beyond / (RAMP * p[0]) + 0.5, 0.0), 1.0)
+        s[signal] = math.copysign(max(beyond, 0.0) + begun, s[signal])
+
+
+EFFECT = Effect(
+    name="dead_zone",
+    port=Port.COMMAND,
+    order=5,
+    parameters=(
+        Parameter("width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),
+        Parameter("jump", "1", null=0.0, low=0.0, high=1.0, typical=0.0, starts=(1.0,), optional=True),
+    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=0.0),
+    function=apply,
+    about="commands that are too small make no torque",
+    equation="T_motor = sign(u) · (|u| - (1 - jump) · width) for |u| > width, else 0",
+)

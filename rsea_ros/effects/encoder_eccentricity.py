@@ -1,0 +1,42 @@
+"""Encoder disc or magnet that sits off its axis: an angle error that repeats with the rotor.
+
+    position = q + amplitude * sin(cycles_per_revolution * rotor_angle + phase)
+
+rotor_angle is the gear's ratio times q. The velocity is that of the same encoder. Source: Lu, Trumper,
+Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007 (first harmonic: eccentricity).
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Add the error to the angle, and its rate to the speed."""
+    wave = p[1] * s[TURNS]
+    at = wave * s[OUTPUT_ANGLE] + p[2]
+    s[POSITION] += p[0] * math.sin(at)
+    s[VELOCITY] *= 1.0 + p[0] * wave * math.cos(at)
+
+
+EFFECT = Effect(
+    name="encoder_eccentricity",
+    port=Port.SENSOR,
+    parameters=(
+        Parameter("amplitude", "rad", null=0.0, low=0.0, high=0.05, typical=1e-4),
+        Parameter(
+            "cycles_per_revolution", "1", null=1.0, low=0.001, high=60.0, typical=1.0, starts=(2.0,),
+            logarithmic=True,
+        ),
+        Parameter(
+            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7,
+            starts=(-2.4, -0.9, 2.3),
+        ),
+    ),
+    claims=Claims("velocity", "neither", amplitude_exponent=None),
+    function=apply,
+    about="angle error of the encoder that repeats with the rotor's angle",
+    equation="position = q + amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
+)  # fmt: skip

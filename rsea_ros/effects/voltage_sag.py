@@ -1,0 +1,46 @@
+"""Torque limit that falls with speed: what the supply's voltage leaves after the motor's own.
+
+    -limit (1 + w / no_load_speed) <= T_m <= limit (1 - w / no_load_speed)
+
+limit is the torque at rest, w the speed of the gear output against the housing. A supply that gives way
+under current, V = V_0 - R_b i, only makes the limit at rest smaller: the line stays straight. Source:
+Hughes, Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at constant voltage).
+"""
+
+import math
+
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_VELOCITY, Port
+
+
+@compiled
+def apply(s, p, x):  # type: ignore[no-untyped-def]
+    """Clip the command at the speed of the middle of the step, by that of its start and of the one before."""
+    w = s[OUTPUT_VELOCITY]
+    share = (w + 0.5 * (w - x[0])) / p[1]
+    x[0] = w
+    if not math.isinf(p[0]):
+        low, high = min(-p[0] * (1.0 + share), 0.0), max(p[0] * (1.0 - share), 0.0)
+        s[COMMAND] = min(max(s[COMMAND], low), high)
+        s[CURRENT] = min(max(s[CURRENT], low), high)
+
+
+EFFECT = Effect(
+    name="voltage_sag",
+    port=Port.COMMAND,
+    order=10,
+    parameters=(
+        Parameter(
+            "limit", "N m", null=math.inf, low=0.5, high=200.0, typical=18.0, starts=(25.0, 12.0),
+            logarithmic=True,
+        ),
+        Parameter(
+            "no_load_speed", "rad/s", null=math.inf, low=0.1, high=100.0, typical=1.5, logarithmic=True
+        ),
+    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=None, confusable_with=("torque_saturation",)),
+    function=apply,
+    states=1,
+    about="torque limit that falls with speed, by the supply's voltage",
+    equation="-limit · (1 + ω / no_load_speed) ≤ T_motor ≤ limit · (1 - ω / no_load_speed)",
+)  # fmt: skip

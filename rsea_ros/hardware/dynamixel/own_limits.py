@@ -1,0 +1,80 @@
+"""What the motor itself is set to: its limits, zero and drive mode, read and compared with the driver's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.hardware.dynamixel.bus import Bus
+from rsea_ros.hardware.dynamixel.tables import ControlTable
+from rsea_ros.hardware.limits import Limits
+
+REVERSED, ENABLED_BY_GOAL = 0x01, 0x08
+"""Bits of the drive mode: the direction is turned round; a goal that is written switches the torque on."""
+ENABLED_AT_START = 0x01
+"""Bit of the startup configuration: the torque is on when the power comes."""
+READ = (
+    "firmware", "return_delay", "drive_mode", "operating_mode", "homing_offset", "temperature_limit",
+    "max_voltage", "min_voltage", "torque_limit", "startup",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class OwnLimits:
+    """current A, temperature °C, voltages V, homing_offset rad. reversed: whether positive is clockwise."""
+
+    firmware: int
+    return_delay: int
+    operating_mode: int
+    current: float
+    temperature: float
+    lowest_voltage: float
+    highest_voltage: float
+    homing_offset: float
+    reversed: bool
+
+
+def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
+    """Read what the motor is set to.
+
+    Raises DeviceError, also for a motor whose torque something else than torque_enable switches on.
+    """
+    start, size = table.span(READ)
+    data = bus.patiently(lambda: bus.read(start, size))
+    value = {name: table.items[name].value(data, start) for name in READ if name in table.items}
+    for name, bit, what in (
+        ("drive_mode", ENABLED_BY_GOAL, "a goal that is written switches its torque on"),
+        ("startup", ENABLED_AT_START, "its torque is on when the power comes"),
+    ):
+        if value.get(name, 0) & bit:
+            without = value[name] & ~bit
+            raise DeviceError(f"motor: {name} {value[name]}: {what}, expected {without}, set in the motor")
+    return OwnLimits(
+        firmware=value["firmware"],
+        return_delay=value["return_delay"],
+        operating_mode=value["operating_mode"],
+        current=value["torque_limit"] * table.ampere,
+        temperature=float(value["temperature_limit"]),
+        lowest_voltage=0.1 * value["min_voltage"],
+        highest_voltage=0.1 * value["max_voltage"],
+        homing_offset=value["homing_offset"] * 2.0 * math.pi / table.pulses,
+        reversed=bool(value.get("drive_mode", 0) & REVERSED),
+    )
+
+
+def check_own_limits(limits: Limits, own: OwnLimits, name: str) -> None:
+    """Compare the driver's limits with the motor's. Raises ParameterError that names all that do not fit."""
+    wrong = []
+    if limits.temperature > own.temperature:
+        wrong.append(
+            f"temperature_limit = {limits.temperature:g} °C, expected at most {own.temperature:g} °C, where"
+            " the motor switches itself off"
+        )
+    if limits.voltage >= own.highest_voltage:
+        wrong.append(
+            f"voltage_limit = {limits.voltage:g} V, expected less than {own.highest_voltage:.4g} V, the most"
+            f" that the motor takes (it takes {own.lowest_voltage:.4g} V or more)"
+        )
+    if wrong:
+        raise ParameterError(f"parameter {'; '.join(wrong)} ({name})")

@@ -1,0 +1,46 @@
+"""What one read of a motor holds, in SI units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsea_ros.hardware.dynamixel.tables import ControlTable
+
+
+@dataclass(frozen=True)
+class Sample:
+    """instant: middle of the transaction, monotonic ns. counts: of the encoder. position rad, velocity rad/s,
+    current A, voltage V, temperature °C.
+
+    hardware_error: what the motor complains of. trouble: what its registers are and should not be, in words.
+    """
+
+    instant: int
+    counts: int
+    position: float
+    velocity: float
+    current: float
+    voltage: float
+    temperature: float
+    hardware_error: str = ""
+    trouble: str = ""
+
+
+def sample_of(
+    table: ControlTable, data: bytes, instant: int, hardware_error: str = "", trouble: str = ""
+) -> Sample:
+    """Return what the bytes of `table.sample` hold; more of them do no harm."""
+    start = table.sample[0]
+    counts = table.position.value(data, start)
+    return Sample(
+        instant=instant,
+        counts=counts,
+        position=counts * 2.0 * math.pi / table.pulses,
+        velocity=table.velocity.value(data, start) * table.radian_per_second,
+        current=table.current.value(data, start) * table.ampere,
+        voltage=table.voltage.value(data, start) * 0.1,
+        temperature=float(table.temperature.value(data, start)),
+        hardware_error=hardware_error,
+        trouble=trouble,
+    )

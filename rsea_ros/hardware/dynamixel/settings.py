@@ -1,0 +1,34 @@
+"""Where a motor is and how it is driven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SHARE, REST = 0.4, 1e-4
+"""What a reply may be late: part of a cycle, less so many s, half of what the rest of a cycle takes."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Where the motor is and what it is.
+
+    baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
+    per A, 0: that of the model's table. latency: what adapter and scheduler may add to the time on the wire,
+    s; a reading gets in addition what the write before it has left of it. watchdog: s without the host after
+    which the motor's own watchdog, or the supervisor, takes the torque away. supervisor: socket of one that
+    runs as a service; empty: a child of this process.
+    """
+
+    path: str
+    baud: int = 1_000_000
+    identity: int = 1
+    model: int = 0
+    torque_constant: float = 0.0
+    latency: float = 1e-3
+    watchdog: float = 0.1
+    supervisor: str = ""
+
+
+def usual_latency(rate: float) -> float:
+    """Return the latency (s) with which a cycle that loses both replies still ends in time. rate: Hz."""
+    return max(SHARE / rate - REST, REST)

@@ -1,0 +1,35 @@
+"""The spring as a torque sensor: two encoders, one on each side of it, in place of an F/T sensor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from rsea_ros.hardware.device import State, Wrench
+
+
+@dataclass(frozen=True)
+class Spring:
+    """stiffness: of the rig, N m/rad. place: of the actuator's axis in the wrench; sign: of it, +1 or -1.
+
+    What it gives is the torque of the elastic element alone, K d: a sensor in series feels the spring's
+    damper too, K d + b d'. It is as right as the stiffness, and zero where the deflection is.
+    """
+
+    stiffness: float
+    place: int = 5
+    sign: float = 1.0
+
+    def __str__(self) -> str:
+        return f"stiffness of {self.stiffness:.4g} N m/rad times measured deflection"
+
+    def felt(self, state: State) -> State:
+        """Return a reading with the wrench that its deflection means; as it is with a sensor's or none."""
+        if state.wrench is not None or math.isnan(state.deflection):
+            return state
+        values = [0.0] * 6
+        values[self.place] = self.sign * self.stiffness * state.deflection
+        wrench: Wrench = (values[0], values[1], values[2], values[3], values[4], values[5])
+        return replace(
+            state, ft_stamp=state.stamp, wrench=wrench, wrenches=((state.stamp, wrench),), inferred=True
+        )

@@ -1,0 +1,71 @@
+"""Stamps of another clock: an offset of seconds is a number, not another rig or a dead sensor."""
+
+from __future__ import annotations
+
+import functools
+import json
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+
+from msg_adapters import write_record
+from rsea_ros.checks.check import check_record
+from rsea_ros.cli.main import main
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel
+
+RIG = load_rig("paper_high_impedance")
+
+
+@functools.cache
+def good():
+    record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
+    return record.with_channels(**{n: Channel(c.t + 10.0, c.y) for n, c in record.channels.items()})
+
+
+def moved(seconds, *names):
+    return good().with_channels(**{n: Channel(good()[n].t + seconds, good()[n].y) for n in names})
+
+
+def off(findings):
+    return {f.channel: f.value for f in findings.of("clock_offset") if f.light == "red"}
+
+
+@pytest.mark.parametrize("seconds", [-0.5, 1.7])
+def test_commands_on_another_clock_are_no_other_rig(seconds):
+    """They were called a wrong rig without a word on clocks."""
+    findings = check_record(moved(seconds, "command"), RIG)
+    assert off(findings) == {"command": pytest.approx(seconds, abs=0.005)}
+    assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
+    assert "clock_offset" in {f.kind for f in findings.faults}
+
+
+def test_one_sensor_on_another_clock_is_neither_dead_nor_of_another_rig():
+    findings = check_record(moved(-1.8, "ft"), RIG)
+    assert off(findings) == {"ft": pytest.approx(-1.8, abs=0.01)}
+    assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
+
+
+def test_a_sine_has_many_lags_and_shows_none():
+    t = good()["command"].t
+    sine = Channel(t, 20.0 * np.sin(2.0 * np.pi * 3.0 * t))
+    assert off(check_record(good().with_channels(command=sine), RIG)) == {}
+
+
+def test_the_option_of_the_remedy_mends_it(tmp_path, capsys):
+    bag = str(tmp_path / "bag.mcap")
+    write_record(moved(-0.5, "command"), bag)
+    assert main(["check", bag, "--json", "--fail-on", "red"]) == 1
+    (record,) = json.loads(capsys.readouterr().out)["records"]
+    (clock,) = (f for f in record["findings"] if f["kind"] == "clock_offset" and f["light"] == "red")
+    assert "--shift command=0.5" in clock["remedy"]
+    assert main(["check", bag, "--shift", "command=0.5", "--fail-on", "amber"]) == 0
+
+
+@pytest.mark.parametrize("shift", ["command", "command=x", "torque=0.5", "command=nan"])
+def test_a_shift_of_nothing_is_refused_in_one_line(shift, tmp_path, capsys):
+    bag = str(tmp_path / "bag.mcap")
+    write_record(good(), bag)
+    assert main(["check", bag, "--shift", shift]) == 2
+    assert f"--shift {shift}: expected CHANNEL=S" in capsys.readouterr().err

@@ -1,0 +1,56 @@
+"""A rig without a spring on a machine that has one, or another inertia, is asked about in red."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from independent.bench import drawn_bench, record_run
+
+import rsea_ros as rsea
+from rsea_ros.checks.check import check_record
+from rsea_ros.checks.gain_findings import RIGHT_RIG
+from rsea_ros.checks.restoring import restoring_findings
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Record
+
+RATE = 280.0
+
+
+def run_of(name, amplitude):
+    return rsea.simulate(name, amplitude * np.random.default_rng(4).standard_normal(2800), RATE, seed=4)
+
+
+def asked(findings):
+    return {f.channel: f.light for f in findings.of("wrong_rig") if f.light != "green"}
+
+
+@pytest.mark.parametrize("rig", ["bare_drive", "pendulum"])
+def test_a_spring_bench_is_no_machine_without_a_spring(rig):
+    """The check was green."""
+    record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
+    findings = check_record(record, load_rig(rig))
+    assert asked(findings) == {"spring_end.stiffness": "red"}
+    (found,) = (f for f in findings.of("wrong_rig") if f.light == "red")
+    assert found.value == pytest.approx(1530.0, rel=0.1)
+    assert found.remedy == RIGHT_RIG
+
+
+def test_nor_is_a_light_pendulum_a_heavy_drive():
+    findings = check_record(run_of("pendulum", 1.0), load_rig("bare_drive"))
+    assert asked(findings)["spring_end.inertia"] == "red"
+
+
+def test_nor_a_pendulum_that_swings_far():
+    """Its torque follows sin(q), which no response shows; that of a real one was amber."""
+    t = np.arange(0.0, 20.0, 1.0 / RATE)
+    q = 2.0 * np.sin(1.7 * t) * np.sin(0.31 * t)
+    v = np.gradient(q, t)
+    torque = 0.15 * np.gradient(v, t) + 0.05 * v + 3.0 * np.sin(q)
+    record = Record({"command": Channel(t, torque), "position": Channel(t, q)}, "swing")
+    assert [f.light for f in restoring_findings(record, load_rig("bare_drive"))] == ["red"]
+    assert restoring_findings(record, load_rig("pendulum")) == []
+
+
+@pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
+def test_the_right_rig_is_not_asked_about(name, amplitude):
+    assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}

@@ -1,0 +1,103 @@
+"""What a newcomer types: names that are nearly right, lists of what there is, a rig of one's own."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import shlex
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.cli import main as cli
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.model.rig_file import load_rig, rig_names
+
+
+@pytest.mark.parametrize(
+    ("arguments", "suggestion"),
+    [
+        (["idntify"], "identify"),
+        (["diagnose", "x", "--holdut", "y"], "--holdout"),
+        (["identify", "x", "--rig", "paper_hih_impedance"], "paper_high_impedance"),
+        (["import", "x", "--map", "pendulm", "--out", "y"], "pendulum"),
+        (["effects", "backlsh"], "backlash"),
+        (["simulate", "pendulum", "--effect", "colomb_friction:torque=1", "--out", "x"], "coulomb_friction"),
+        (["run", "plnt"], "plant"),
+        (["launch", "simulaton"], "simulation"),
+        (["launch", "replay", "bagg:=x"], "bag"),
+    ],
+)
+def test_a_name_that_is_nearly_right_is_answered_with_the_right_one(
+    arguments, suggestion, capsys, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "200")
+    try:
+        status = cli.main(arguments)
+    except SystemExit as left:
+        status = left.code
+    assert status == 2
+    assert f"did you mean {suggestion}?" in capsys.readouterr().err
+
+
+def test_a_rig_file_with_a_mistyped_key_is_answered_too(tmp_path, capsys):
+    (tmp_path / "mine.yaml").write_text("name: mine\nsprng: {rigid: true}\n")
+    assert cli.main(["rig", "check", str(tmp_path / "mine.yaml")]) == 2
+    assert "did you mean spring?" in capsys.readouterr().err
+
+
+def test_the_version_is_the_packages(capsys):
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("rsea_ros 0.")
+
+
+@pytest.mark.parametrize("name", sorted(cli.verbs()))
+def test_a_verbs_help_ends_with_an_example_that_its_parser_takes(name, capsys):
+    with pytest.raises(SystemExit) as left:
+        cli.main([name, "--help"])
+    shown = capsys.readouterr().out
+    verb = importlib.import_module(f"rsea_ros.cli.{cli.verbs()[name].stem}")
+    assert left.value.code == 0 and shown.rstrip().endswith(verb.EXAMPLE)
+    for command in verb.EXAMPLE.split("&&"):
+        program, own, *arguments = shlex.split(command)
+        assert (program, own) == ("rsea", name)
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        verb.add_arguments(parser)
+        parser.parse_args(arguments) if name != "test" else None
+
+
+@pytest.mark.parametrize(("verb", "names"), [("rigs", rig_names()), ("effects", list(catalogue()))])
+def test_what_there_is_stands_in_a_list(verb, names, capsys):
+    assert cli.main([verb]) == 0
+    first_words = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line]
+    assert set(names) <= set(first_words)
+
+
+def test_every_map_stands_in_the_list(capsys):
+    assert cli.main(["maps"]) == 0
+    shown = capsys.readouterr().out
+    maps = Path(cli.__file__).parents[2] / "config" / "imports"
+    assert all(path.stem in shown for path in maps.glob("*.yaml"))
+
+
+def test_an_effect_is_shown_with_equation_parameters_unit_and_source(capsys):
+    assert cli.main(["effects", "backlash"]) == 0
+    shown = capsys.readouterr().out
+    assert "gap (rad): typical 0.004" in shown and "gap / 2" in shown and "Source: Nordin" in shown
+
+
+def test_a_new_rig_is_right_as_it_stands_and_replaces_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["rig", "new", "left_knee"]) == 0
+    assert load_rig("left_knee.yaml").name == "left_knee"
+    assert cli.main(["rig", "new", "left_knee"]) == 2
+    assert cli.main(["rig", "new", "left knee"]) == 2
+    capsys.readouterr()
+    assert cli.main(["rig", "check", "left_knee.yaml"]) == 0
+    shown = capsys.readouterr().out
+    assert "spring.stiffness" in shown and "N m/rad" in shown and "identify fits: " in shown
+
+
+def test_an_axis_that_is_turned_around_is_taken_as_typed(capsys):
+    assert cli.main(["check", "no_such_bag", "--axis", "-torque.z"]) == 2
+    assert "no such bag" in capsys.readouterr().err

@@ -1,0 +1,101 @@
+"""Nodes without a `ros2` command: run, launch and topics."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rsea_ros.cli import main as cli
+from rsea_ros.cli._graph import node_calls
+from rsea_ros.cli._together import together
+from rsea_ros.cli.run import node_names, ros_arguments
+from rsea_ros.errors import ParameterError
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_every_node_of_the_graph_is_one_that_there_is():
+    content = yaml.safe_load((ROOT / "launch" / "graph.yaml").read_text())
+    assert {*content["first"], *content["others"]} <= set(node_names())
+
+
+def test_a_graph_starts_its_first_node_and_those_that_are_asked_for():
+    started = [call.name for call in node_calls("simulation", [])]
+    assert started == ["plant", "model", "identify"]
+    asked = node_calls(
+        "hardware", ["identify:=false", "record:=true", "port:=/dev/ttyACM0", "namespace:=/left"]
+    )
+    assert [call.name for call in asked] == ["driver", "model", "record"]
+    assert asked[0].parameters["port"] == "/dev/ttyACM0" and asked[0].parameters["autostart"] == "false"
+    assert "__ns:=/left" in asked[1].arguments
+
+
+@pytest.mark.parametrize("wrong", ["rig", "rigg:=x", "model:=perhaps"])
+def test_a_wrong_argument_is_refused_before_anything_starts(wrong):
+    with pytest.raises(ParameterError):
+        node_calls("simulation", [wrong])
+
+
+def test_parameters_are_handed_on_as_ros_reads_them():
+    assert ros_arguments(["rig:=pendulum", "rate:=500.0"]) == [
+        "--ros-args", "-p", "rig:=pendulum", "-p", "rate:=500.0", "--",
+    ]  # fmt: skip
+    with pytest.raises(ParameterError):
+        ros_arguments(["pendulum"])
+
+
+def test_a_node_that_fails_ends_the_others(capfd):
+    begun = time.monotonic()
+    status = together({"plant": [], "model": ["--ros-args", "-p", "rig:=no_such_rig"]})
+    assert status == 2 and time.monotonic() - begun < 30.0
+    assert "model ended with status 2" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("words", [["run", "plant"], ["launch", "simulation"], ["topics"], ["demo"]])
+def test_without_ros_one_line_says_what_is_needed(words, monkeypatch, capsys):
+    monkeypatch.setattr("rsea_ros.cli._ros.find_spec", lambda name: None)
+    assert cli.main(words) == 2
+    assert "no rclpy here" in capsys.readouterr().err
+
+
+def rsea(*words: str) -> list[str]:
+    """Return the command of a verb."""
+    return [sys.executable, "-m", "rsea_ros", *words]
+
+
+def heard(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
+    """Return a message of a topic, once there is one, while some processes run."""
+    while all(process.poll() is None for process in running):  # a plant compiles its simulation first
+        echo = subprocess.run(
+            rsea("topics", "echo", topic), cwd=ROOT, capture_output=True, text=True, timeout=60
+        )
+        if echo.returncode == 0:
+            message: dict[str, Any] = yaml.safe_load(echo.stdout.split("---")[0])
+            return message
+    raise AssertionError(f"ended before {topic} was published")
+
+
+def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it(tmp_path):
+    page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "my_controller.py").write_text(code)
+    graph = subprocess.Popen(
+        rsea("launch", "simulation", "model:=false", "identify:=false"), cwd=ROOT
+    )
+    controller = subprocess.Popen(rsea("run", "my_controller.py"), cwd=tmp_path)
+    try:
+        assert heard("joint_states", graph)["name"] == ["joint"]
+        assert abs(heard("torque_command", graph, controller)["effort"][0]) > 0.0
+    finally:
+        controller.kill()
+        controller.wait()
+        graph.send_signal(signal.SIGTERM)
+    assert graph.wait(20) == 128 + signal.SIGTERM

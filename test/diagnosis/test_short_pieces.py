@@ -1,0 +1,88 @@
+"""Short pieces of a record: a model that is right leaves nothing but noise in any of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.candidate import with_doubled_step
+from rsea_ros.diagnosis.short_pieces import short_pieces_of
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import measure, simulate, synthesize
+from rsea_ros.signals import Channel, Record
+
+RATE = 280.0
+
+
+def with_stated_noise(case, rig):
+    sensors = {n: rig.sensors[n] for n in case.noise}
+    noise = {n: math.hypot(s.noise, s.quantum / math.sqrt(12.0)) for n, s in sensors.items()}
+    return replace(case, noise=noise)
+
+
+@pytest.mark.parametrize("kind", ["multisine", "white_noise", "chirp"])
+def test_the_right_model_leaves_only_noise_in_every_piece(kind):
+    """A piece begins at the state that was measured, and what it runs up with does not count."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation(kind, Settings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
+    record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
+    case = case_from(record, rig)
+    problem = Problem((case,), rig, (), CHANNELS)
+    pieces = short_pieces_of(case, problem.outputs(np.zeros(0))[0])
+    assert len(pieces) > 5
+    for piece in pieces:
+        (out,) = Problem((piece,), rig, (), CHANNELS).outputs(np.zeros(0))
+        for name, values in out.items():
+            mask = piece.mask[name]
+            left = (piece.measured[name] - values)[mask] / piece.noise[name]
+            assert mask.sum() > 100
+            assert np.abs(left).max() < 6.0, (piece.start, name)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
+@pytest.mark.parametrize("rate", [250.0, 280.0, 500.0, 1000.0])
+def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_too(rate, jitter):
+    """Pieces that began within a hold gave the motor torque a whole command change: 2.5e7 for 2.5e4."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation("white_noise", Settings(rate=rate, duration=32.0, seed=5))
+    stamps = np.arange(len(command)) / rate
+    stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
+    record = synthesize(rig, Channel(stamps, command), seed=5)
+    case = with_stated_noise(case_from(record, rig), rig)
+    pieces = short_pieces_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
+    assert len(pieces) > 5
+    for problem in (
+        Problem(pieces, rig, (), CHANNELS),
+        with_doubled_step(Problem(pieces, rig, (), CHANNELS)),
+    ):
+        residual = problem.residual(np.zeros(0))
+        assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
+@pytest.mark.parametrize(("times", "kept"), [(0.2, 0.2), (1.0, 1.0), (1.5, 1.5), (2.0, 1.0), (4.0, 1.0)])
+def test_pieces_hold_a_channel_no_more_than_about_as_often_as_commands(times, kept, jitter):
+    """Joint states at four times the rate of the commands took twice as long and told no more."""
+    rig = load_rig("paper_high_impedance")
+    t = np.arange(round(40.0 * RATE)) / RATE
+    command = Channel(t, excitation("white_noise", Settings(rate=RATE, duration=40.0, seed=5)))
+    stamps = (np.arange(round(40.0 * RATE * times)) + 1.0) / (RATE * times)
+    stamps += jitter / (RATE * times) * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
+    blank = Channel(stamps, np.zeros(len(stamps)))
+    asked = Record({"command": command, "ft": Channel(t + 1.0 / RATE, np.zeros(len(t))), "position": blank})
+    rng = np.random.default_rng(5)
+    measured = {n: measure(rig, n, y, rng) for n, y in simulate(rig, asked).items()}
+    record = asked.with_channels(**{n: Channel(asked[n].t, y) for n, y in measured.items()})
+    case = with_stated_noise(case_from(record, rig), rig)
+    problem = Problem((case,), rig, (), CHANNELS)
+    pieces = Problem(short_pieces_of(case, problem.outputs(np.zeros(0))[0]), rig, (), CHANNELS)
+    counts = {n: sum(np.count_nonzero(p.mask[n]) for p in pieces.cases) for n in ("ft", "position")}
+    assert counts["position"] == pytest.approx(kept * counts["ft"], rel=0.02)
+    residual = pieces.residual(np.zeros(0))
+    assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)

@@ -1,0 +1,67 @@
+"""Effects that the rig states belong to the nominal model: they act, are fitted, and are never causes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis import conclusion
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.errors import IdentificationError
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.report.diagnosis_terminal import terminal_lines
+from rsea_ros.signals import Channel
+
+RATE, DURATION = 280.0, 8.0
+RIG = load_rig("paper_high_impedance")
+FRICTION = EffectSetting("coulomb_friction", {**effect_named("coulomb_friction").typical, "torque": 3.0})
+GAP = EffectSetting("backlash", {**effect_named("backlash").typical, "gap": 4e-3})
+FEW = DiagnosisSettings(max_causes=1, without=tuple(set(catalogue()) - {"coulomb_friction", "backlash"}))
+
+
+def recorded(*effects):
+    command = excitation("multisine", Settings(rate=RATE, duration=DURATION, period=4.0))
+    bench = RIG.with_effects(*effects)
+    return synthesize(bench, Channel(np.arange(len(command)) / RATE, command), seed=3)
+
+
+def test_a_known_effect_acts_and_is_no_cause():
+    """It came out as a cause without parameters, and the report ended in StopIteration."""
+    rig = RIG.with_effects(FRICTION)
+    rig = replace(rig, known=rig.known | {f"coulomb_friction.{p}" for p in FRICTION.parameters})
+    diagnosis = diagnose([recorded(FRICTION, GAP)], rig, settings=FEW)
+    assert [cause.name for cause in diagnosis.causes] == ["backlash"]
+    assert diagnosis.causes[0].parameters["gap"].value == pytest.approx(4e-3, rel=0.05)
+    assert diagnosis.causes[0].gain_holdout > 0.5
+    assert [e.name for e in diagnosis.extended_rig.effects] == ["coulomb_friction", "backlash"]
+    assert "backlash" in terminal_lines(diagnosis)[0].plain.lower()
+
+
+def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
+    """It was taken out of the rig without a word and found again as a cause."""
+    guess = replace(FRICTION, parameters={**FRICTION.parameters, "torque": 2.0})
+    diagnosis = diagnose([recorded(FRICTION)], RIG.with_effects(guess), settings=FEW)
+    assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())
+    fitted = {p.name: p.value for p in diagnosis.baseline}
+    assert fitted["coulomb_friction.torque"] == pytest.approx(3.0, rel=0.02)
+
+
+def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
+    with pytest.raises(IdentificationError, match="4 s or more"):
+        diagnose([recorded().between(0.0, 3.0)], RIG, settings=FEW)
+
+
+def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
+    """With the verdict `unexplained` it was in neither list."""
+    monkeypatch.setattr(conclusion, "verdict_of", lambda *_: "unexplained")
+    diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
+    assert diagnosis.causes == ()
+    dropped = {r.name: r for r in diagnosis.rejected}["backlash"]
+    assert dropped.reason == "leaves_too_much" and dropped.gain_holdout > 0.5

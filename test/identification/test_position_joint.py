@@ -1,0 +1,90 @@
+"""Joints that positions command, identified in their loop: values, gains, and what cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.checks.check import check_record
+from rsea_ros.identification.excitation import JOINT, excitation
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.result import Identification
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel, Record
+
+TRUE = {
+    "rotor.reflected_inertia": 0.03,
+    "rotor.reflected_damping": 0.35,
+    "spring_end.gravity": 0.6,
+    "controller.k_p": 22.0,
+}
+
+
+def run(rig: Rig, duration: float = 15.0) -> Record:
+    targets = excitation("chirp", replace(JOINT, duration=duration))
+    return synthesize(rig, Channel(np.arange(len(targets)) / JOINT.rate, targets), seed=4)
+
+
+def with_spread(rig: Rig, spreads: Mapping[str, float]) -> Rig:
+    """Return a rig of which some values are doubted."""
+    doubted = {n: replace(rig.quantities[n], spread=s) for n, s in spreads.items()}
+    return replace(rig, quantities={**rig.quantities, **doubted})
+
+
+def rigid(rig: Rig) -> Rig:
+    """Return a joint whose shaft gives nowhere, its rotor's inertia known."""
+    kept = {n: q for n, q in rig.quantities.items() if n.split(".")[0] != "spring"}
+    return replace(rig, quantities=kept, rigid_spring=True)
+
+
+def value(result: Identification, name: str) -> tuple[float, float]:
+    """Return an estimate and its one sigma."""
+    estimate = next(p for p in result.parameters if p.name == name)
+    return estimate.value, (estimate.ci95[1] - estimate.ci95[0]) / 3.92
+
+
+@pytest.fixture(scope="module")
+def stiff() -> Rig:
+    return replace(rigid(load_rig("pd_joint")), known=frozenset({"gear.ratio", "spring_end.inertia"}))
+
+
+def test_values_and_a_doubted_gain_from_position_and_current(stiff):
+    nominal = with_spread(stiff, {"controller.k_p": 0.3})
+    result = identify([run(stiff.with_values(TRUE))], nominal)
+    assert result.verdict == "adequate"
+    for name, true in TRUE.items():
+        estimate, sigma = value(result, name)
+        assert abs(estimate - true) < 4.0 * sigma + 0.002 * true
+        assert sigma < 0.05 * true
+
+
+def test_without_a_current_only_ratios_to_the_gains_are_told(stiff):
+    free = {
+        "controller.k_p": 0.3,
+        "controller.k_d": 0.3,
+        "spring_end.inertia": 0.3,
+        "controller.torque_limit": 0.3,
+    }
+    nominal = replace(with_spread(stiff, free), known=frozenset({"gear.ratio"}))
+    whole = run(stiff.with_values({n: v for n, v in TRUE.items() if n != "controller.k_p"}))
+    only = replace(whole, channels={n: whole[n] for n in ("reference", "position")})
+    result = identify([only], nominal)
+    assert any("controller.k_p" in s and "identifiable" in s for s in result.statements)
+    assert any("loop's gains" in s for s in result.statements)
+    estimate, sigma = value(result, "controller.k_p")
+    assert sigma > 0.1 * estimate
+
+
+def test_the_checks_speak_of_targets(stiff):
+    record = run(stiff)
+    found = check_record(record, stiff)
+    assert found.light != "red"
+    assert {f.unit for f in found.of("excitation")} == {"rad"}
+    assert "command" not in {f.channel for f in found.findings}
+    without = replace(record, channels={"position": record["position"]})
+    assert [f.channel for f in check_record(without, stiff).findings] == ["reference"]

@@ -1,0 +1,36 @@
+"""A value that the data do not touch keeps the whole doubt of its bounds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification import confidence
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.identify import fit
+from rsea_ros.identification.problem import case_from
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_so(monkeypatch):
+    """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
+    rig = load_rig("paper_high_impedance")
+    command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
+    record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
+    spring = EffectSetting("nonlinear_spring", effect_named("nonlinear_spring").typical)
+    solution, _ = fit((case_from(record, rig),), rig.with_effects(spring))
+    names = [u.name for u in solution.problem.unknowns]
+    i = names.index("nonlinear_spring.cubic")
+    matrix = solution.jacobian.copy()
+    matrix[:, i] = 0.0
+    monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
+    doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
+    assert np.sqrt(doubt.covariance[i, i]) == pytest.approx(solution.problem.unknowns[i].reach, rel=1e-6)
+    sentences = confidence.what_is_not_told(solution.problem.unknowns, doubt)
+    assert any(s.startswith("nonlinear_spring.cubic is not identifiable") for s in sentences)

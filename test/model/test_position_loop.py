@@ -1,0 +1,185 @@
+"""Joints that positions command: the loop in the simulated step, against scipy and against what it is for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import slow
+from scipy.linalg import expm
+
+from rsea_ros.errors import ChannelError, RigError
+from rsea_ros.identification.responses import model_response
+from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.rig import Controller, Quantity, Rig
+from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import simulate, synthesize
+from rsea_ros.signals import Channel, Record
+
+RATE = 200.0
+T = np.arange(400) / RATE
+STEPPING = np.where(T < 0.5, 0.0, np.where(T < 1.2, 0.3, -0.2))
+
+
+def joint(kind: str = "pd", **values: float) -> Rig:
+    """Return a rigid joint in a position loop."""
+    rig = replace(load_rig("bare_drive"), loop=kind, quantities=rigid_quantities(kind))
+    return rig.with_values({f"controller.{n}": v for n, v in values.items()})
+
+
+def rigid_quantities(kind: str) -> dict[str, Quantity]:
+    gains = {"pd": {"k_p": 60.0, "k_d": 2.0}, "cascade": {"k_pos": 8.0, "k_v": 6.0}}[kind]
+    rig = load_rig("bare_drive").with_values(
+        {"rotor.reflected_inertia": 0.05, "rotor.reflected_damping": 0.8, "spring_end.inertia": 0.03}
+    )
+    return {**rig.quantities, **{f"controller.{n}": Quantity(v) for n, v in gains.items()}}
+
+
+def moved(rig: Rig, targets=STEPPING, **options) -> dict[str, np.ndarray]:
+    """Return what a rig does for targets, at the end of each hold."""
+    blank = {n: Channel(T + 1 / RATE, np.zeros(len(T))) for n in ("position", "velocity", "motor_torque")}
+    return simulate(rig, Record({"reference": Channel(T, targets), **blank}, source="joint"), **options)
+
+
+def by_scipy(rig: Rig, law) -> np.ndarray:
+    """Integrate with the loop's torque held over the simulation's step: position at the end of each hold."""
+    a, b, c = slow.state_matrices(rig)
+    n, parts = len(b), 5
+    step = 1 / RATE / parts
+    block = np.zeros((n + 1, n + 1))
+    block[:n, :n], block[:n, n] = a * step, b * step
+    phi, x, states = expm(block), np.zeros(n), []
+    for k in range(parts * len(T)):
+        u = law(STEPPING[k // parts], c[0] @ x, c[1] @ x, step)
+        x = phi[:n, :n] @ x + phi[:n, n] * u
+        states.append(c[0] @ x)
+    return np.array(states[parts - 1 :: parts])
+
+
+@pytest.mark.parametrize("kind", ["pd", "cascade"])
+def test_the_loop_is_that_of_its_equation(kind):
+    total = 0.0
+
+    def law(r, q, v, h):
+        nonlocal total
+        if kind == "pd":
+            u = 60.0 * (r - q) + 40.0 * total - 2.0 * v
+            total += (r - q) * h
+        else:
+            error = min(max(8.0 * (r - q), -1.5), 1.5) - v
+            u = 6.0 * error + 30.0 * total
+            total += error * h
+        return u
+
+    integral = {"k_i": 40.0} if kind == "pd" else {"k_vi": 30.0, "velocity_limit": 1.5}
+    position = moved(joint(kind, **integral), refine=1)["position"]
+    assert np.max(np.abs(position - by_scipy(joint(kind), law))) < 1e-9
+
+
+def test_a_cascade_without_integral_is_the_controller_that_a_record_may_name():
+    looped = joint("cascade")
+    bare = {n: q for n, q in looped.quantities.items() if not n.startswith("controller.")}
+    drive = replace(looped, loop=None, quantities=bare, controller=Controller(8.0, 6.0))
+    steady = np.full(len(T), 0.2)
+    blank = Channel(T + 1 / RATE, np.zeros(len(T)))
+    record = Record(
+        {"command": Channel(T, np.zeros(len(T))), "reference": Channel(T, steady), "position": blank},
+        source="a",
+    )
+    outside = simulate(drive, record, refine=5)["position"]
+    assert np.allclose(outside, moved(joint("cascade"), steady, refine=12)["position"], atol=1e-12)
+
+
+def test_limits_hold():
+    limited = moved(joint(torque_limit=4.0))
+    assert np.max(np.abs(limited["motor_torque"])) == pytest.approx(4.0)
+    slewed = moved(joint(velocity_limit=0.5))
+    assert np.max(np.abs(slewed["velocity"])) < 0.65 < np.max(np.abs(moved(joint())["velocity"]))
+
+
+def test_an_integral_takes_away_what_gravity_pulls_and_does_not_wind_up():
+    hanging = joint().with_values({"spring_end.gravity": 3.0, "spring_end.gravity_angle": 0.5})
+    still = np.full(len(T), 0.0)
+    sag = moved(hanging, still)["position"][-1]
+    assert 60.0 * -sag == pytest.approx(3.0 * np.sin(0.5 + sag), rel=1e-3)
+    assert abs(moved(hanging.with_values({"controller.k_i": 300.0}), still)["position"][-1]) < 0.1 * abs(sag)
+    weak = hanging.with_values({"controller.k_i": 300.0, "controller.torque_limit": 6.0})
+    assert np.max(moved(weak)["position"]) < 0.4
+
+
+def test_the_firmware_holds_its_torque_between_its_samples():
+    torque = moved(joint(sample_time=0.05))["motor_torque"]
+    assert len(np.unique(np.round(torque, 12))) <= 2.0 / 0.05 + 1
+    assert np.allclose(torque[1:10], torque[1])
+
+
+def test_a_delay_delays_the_target_not_the_torque_in_the_loop():
+    late = moved(joint().with_effect("command_delay", delay=0.04))["position"]
+    assert np.max(np.abs(late[8:] - moved(joint())["position"][:-8])) < 1e-9
+    shifted = moved(joint().with_effect("command_delay", delay=0.04), STEPPING + 1.0)["position"]
+    assert shifted[0] > moved(joint())["position"][0]  # before the first target a joint had that target
+
+
+def test_the_encoder_may_sit_behind_the_play():
+    before = (
+        load_rig("pd_joint").with_effect("backlash", gap=0.02).with_effect("coulomb_friction", torque=0.1)
+    )
+    behind = replace(before, encoder_end="spring_end")
+    slow_swing = 0.4 * np.sin(2 * np.pi * T)
+    lost = {
+        rig.encoder_end: np.ptp(
+            moved(rig, slow_swing)["position"] - moved(rig.with_effects(), slow_swing)["position"]
+        )
+        for rig in (before, behind)
+    }
+    assert lost["spring_end"] > 2.0 * lost["gear_output"]
+
+
+@pytest.mark.parametrize("kind", ["pd", "cascade"])
+def test_the_linear_response_is_that_of_the_simulation(kind):
+    rig = joint(kind)
+    f = 4.0
+    position = moved(rig, 0.1 * np.sin(2 * np.pi * f * T))["position"]
+    wave = np.exp(-2j * np.pi * f * (T + 1 / RATE))[200:]
+    hold = np.exp(-1j * np.pi * f / RATE) * np.sinc(f / RATE)
+    measured = 2j * np.mean(position[200:] * wave) / 0.1
+    assert measured == pytest.approx(
+        complex(model_response(rig, "position", np.array([f]))[0] * hold), rel=0.02
+    )
+
+
+def test_a_rig_file_keeps_the_loop():
+    rig = replace(load_rig("pd_joint"), encoder_end="spring_end")
+    again = rig_from_document(rig_to_document(rig))
+    assert again == rig
+    assert again.free() == rig.free()
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"kind": "pid"}, "controller.kind"),
+        ({"kind": "pd", "k_v": {"value": 1.0, "unit": "N m s/rad"}}, "controller"),
+        ({"kind": "pd", "k_d": {"value": 1.0, "unit": "N m s/rad"}}, "controller.k_p"),
+        ({"kind": "pd", "k_p": {"value": 1.0, "unit": "1/s"}}, "controller.k_p"),
+        ({"kind": "pd", "k_p": {"value": -1.0, "unit": "N m/rad"}}, "controller.k_p"),
+    ],
+)
+def test_a_loop_that_is_none_is_refused(change, field):
+    document = rig_to_document(load_rig("pd_joint"))
+    with pytest.raises(RigError, match=field):
+        rig_from_document({**document, "controller": change})
+
+
+def test_a_record_must_have_what_commands_its_rig():
+    rig = load_rig("pd_joint")
+    record = synthesize(rig, Channel(T, STEPPING))
+    assert set(record.channels) == {"reference", *rig.sensors}
+    assert np.array_equal(commanded(record, rig)["command"].y, STEPPING)
+    with pytest.raises(ChannelError, match="expected a rig with controller"):
+        simulate(load_rig("bare_drive"), record)
+    torques = Record({"command": Channel(T, STEPPING), "position": record["position"]}, source="torques")
+    with pytest.raises(ChannelError, match="no target positions"):
+        simulate(rig, torques)

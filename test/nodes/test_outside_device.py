@@ -1,0 +1,65 @@
+"""A device from outside the package in the driver node: asked for protection, its spring published as ft."""
+
+from pathlib import Path
+
+import pytest
+from rclpy.lifecycle import LifecycleNode
+
+from msg_adapters.ros import JointState, WrenchStamped, torque_command_message, wrench_of
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+
+TOY = Path(__file__).resolve().parents[1] / "hardware" / "toy_device.py"
+VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
+    "device": "toy", "rate": 200.0, "autostart": True, "command_timeout": 5.0, "deflection_limit": 0.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def drive(listener, monkeypatch):
+    """A function that makes a driver of a toy in this process."""
+    monkeypatch.setenv("RSEA_DEVICES", str(TOY))
+    made = []
+
+    def make(**values):
+        node = LifecycleNode("toy", namespace="toy")
+        made.append((driver.Driver(node, VALUES | values), node))
+        listener._executor.add_node(node)
+        return made[-1]
+
+    yield make
+    for program, node in made:
+        program.close()
+        listener._executor.remove_node(node)
+        node.destroy_node()
+
+
+def test_without_protection_it_is_not_configured(drive):
+    program, node = drive()
+    assert node._state_machine.current_state[1] == "unconfigured"
+    assert "dead-host protection none" in program._report()[1]
+
+
+def test_its_deflection_is_published_as_ft_and_says_so(drive, listener):
+    program, _ = drive(allow_no_dead_host_protection=True, axis="-torque.y")
+    wrenches = listener.hear(WrenchStamped, "/toy/ft", MEASUREMENT)
+    commands = listener.node.create_publisher(JointState, "/toy/torque_command", COMMAND)
+
+    def pushed():
+        commands.publish(torque_command_message(0, 10.0))
+        return wrenches and wrenches[-1].wrench.torque.y < -15.0
+
+    listener.until(pushed)
+    assert wrench_of(wrenches[-1])[1] == 0.0, "torque.z"
+    assert wrenches[-1].wrench.torque.y == pytest.approx(-1530.456 * 0.01)
+    assert wrenches[-1].header.frame_id == "spring_deflection"
+    values = program._report().values
+    assert str(values["dead_host_protection"]) == "none"
+    assert values["ft_source"] == "stiffness of 1530 N m/rad times measured deflection"
+    assert "toy" in values
+
+
+def test_a_supervised_one_is_configured_and_its_options_arrive(drive):
+    program, node = drive(device_options="supervised=yes")
+    assert node._state_machine.current_state[1] == "active"
+    assert str(program._report().values["dead_host_protection"]) == "supervisor, 0.1 s"

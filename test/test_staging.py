@@ -1,0 +1,147 @@
+"""Stages: what a killed writer left goes with the next writer, what one at work or another user has stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from msg_adapters import BagWriter
+from rsea_ros import staging
+from rsea_ros.files import PREFIX, give_names
+from rsea_ros.new_files import NewFiles
+from rsea_ros.staging import LEFT_AFTER, make_stage, remove_left
+
+KILLED = (
+    "import os, signal, sys; from pathlib import Path; from rsea_ros.staging import make_stage\n"
+    "stage = make_stage(Path(sys.argv[1]))\n"
+    "(stage.path / 'report.html').write_text('half of it')\n"
+    "os.kill(os.getpid(), signal.SIGKILL)"
+)
+
+
+def aged(path: Path, seconds: float = 2.0 * LEFT_AFTER) -> Path:
+    os.utime(path, (time.time() - seconds,) * 2)
+    return path
+
+
+def left_by_a_killed_writer(folder: Path) -> Path:
+    done = subprocess.run([sys.executable, "-c", KILLED, folder], timeout=60, check=False)
+    assert done.returncode == -signal.SIGKILL
+    (path,) = folder.iterdir()
+    assert path.name.startswith(PREFIX)
+    return path
+
+
+def left(folder: Path) -> Path:
+    """Return a stage as a killed writer leaves it, without killing one."""
+    stage = make_stage(folder)
+    (stage.path / "report.html").write_text("half of it")
+    stage.release()
+    return aged(stage.path)
+
+
+def test_the_next_writer_removes_what_a_killed_one_left(tmp_path):
+    path = left_by_a_killed_writer(tmp_path)
+    remove_left(tmp_path)
+    assert path.exists(), "younger than a minute"
+    aged(path)
+    with NewFiles(tmp_path) as new:
+        new.write("report.html", "whole")
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_so_does_the_next_bag(tmp_path):
+    left(tmp_path)
+    with BagWriter(tmp_path / "bag.mcap", recording=False):
+        pass
+    assert [p.name for p in tmp_path.iterdir()] == ["bag.mcap"]
+
+
+def test_a_writer_at_work_keeps_its_stage_however_old(tmp_path):
+    with NewFiles(tmp_path) as first:
+        first.write("first", "1")
+        (stage,) = tmp_path.iterdir()
+        aged(stage)
+        with NewFiles(tmp_path) as second:
+            second.write("second", "2")
+        assert stage.exists()
+    assert {p.name for p in tmp_path.iterdir()} == {"first", "second"}
+
+
+def test_a_bag_being_written_is_kept_and_lets_go_when_complete(tmp_path):
+    with BagWriter(tmp_path / "bag", recording=False) as bag:
+        aged(bag.partial)
+        remove_left(tmp_path)
+        assert bag.partial.exists()
+    assert [p.name for p in tmp_path.iterdir()] == ["bag"]
+    assert bag._stage is None
+
+
+def stage_of_another_machine(folder: Path) -> Path:
+    path = left(folder)
+    return aged(path.rename(path.with_name(f"{PREFIX}stage-00000000-{path.name[-16:]}")))
+
+
+def replaced_file(folder: Path) -> Path:
+    """Return what a writer that was killed while it replaced a file has put aside: the only copy."""
+    path = folder / f"{PREFIX}old-0123abcd"
+    path.mkdir()
+    return aged(path)
+
+
+def link_of_that_name(folder: Path) -> Path:
+    (folder / "target").mkdir()
+    path = folder / f"{staging._NAME}0123456789abcdef"
+    path.symlink_to(folder / "target")
+    return path
+
+
+def file_of_that_name(folder: Path) -> Path:
+    path = folder / f"{staging._NAME}0123456789abcdef"
+    path.write_text("of somebody")
+    return aged(path)
+
+
+KEPT = (stage_of_another_machine, replaced_file, link_of_that_name, file_of_that_name)
+
+
+@pytest.mark.parametrize("make", KEPT)
+def test_what_is_no_left_stage_stays(tmp_path, make):
+    path = make(tmp_path)
+    remove_left(tmp_path)
+    assert os.path.lexists(path)
+
+
+def test_a_stage_of_another_user_stays(tmp_path, monkeypatch):
+    path = left(tmp_path)
+    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    remove_left(tmp_path)
+    assert path.exists()
+
+
+def test_what_is_put_aside_has_a_name_that_no_sweep_knows(tmp_path, monkeypatch):
+    source, target = tmp_path / "source", tmp_path / "target"
+    for path in (source, target):
+        path.mkdir()
+        (path / "file").write_text(path.name)
+    seen = []
+    monkeypatch.setattr("rsea_ros.files.remove", seen.append)
+    give_names([(source, target)], force=True)
+    (aside,) = seen
+    aged(aside)
+    remove_left(tmp_path)
+    assert (aside / "file").read_text() == "target"
+
+
+def test_two_that_remove_at_once_agree(tmp_path):
+    paths = [left(tmp_path) for _ in range(20)]
+    with ThreadPoolExecutor(2) as both:
+        list(both.map(remove_left, [tmp_path] * 2))
+    assert not any(path.exists() for path in paths)
