@@ -1,7 +1,9 @@
-"""The torque controller on the simulated bench, faster than real time: the table of the README as Markdown.
+"""The torque controller on the simulated bench, faster than real time: its tables, as Markdown.
 
-Run: python bench/torque_control.py [RIG] [--free RIG] [--rate 280 1000].
-Through real nodes: bench/torque_control_nodes.py.
+Run: python bench/torque_control.py [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
+Sections: trials (all that is asked, the worst of the set beside the nominal; the whole set swept), followed
+(5 Hz on every simulated bench of the set), impedance (the outer loop), late (samples that come when they
+come), baselines (docs/baselines.md), cost. Through real nodes: bench/torque_control_nodes.py.
 """
 
 from __future__ import annotations
@@ -11,17 +13,30 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from bench.torque_control_baselines import baselines
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Reading, TorqueController
-from rsea_ros.control.study import Study, study
-from rsea_ros.model.rig import EffectSetting
+from rsea_ros.control.harness import Arrivals, irregular
+from rsea_ros.control.human import measured
+from rsea_ros.control.impedance import moved
+from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.robustness import robustness
+from rsea_ros.control.study import study
+from rsea_ros.control.synthesis import Design, design
+from rsea_ros.control.trials import hardest, tracked
+from rsea_ros.control.virtual import Virtual, passive_to, stiffest
+from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report import control_tables as tables
+
+SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -30,36 +45,113 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
 
-def cost(found: Study) -> str:
-    """Return what a step costs, as a part of its period, with friction compensated; medians of 1000."""
-    parts = []
-    rig = found.rig.with_effects(EffectSetting("coulomb_friction", {"torque": 3.0}))
+def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Design, try everything, sweep the set densely."""
+    found = study(rig, free, rates, motors(rig))
+    shown = [f"{at.design.rate:g} Hz" for at in found.rates]
+    yield "\n".join(tables.gains_words(found))
     for at in found.rates:
-        controller, times = TorqueController(rig, at.design.rate, at.design.gains), []
+        swept = robustness(found.rig, load_range(rig, free), at.design)
+        m = swept.margins
+        yield (
+            f"{at.design.rate:g} Hz, {swept.cases} benches, {swept.unstable} unstable: least phase margin "
+            f"{m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
+            f"|S| {swept.sensitivity:.2f} ({swept.where})"
+        )
+    yield markdown(tables.trial_head(found), tables.trial_rows(found))
+    yield markdown(["compensated", "sine of 10 N·m", *shown], tables.compensation_rows(found))
+    yield markdown(["motor", "amplitude", "clamped: not from", "free: not from"], tables.reach_rows(found))
+
+
+def followed(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Follow the sine on every simulated bench of the set."""
+    loads = load_range(rig, free)
+    for found in designs(rig, loads, rates):
+        for case in hardest(loads, every=True):
+            yield f"{found.rate:g} Hz, {case}: {100.0 * tracked(loads[LOCKED], loads, case, found):.2f} %"
+
+
+def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """State the passive range of the outer loop, and measure it with a human-like load."""
+    for found in designs(rig, load_range(rig, free), rates):
+        for damping in (0.0, 2.0, 5.0):
+            most = stiffest(rig, found, damping, 20.0)
+            to = passive_to(rig, found, Virtual(0.9 * most, damping))
+            yield (
+                f"{found.rate:g} Hz, D_v {damping:g}: Re Z > 0 to 20 Hz for K_v <= {most:.0f} N m/rad; "
+                f"0.9 of that to {to:.0f} Hz"
+            )
+        for virtual in (Virtual(0.0, 0.0), Virtual(200.0, 2.0)):
+            z = measured(rig, found, virtual, SWEEP)
+            over = np.abs(z) / np.abs(moved(rig, found.rate, SWEEP).spring)
+            cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
+            yield f"{virtual}: |Z| over the spring's {', '.join(cells)}; least Re Z {z.real.min():.1f}"
+
+
+def late(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Let measurements and commands come when they come: largest |ft| and command for 10 N m at 5 Hz."""
+    for found in designs(rig, load_range(rig, free), rates):
+        for name, (taken, acting) in _kinds(round(3.0 * found.rate)).items():
+            wanted = 10.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(len(taken)) / found.rate)
+            controller = TorqueController(rig, found.rate, found.gains)
+            run = irregular(rig, found.rate, controller, wanted, Arrivals(taken, acting))
+            after = run.t > 1.0
+            ft, command = np.abs(run.ft[after]).max(), np.abs(run.command[after]).max()
+            error = f"error {run.error(1.0):.1%}"
+            yield f"{found.rate:g} Hz, {name}: |ft| {ft:.1f}, command {command:.1f} N m, {error}"
+
+
+def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+    dice, k, none = np.random.default_rng(1), np.arange(n) % 97, np.zeros(n)
+    return {
+        "in time": (none, none),
+        "one 2.6 periods after the last, then one in time": (np.where(k == 60, 1.6, 0.0), none),
+        "one lost, the next 0.6 late": (np.select([k == 59, k == 60], [np.nan, 0.6], 0.0), none),
+        "a tenth lost": (np.where(dice.random(n) < 0.1, np.nan, 0.0), none),
+        "eight lost at once": (np.where((k > 50) & (k < 59), np.nan, 0.0), none),
+        "jitter of 0.3 periods": (np.minimum(0.3 * np.abs(dice.normal(size=n)), 0.9), none),
+        "all commands one late": (none, none + 1.0),
+        "all commands three late": (none, none + 3.0),
+    }
+
+
+def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Tell what a step costs, as a part of its period; medians of 1000."""
+    for found in designs(rig, load_range(rig, free), rates):
+        controller, times = TorqueController(rig, found.rate, found.gains), []
         for k in range(1000):
-            reading = Reading(math.sin(0.1 * k), 0.01, 0.0, 1.0)
+            reading = Reading(math.sin(0.1 * k), 0.01 * math.cos(0.1 * k), 0.0, 1.0)
             begin = time.perf_counter()
-            controller.step(reading, 1.0)
+            controller.step(reading, math.sin(0.1 * k))
             times.append(time.perf_counter() - begin)
         middle = statistics.median(times)
-        parts.append(f"{1e6 * middle:.0f} µs, {100 * middle * at.design.rate:.1f} % at {at.design.rate:g} Hz")
-    return "One step of the controller: " + "; ".join(parts)
+        part = f"{100 * middle * found.rate:.1f} % of the period"
+        yield f"{found.rate:g} Hz: {1e6 * middle:.0f} µs a step, {part}"
+
+
+def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[Design]:
+    """Return the design at each rate."""
+    return [design(rig, loads, rate) for rate in rates]
+
+
+SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
+    "trials": trials, "followed": followed, "impedance": outer, "late": late, "baselines": baselines,
+    "cost": cost,
+}  # fmt: skip
 
 
 def main() -> None:
     """Design, try, print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rig", nargs="?", default="paper_high_impedance")
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
+    parser.add_argument("--rig", default="paper_high_impedance")
     parser.add_argument("--free", default="paper_moving_output", help="rig whose ends are the lightest load")
     parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="Hz")
     args = parser.parse_args()
-    rig = load_rig(args.rig)
-    found = study(rig, load_rig(args.free), args.rate, motors(rig))
-    rates = [f"{at.design.rate:g} Hz" for at in found.rates]
-    print(*tables.gains_words(found), cost(found), sep="\n", end="\n\n")
-    print(markdown(tables.trial_head(found), tables.trial_rows(found)))
-    print(markdown(["compensated", "sine of 10 N·m", *rates], tables.compensation_rows(found)))
-    print(markdown(["motor", "amplitude", "clamped: not from", "free: not from"], tables.reach_rows(found)))
+    for name in args.sections or SECTIONS:
+        print(f"== {name}", flush=True)
+        for line in SECTIONS[name](load_rig(args.rig), load_rig(args.free), args.rate):
+            print(line, flush=True)
 
 
 if __name__ == "__main__":

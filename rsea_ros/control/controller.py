@@ -75,12 +75,14 @@ class TorqueController:
     """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
 
     def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
-                 compensate: Iterable[str] = COMPENSATED, preview: bool = False,
+                 compensate: Iterable[str] = COMPENSATED, preview: bool = False, learn: bool = True,
                  corner: float = CORNER) -> None:  # fmt: skip
         """rate: Hz. gains: by default those of `synthesis.design`, which takes some seconds.
 
         preview: desired torques are those of two samples later, known ahead: no prediction. corner: of the
-        prediction, Hz. Raises ParameterError for a rig whose torque cannot be controlled.
+        prediction, Hz. learn: whether load and drive are learned; not inside an outer loop whose desired
+        torque follows the motion (virtual.py), where what is learned would change its impedance.
+        Raises ParameterError for a rig whose torque cannot be controlled.
         """
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
         self._law: Law = law_of(rig, rate, gains)
@@ -88,7 +90,7 @@ class TorqueController:
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction = Prediction(corner, 1.0 / rate)
-        self._preview, self._limits = preview, limits or Limits()
+        self._preview, self._learn, self._limits = preview, learn, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
 
     def start(self, reading: Reading, desired: float = 0.0) -> None:
@@ -123,17 +125,17 @@ class TorqueController:
         for wanted in self._prediction.between(desired, missed):
             self._coast(wanted)
         ahead, model = self._ahead(desired), self._reference
-        low, high = self._allowed()
-        forward = min(max(model.torque(ahead), low), high)
+        largest, most = self._largest(), self._limits.slew * self._law.period
+        forward = min(max(model.torque(ahead), -largest), largest)
         more, learned = model.more(forward)
-        more = min(max(more, low - forward), high - forward)
+        more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
-        self._hear(reading, missed, error, slowness, sure=trust == 1.0 and not late)
+        self._hear(reading, missed, error, slowness, sure=self._learn and trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back = 0.0 if late else trust * back
         known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + more + back + known + crossing
-        torque = min(max(asked, low), high)
+        torque = min(max(asked, self._sent - most, -largest), self._sent + most, largest)
         if (asked - torque) * error > 0.0:
             state = state._replace(slow=self._state.slow, integral=self._state.integral)
         self._remember(hold(state, torque - known), torque, known, learned)
@@ -210,10 +212,8 @@ class TorqueController:
         self._crossed = start
         return self._law.inertia * (stop - start) / h + 0.5 * self._law.damping * (start + stop)
 
-    def _allowed(self) -> tuple[float, float]:
-        """Return the least and the largest torque that the limits let through now, N m."""
-        limits, before, h = self._limits, self._sent, self._law.period
+    def _largest(self) -> float:
+        """Return the largest torque that the limits let through now, N m; it grows after a start."""
+        limits, h = self._limits, self._law.period
         grown = min(1.0, (self._age + 1) * h / limits.ramp) if limits.ramp > 0.0 else 1.0
-        largest = min(limits.torque, max(abs(self._begin), limits.torque * grown))
-        low, high = before - limits.slew * h, before + limits.slew * h
-        return min(max(low, -largest), largest), min(max(high, -largest), largest)
+        return min(limits.torque, max(abs(self._begin), limits.torque * grown))

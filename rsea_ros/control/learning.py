@@ -66,7 +66,7 @@ class Learning:
         self._priors = [(LOCKED, 1.0 / spreads[0] ** 2), (known, 1.0 / spreads[1] ** 2)]
         self._bounds = [
             (np.array([0.8, 0.0, -LIGHTEST]), np.array([1.25, LIGHTEST, 3.0 * LIGHTEST])),
-            (np.array([0.5, -0.5, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
+            (np.array([0.5, 0.0, 0.0]) * [*known[:2], 0.0], np.array([2.0, 3.0, 10.0]) * [*known[:2], 1.0]),
         ]
         self.load, self.drive = LOCKED, known
         self._moments, self._turn = np.zeros((2, 4, 4)), 0

@@ -105,3 +105,11 @@ def prediction_response(corner: float, period: float, hz: FloatArray) -> Complex
     rates = ALONG[0] * [1.0, AHEAD, AHEAD * AHEAD]
     response: ComplexArray = (1.0 + states[:, 1:] @ rates[1:]) / z**AHEAD
     return response
+
+
+def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:
+    """Return what becomes of a torque that is not trusted, at the end of the hold, at hz."""
+    back = 1.0 / z_of(period, hz)
+    pole = math.exp(-2.0 * math.pi * SMOOTH * period)
+    response: ComplexArray = ((1.0 - pole) / (1.0 - pole * back)) ** 2 * back**AHEAD
+    return response

@@ -165,8 +165,8 @@ def disturbed(loads: Mapping[str, Rig], case: Case) -> Rig:
 
 
 def amplitude_of(load: Rig) -> float:
-    """Return the sine, N m, that a load lets a motor of 68 N m make at 5 Hz, with a tenth to spare."""
-    return min(AMPLITUDE, 0.9 * largest(load.with_effects(), HZ, Limits().torque, math.inf))
+    """Return the sine, N m, that a load lets a motor of 68 N m make at 5 Hz, a fifth of it to spare."""
+    return min(AMPLITUDE, 0.8 * largest(load.with_effects(), HZ, Limits().torque, math.inf))
 
 
 def tracked(rig: Rig, loads: Mapping[str, Rig], case: Case, design: Design) -> float:

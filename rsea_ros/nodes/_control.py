@@ -31,6 +31,7 @@ TABLE = (
     Parameter("robust", 3.0, "largest sensitivity of the whole set of benches", "", 1.1, 20.0),
     Parameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
     Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
+    Parameter("learn", True, "whether load and drive are learned; not inside an outer impedance loop"),
     Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
     Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
     Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
@@ -72,6 +73,7 @@ def controller_of(values: Values, found: Design) -> TorqueController:
         found.gains,
         limits=limits,
         preview=values["preview"],
+        learn=values["learn"],
         corner=values["prediction"],
         **options,
     )

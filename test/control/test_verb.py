@@ -9,7 +9,8 @@ def test_the_verb_writes_json_and_a_page(tmp_path, capsys):
     assert main(["control", "--rate", "280", "--json", "--fail-on", "missed", "--out", str(tmp_path)]) == 0
     result = json.loads(capsys.readouterr().out)
     (at,) = result["rates"]
-    assert all(trial["met"] for trial in at["trials"])
+    met = [trial["met"] for trial in at["trials"]]
+    assert False not in met and met.count(True) > 12 and at["set"]["unstable"] == 0
     assert at["gains"]["k_p"] > 0.0 and "locked" in at["margins"]
     assert {c["effect"] for c in at["compensation"]} >= {"coulomb_friction", "torque_ripple", "backlash"}
     assert {m["motor"] for m in result["large_signal"]} >= {"h54-200-s500-r, continuous"}

@@ -1,0 +1,41 @@
+"""The outer impedance loop: what a hand feels is what the linear model says, and passive as far as stated."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rsea_ros.control.human import measured
+from rsea_ros.control.impedance import moved
+from rsea_ros.control.law import Gains
+from rsea_ros.control.synthesis import Design
+from rsea_ros.control.virtual import Virtual, felt, passive_to, stiffest
+from rsea_ros.model.rig_file import load_rig
+
+RIG = load_rig("paper_high_impedance")
+DESIGN = Design(Gains(0.2575, 0.003029, 1.195, 6.99, 42.9), 280.0, {}, math.nan)
+HZ = np.array([1.0, 5.0, 10.0, 20.0])
+
+
+def test_a_hand_feels_hardly_more_than_the_spring_and_what_the_formula_says():
+    alone = Virtual(0.0, 0.0)
+    z = measured(RIG, DESIGN, alone, HZ)
+    assert np.abs(z) == pytest.approx(np.abs(felt(RIG, DESIGN, alone, HZ)), rel=0.03)
+    assert np.all(np.abs(z) / np.abs(moved(RIG, 280.0, HZ).spring) < 1.23)
+    assert np.all(z.real > 0.0)
+
+
+def test_a_virtual_spring_is_felt_and_is_passive():
+    spring = Virtual(200.0, 2.0)
+    z = measured(RIG, DESIGN, spring, HZ[:1])
+    assert z == pytest.approx(felt(RIG, DESIGN, spring, HZ[:1]), rel=0.05)
+    more = z[0] - felt(RIG, DESIGN, Virtual(0.0, 0.0), HZ[:1])[0]
+    assert more.imag == pytest.approx(-200.0 / (2.0 * math.pi), rel=0.05)
+    assert more.real == pytest.approx(2.0, abs=0.5)
+
+
+def test_the_stiffest_spring_is_the_last_that_is_passive():
+    most = stiffest(RIG, DESIGN, 2.0, 20.0)
+    assert 200.0 < most < RIG["spring.stiffness"]
+    assert passive_to(RIG, DESIGN, Virtual(0.98 * most, 2.0)) >= 20.0
+    assert passive_to(RIG, DESIGN, Virtual(1.05 * most, 2.0)) < 20.0
