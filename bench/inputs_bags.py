@@ -20,6 +20,8 @@ from rsea_ros.signals import Channel, FloatArray, Record
 CHANNELS = ("ft", "position", "velocity", "motor_torque")
 FEWEST = 10
 """Samples of a command: fewer are refused by the package's excitations, but may stand in a bag."""
+TARGETS = {True: 0.02, False: 1e-3}
+"""rad of reference for each N m of a case's command, with and without a position loop in the rig."""
 MISFIT = 1.6
 """By which the bench's damping and inertia differ from the rig's where the case says so."""
 
@@ -91,12 +93,14 @@ def record_of(case: Mapping[str, Any], rig: Rig) -> Record:
                      for n in names if n != "ft"}  # fmt: skip
         if "ft" in names:
             channels["ft"] = Channel(t + 1.0 / rate, np.zeros(len(t)))
-        measured = _measured(Record(channels), _bench(rig, case["bench"]), case["noise"])
+        targets = Channel(t, TARGETS[rig.loop is not None] * u)
+        asked = Record({**channels, "reference": targets})
+        measured = _measured(asked, _bench(rig, case["bench"]), case["noise"])
         if "ft" in case["channels"] and rig.rigid_spring:
             measured["ft"] = Channel(t + 1.0 / rate, 0.01 * _noise(len(t)))
         record = Record({"command": channels["command"], **measured}, epoch_ns=case["epoch"])
         if case["loop"] and rig.controller is not None:
-            record = record.with_channels(reference=Channel(t, 1e-3 * u))
+            record = record.with_channels(reference=targets)
         return STAMPS[case["stamps"]](SENSORS[case["dead"]](record))
 
 
@@ -112,9 +116,10 @@ def _measured(asked: Record, rig: Rig, noise: bool) -> dict[str, Channel]:
     rng = np.random.default_rng(11)
     effects = tuple(e for e in rig.effects if e.name != "mains_interference")
     try:
-        true = simulate(replace(rig, effects=effects, controller=None), asked)
+        driven = replace(rig, effects=effects, controller=rig.controller if rig.loop else None)
+        true = simulate(driven, asked)
     except IdentificationError:  # too short for a simulation: sensors at rest
-        true = {n: np.zeros(len(c)) for n, c in asked.channels.items() if n != "command"}
+        true = {n: np.zeros(len(c)) for n, c in asked.channels.items() if n in CHANNELS}
     hum = len(effects) < len(rig.effects)
     measured = {}
     for n, y in true.items():

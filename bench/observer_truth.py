@@ -17,9 +17,9 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.drive import steps_per_sample
 from rsea_ros.model.equations import C, H, P, mechanics
-from rsea_ros.model.observer.linear import structured
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import Machine, build, measure, run
+from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
 

@@ -6,6 +6,7 @@ numbers of its initial state, and those on the first samples only, which no scor
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import solve
+from rsea_ros.identification.solver import Solution, solve
 from rsea_ros.identification.unknowns import apply, unknowns_of_effect, unknowns_of_rig
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
@@ -28,7 +29,7 @@ REFINE = 4
 
 @dataclass(frozen=True)
 class Score:
-    """A test: what was scored, its error, published errors beside it, and the limit that was asked for."""
+    """A test: what was scored, its error, published errors, and the limit that was asked for."""
 
     test: str
     error: float
@@ -43,23 +44,38 @@ def record_of(command: FloatArray, position: FloatArray, rate: float) -> Record:
     return Record({"command": Channel(t, command), "position": Channel(t, position)}, source="benchmark")
 
 
-def fitted(rig: Rig, record: Record, skip: int, refine: int = REFINE) -> Rig:
-    """Return the rig with all its free values fitted to a record by output error on position.
+def case_of(
+    rig: Rig,
+    record: Record,
+    skip: int,
+    refine: int = REFINE,
+    initial: tuple[float, float] = (0.0, 0.0),
+) -> Case:
+    """Return a record ready to be fitted to its position.
 
-    skip: samples at the start that no residual looks at: the initial state decays in them.
+    skip: samples at the start that no residual looks at: the initial state, position and velocity, decays in
+    them.
     """
     mask = np.arange(len(record["position"])) >= skip
-    case = Case(
-        drive=replace(drive_from(record, hold=rig.hold, refine=refine), initial=(0.0, 0.0)),
+    return Case(
+        drive=replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial),
         t={"position": record["position"].t},
         measured={"position": record["position"].y},
         noise={"position": rig.sensors["position"].noise},
         mask={"position": mask},
     )
+
+
+def fitted(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
+    """Return the fit of all free values of a rig and its effects, by output error on position."""
     effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
     unknowns = (*unknowns_of_rig(rig), *(u for group in effects for u in group))
-    solution = solve(Problem((case,), rig, unknowns, ("position",)), iterations=60)
-    return apply(rig, unknowns, solution.theta)[0]
+    return solve(Problem(tuple(cases), rig, unknowns, ("position",)), iterations=iterations)
+
+
+def rig_of(solution: Solution) -> Rig:
+    """Return the rig with the values of a fit."""
+    return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)[0]
 
 
 def error_of(rig: Rig, record: Record, window: int, refine: int = REFINE) -> float:
@@ -69,8 +85,23 @@ def error_of(rig: Rig, record: Record, window: int, refine: int = REFINE) -> flo
     """
     drive = drive_from(record, hold=rig.hold, refine=refine)
     started = replace(drive, initial=_initial(rig, drive, record["position"].y[:window]))
-    error = simulate_drive(rig, started)["position"] - record["position"].y
-    return float(np.sqrt(np.mean(error[window:] ** 2)))
+    return _rms(simulate_drive(rig, started)["position"] - record["position"].y, window)
+
+
+def error_from(
+    rig: Rig,
+    record: Record,
+    skip: int = 0,
+    refine: int = REFINE,
+    initial: tuple[float, float] = (0.0, 0.0),
+) -> float:
+    """Return the RMS error on a test record that is simulated from a state, its first samples left out."""
+    drive = replace(drive_from(record, hold=rig.hold, refine=refine), initial=initial)
+    return _rms(simulate_drive(rig, drive)["position"] - record["position"].y, skip)
+
+
+def _rms(error: FloatArray, skip: int) -> float:
+    return float(np.sqrt(np.mean(error[skip:] ** 2)))
 
 
 def _initial(rig: Rig, drive: Drive, measured: FloatArray) -> tuple[float, float]:

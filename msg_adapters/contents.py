@@ -69,5 +69,6 @@ class Contents:
 
     def told(self) -> str:
         """Return notes and faults for the text of a refusal, empty where there are none."""
-        parts = [*self.notes, *(f"{f.kind.replace('_', ' ')}: {f.detail}" for f in self.faults)]
+        faults = (f"{f.kind.replace('_', ' ')}: {f.detail}" for f in self.faults)
+        parts = dict.fromkeys([*self.notes, *faults])
         return f" ({'; '.join(parts)})" if parts else ""

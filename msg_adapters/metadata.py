@@ -12,6 +12,7 @@ import yaml
 from msg_adapters import yaml_text
 from msg_adapters.contents import Contents
 from msg_adapters.remarks import Remarks, remarks_of
+from msg_adapters.yaml_text import NotUnderstood
 from rsea_ros.errors import BagError
 from rsea_ros.wording import brief
 
@@ -57,7 +58,7 @@ def known(bag: Path, contents: Contents) -> Known:
         raise
     except (TypeError, ValueError, KeyError) as error:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
-        contents.tell("damaged_metadata", NAME, f"not understood ({brief(str(error))}), read without it")
+        contents.tell("damaged_metadata", NAME, f"not understood ({_why(error)}), read without it")
         return Known()
     for file in found.files:
         if not file.exists():
@@ -66,26 +67,44 @@ def known(bag: Path, contents: Contents) -> Known:
 
 
 def _known(bag: Path, document: Any) -> Known:
-    """Raises TypeError, ValueError or KeyError for a document that is not what rosbag2 writes."""
-    root = document[ROOT]
+    """Raises NotUnderstood, TypeError, ValueError or KeyError for what rosbag2 does not write."""
+    root = document[ROOT] if isinstance(document, dict) else None
+    if not isinstance(root, dict):
+        raise NotUnderstood(f"no mapping {ROOT}")
     files = [bag / PurePath(_text_of(name)).name for name in _list_of(root["relative_file_paths"])]
     topics = [
         (topic["topic_metadata"]["name"], topic) for topic in _list_of(root["topics_with_message_count"])
     ]
-    counts = {_text_of(name): int(topic["message_count"]) for name, topic in topics}
+    counts = {_text_of(name): _count_of(topic["message_count"]) for name, topic in topics}
     custom = root.get("custom_data")
     return Known(files, counts, remarks_of(custom if isinstance(custom, dict) else {}))
 
 
+def _why(error: Exception) -> str:
+    """Return in words why metadata were not understood."""
+    match error:
+        case NotUnderstood():
+            return brief(str(error))
+        case KeyError():
+            return f"no {brief(str(error.args[0]))}"
+    return "not in the form that rosbag2 writes"
+
+
 def _text_of(value: Any) -> str:
     if not isinstance(value, str) or "\0" in value:
-        raise TypeError(f"{brief(repr(value))}, expected a text")
+        raise NotUnderstood(f"{brief(repr(value))}, expected a text")
     return value
+
+
+def _count_of(value: Any) -> int:
+    if not (isinstance(value, str) and value.isdecimal() and value.isascii() and len(value) < 19):
+        raise NotUnderstood(f"message_count {brief(repr(value))}, expected a number")
+    return int(value)
 
 
 def _list_of(value: Any) -> list[Any]:
     if not isinstance(value, list):
-        raise TypeError(f"{brief(repr(value))}, expected a list")
+        raise NotUnderstood(f"{brief(repr(value))}, expected a list")
     return value
 
 

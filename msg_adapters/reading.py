@@ -102,7 +102,10 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             topics_held = sorted(contents.topics.items())[:_MOST_NAMED]
             have = ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics_held)
             have = have or "no topic at all"
-            raise BagError(f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}")
+            raise BagError(
+                f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}; "
+                "record one, or name its topic with --topic or --namespace"
+            )
 
 
 def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
@@ -110,7 +113,10 @@ def _require_values(source: str, series: Mapping[str, Series], strict: bool, tol
     if strict and "command" not in series and "reference" not in series:
         raise BagError(f"{source}: the command's messages hold no effort, expected the torque in N m")
     if not set(series) - ({"command", "reference"} if strict else set()):
-        raise BagError(f"{source}: the messages hold no values, expected a measurement{told.told()}")
+        raise BagError(
+            f"{source}: no measurement is left{told.told()}, expected joint states or F/T with values, "
+            "stamped by the command's clock"
+        )
 
 
 def _series(

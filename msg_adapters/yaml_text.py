@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 
 from rsea_ros.errors import BagError
-from rsea_ros.wording import brief
+from rsea_ros.wording import brief, no_utf_8
 
 LARGEST = 1_000_000
 DEEPEST = 30
@@ -16,11 +16,15 @@ DEEPEST = 30
 _Loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
+class NotUnderstood(ValueError):
+    """A document that is not what it should be, in words for people."""
+
+
 def load(path: Path) -> Any:
     """Return the document of a file as mappings, lists and texts.
 
-    Raises BagError for a file of more than 1 MB, aliases, and deep nesting; ValueError for what is no YAML;
-    FileNotFoundError.
+    Raises BagError for a file of more than 1 MB, aliases, and deep nesting; NotUnderstood for what is no
+    YAML; FileNotFoundError.
     """
     with path.open("rb") as file:
         data = file.read(LARGEST + 1)
@@ -28,10 +32,13 @@ def load(path: Path) -> Any:
         raise BagError(f"{path}: more than {LARGEST} bytes, expected the metadata of a bag")
     try:
         text = data.decode()
+    except UnicodeDecodeError as error:
+        raise NotUnderstood(no_utf_8(error)) from None
+    try:
         _check(path, text)
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
-        raise ValueError(brief(" ".join(str(error).split()))) from None
+        raise NotUnderstood(brief(" ".join(str(error).split()))) from None
 
 
 def _check(path: Path, text: str) -> None:

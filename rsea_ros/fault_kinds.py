@@ -41,6 +41,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "dead_channel": "a sensor that does not answer to the machine; no result uses it",
         "sign": "a channel has the other sign than the rig",
         "scale": "a channel is in another unit than the rig",
+        "smoothing": "a channel was averaged before it was logged",
         "wrong_rig": "the record does not fit the rig it is held against",
         "coarse_steps": "values in much larger steps than the rig's sensor makes",
         "frozen_samples": "samples that repeat while the machine moves",

@@ -17,7 +17,7 @@ import yaml
 
 from rsea_ros.decimal_number import decimal, is_decimal
 from rsea_ros.errors import FieldError
-from rsea_ros.wording import shown
+from rsea_ros.wording import no_utf_8, shown
 
 LARGEST = 1 << 20
 """Bytes. The largest rig has 4 kB."""
@@ -78,7 +78,7 @@ def read(path: Path) -> Document:
     try:
         return parse(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        raise FieldError(f"not YAML: {error}, expected text in UTF-8") from None
+        raise FieldError(f"not YAML: {no_utf_8(error)}, expected text in UTF-8") from None
 
 
 def parse(text: str) -> Document:

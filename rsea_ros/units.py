@@ -18,6 +18,22 @@ _SAME = {
     "1/1": "1",
 }
 
+_ALONG_A_LINE = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "N m": "N",
+    "N m/rad": "N/m",
+    "N m s/rad": "N s/m",
+    "kg m^2": "kg",
+    "1/rad": "1/m",
+    "1/rad^2": "1/m^2",
+}
+
+
+def in_motion(unit: str, *, linear: bool) -> str:
+    """Return the unit that stands for one of a rotary machine in a machine that moves along a line."""
+    return _ALONG_A_LINE.get(unit, unit) if linear else unit
+
 
 def same_unit(text: object, unit: str) -> bool:
     """Tell whether a text means a unit, which is written as in `N m s/rad`.

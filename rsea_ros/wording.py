@@ -39,6 +39,11 @@ def shown(value: object, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
+def no_utf_8(error: UnicodeDecodeError) -> str:
+    """Return which byte of a file is no text in UTF-8."""
+    return f"byte {error.start} is {error.object[error.start]:#04x}, which is no UTF-8"
+
+
 def brief(text: str, longest: int = _LONGEST) -> str:
     """Return a text of unknown origin fit for a message: one line, no control characters, not too long."""
     cut = text[: longest + 1]

@@ -28,7 +28,7 @@ OWN = {
     "plugins": {"errors"},
     "interrupts": set(),
     "files": {"errors", "interrupts"},
-    "staging": {"errors", "files", "interrupts"},
+    "staging": {"files"},
     "new_files": {"errors", "files", "interrupts", "staging"},
     "units": set(),
     "decimal_number": set(),

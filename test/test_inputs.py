@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main, verbs
-from rsea_ros.diagnosis.initial_guess import Seen, starts_of
+from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify
@@ -26,10 +26,11 @@ from rsea_ros.signals import Channel, Record
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
+from inputs import kept_promises
 from inputs_bags import bag_of, record_of
 from inputs_cover import covering, pairs
 from inputs_matrix import BAG_VERBS
-from inputs_outcome import judge
+from inputs_outcome import Outcome, judge
 from inputs_server import MODULES
 
 BENCH = {
@@ -91,9 +92,14 @@ REFUSALS = {
     "a sample of 1e308": ("identify", {"dead": "1e308"}, "expected a finite value up to 1e+30"),
     "a zero command": ("identify", {"command": "zero"}, "the command stays at 0 N m and nothing moves"),
     "a dead bench": ("identify", {"dead": "all still"}, "no sensor answers to the machine"),
-    "too few samples": ("identify", {"dead": "few"}, "expected ft, position or velocity with motion"),
+    "too few samples": ("identify", {"dead": "few"}, "position or velocity with motion"),
     "a command of NaN": ("predict", {"dead": "command nan"}, "is nan N m, expected a number"),
     "sensors of another day": ("diagnose", {"stamps": "apart"}, "differs from the command's"),
+    "sensors of another day to a fit": ("identify", {"stamps": "apart"}, "stamped by the command's clock"),
+    "no measurement": ("identify", {"channels": ()}, "record one, or name its topic with --topic"),
+    "no channel to predict": ("predict", {"channels": ()}, "record it, or name its topic with --topic"),
+    "one stamp for all": ("diagnose", {"stamps": "same"}, "rising stamps: stamp each message when"),
+    "a dead bench to a diagnosis": ("diagnose", {"dead": "all still"}, "are the sensors alive?"),
     "nothing to compare": ("predict", {"stamps": "apart"}, "expected one channel"),
     "a still drive": (
         "identify", {"rig": "bare_drive", "dead": "all zero"}, "no sensor answers to the machine"
@@ -138,8 +144,8 @@ def test_a_simulation_that_runs_away_is_refused():
 
 def test_a_limit_is_guessed_without_a_motor_torque():
     case = case_from(record(), load_rig("paper_high_impedance"))
-    seen = Seen(case, load_rig("paper_high_impedance"), dict(case.measured))
-    limits = [start["limit"] for start in starts_of(effect_named("torque_saturation"), seen)]
+    seen = ResidualView(case, load_rig("paper_high_impedance"), dict(case.measured))
+    limits = [start["limit"] for start in initial_guesses(effect_named("torque_saturation"), seen)]
     assert len(limits) == 4 and min(limits) > 0.0
 
 
@@ -190,6 +196,23 @@ def test_a_still_command_is_refused_without_a_warning():
 )
 def test_the_gate_tells_a_kept_promise_from_a_broken_one(status, out, err, kind):
     assert judge(status, out, err, is_json=status in (0, 1)).kind == kind
+
+
+def test_a_gate_that_broke_off_goes_on_without_the_promises_that_were_kept(tmp_path):
+    log = tmp_path / "log.jsonl"
+    said = [
+        ("b0001 verb=check", "result"),
+        ("b0002 verb=predict", "traceback"),
+        ("b0003 verb=export", "crash"),
+        ("b0007 verb=export", "refused"),
+        ("b0001 verb=design", "result"),
+        ("b0002 verb=design", "memory"),
+    ]
+    lines = [json.dumps({"case": case, **vars(Outcome(kind))}) for case, kind in said]
+    log.write_text("\n".join([*lines, '{"case": "b0009 verb=control", "ki']))
+    kept = {case: outcome.kind for case, outcome in kept_promises(log).items()}
+    assert kept == {"verb=check": "result", "verb=export": "refused"}
+    assert kept_promises(tmp_path / "none") == kept_promises(None) == {}
 
 
 def test_the_covering_design_holds_every_pair():

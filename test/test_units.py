@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+import rsea_ros as rsea
 from rsea_ros.model.rig import FIELDS
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.signals import UNITS
 from rsea_ros.units import same_unit
 
@@ -41,3 +45,20 @@ def test_other_units(text, unit):
 def test_no_two_units_of_the_rig_are_the_same():
     units = {field.unit for field in FIELDS.values()} | set(UNITS.values())
     assert not [pair for pair in itertools.permutations(units, 2) if same_unit(*pair)]
+
+
+def test_a_linear_machine_has_units_of_its_own(tmp_path):
+    """The published drive of EMPS was said to have 95 kg m^2."""
+    rig = load_rig("emps")
+    assert rig.linear and load_rig(save(rig, tmp_path / "rig.yaml")).linear
+    t = np.arange(1200) / 300.0
+    force = 60.0 * np.sign(np.sin(2.0 * np.pi * 1.3 * t)) * np.exp(-0.1 * t)
+    record = rsea.simulate(replace(rig, controller=None), force, 300.0, seed=1)
+    units = {p.name: p.unit for p in rsea.identify(record, replace(rig, controller=None)).parameters.values()}
+    assert units["rotor.reflected_inertia"] == "kg" and units["coulomb_friction.torque"] == "N"
+    assert units["rotor.reflected_damping"] == "N s/m"
+
+
+def save(rig, path):
+    save_rig(rig, path)
+    return path

@@ -15,8 +15,12 @@ MEMORY, SECONDS = 3 << 30, 60
 """Ceilings of this process: bytes of addresses (SciPy itself takes 1 GB of them), and processor time."""
 
 
+class Refused(ValueError):
+    """What a variable is, and what was expected."""
+
+
 def main(path: str, limit: int, columns: list[str]) -> None:
-    """Read and write. Raises ValueError for what is no vector of numbers."""
+    """Read and write. Raises Refused for what is no vector of numbers."""
     import numpy as np
     from scipy.io import loadmat, whosmat
 
@@ -31,15 +35,15 @@ def main(path: str, limit: int, columns: list[str]) -> None:
             or size < 2
             or kind in ("cell", "struct", "object", "opaque", "char")
         ):
-            raise ValueError(f"variable {column!r} is {kind} {shape}, expected a vector of numbers")
+            raise Refused(f"variable {column!r} is {kind} {shape}, expected a vector of numbers")
         if size * len(columns) > limit:
-            raise ValueError(f"variable {column!r} has {size:.0f} values, expected fewer than {limit}")
+            raise Refused(f"variable {column!r} has {size:.0f} values, expected fewer than {limit}")
     variables = loadmat(path, variable_names=columns)
     vectors = []
     for column in columns:
         values = np.asarray(variables[column])
         if values.dtype.kind not in "iufb" or values.size < 2 or values.size != max(values.shape):
-            raise ValueError(
+            raise Refused(
                 f"variable {column!r} is {values.dtype} {values.shape}, expected a vector of numbers"
             )
         vectors.append(values.ravel().astype("<f8"))
@@ -63,5 +67,7 @@ if __name__ == "__main__":
         _answer({"column": error.args[0], "names": error.args[-1]})
     except MemoryError:
         _answer({"error": f"asks for more than {MEMORY >> 30} GB of memory"})
-    except Exception as error:  # whatever a damaged file makes of the reader is told to the other process
-        _answer({"error": str(error) or type(error).__name__})
+    except Refused as error:
+        _answer({"error": str(error)})
+    except Exception:  # whatever a damaged file makes of the reader
+        _answer({"error": "no MAT file that can be read, expected one up to version 7; a damaged file?"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +22,9 @@ def read_columns(path: Path, columns: Sequence[str], delimiter: str | None = Non
     """
     try:
         return read_mat(path, columns) if path.suffix == ".mat" else read_text(path, columns, delimiter)
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        raise ImportMapError(f"{path}: damaged or no gzip file, expected a packed table") from None
     except OSError as error:
         raise ImportMapError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, csv.Error, zlib.error, EOFError) as error:
+    except (ValueError, csv.Error) as error:
         raise ImportMapError(f"{path}: {' '.join(str(error).split())}") from None

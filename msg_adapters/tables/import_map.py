@@ -237,7 +237,8 @@ def _keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
     """Return a mapping that has only these keys, and all of them that are needed."""
     allowed = ", ".join(sorted(key.name for key in keys))
     if not isinstance(value, Mapping):
-        raise FieldError(f"{field} is {shown(value)}, expected a mapping with {allowed}", field)
+        held = "empty" if value is None else shown(value)
+        raise FieldError(f"{field} is {held}, expected a mapping with {allowed}", field)
     for name in value:
         if name not in [key.name for key in keys]:
             raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")

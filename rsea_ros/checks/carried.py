@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
+from rsea_ros.checks.usable import require_motion
 from rsea_ros.errors import IdentificationError
+from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
 _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamps", "clock_jump", "outliers",
           "clipping", "nan", "coarse_steps")  # fmt: skip
 """Faults that the diagnosis finds and masks itself."""
+
+
+def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: bool) -> Record:
+    """Return a record that carries what the checks find wrong with it into the result.
+
+    axis: of the wrench that `ft` was read from. masks: see with_faults.
+    Raises IdentificationError where nothing moves.
+    """
+    require_motion(record)
+    return with_faults(record, check_record(record, rig, axis), masks=masks)
 
 
 def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
@@ -25,7 +38,8 @@ def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
     if not set(channels) - {"command", "reference"}:
         reasons = "; ".join(f"{f.channel}: {f.detail or f.kind}" for f in found.faults if f.channel in dead)
         raise IdentificationError(
-            f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does"
+            f"{record.source}: no sensor answers to the machine ({reasons}), expected one that does: "
+            "rsea check shows each"
         )
     again = _AGAIN if masks else ()
     kept = (*record.faults, *(f for f in found.faults if f.kind not in again and f not in record.faults))

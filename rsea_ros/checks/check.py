@@ -19,6 +19,7 @@ from rsea_ros.checks.linear_findings import clock_findings, identifiability
 from rsea_ros.checks.motion import is_commanded
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.signal_findings import excitation, noises
+from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
 from rsea_ros.errors import RseaError
@@ -35,7 +36,7 @@ _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -134,6 +135,7 @@ def _matched(
     silent = set(related) - set(readings.channels if readings else ())
     found = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
     found += gain_findings(readings, rig, axis) if readings else []
+    found += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
     another = _another(record, compared, rig)
     return readings, [*another, *(f for f in found if not (another and f.kind == "wrong_rig"))]
 

@@ -77,29 +77,17 @@ def _of_channel(r: Reading, axis: str) -> list[Finding]:
                 remedy=_unit(r.channel, r.factor),
             )
         )
-    if r.odd:
+    if r.odd or not found:
         found.append(
             Finding(
-                "red",
-                "wrong_rig",
-                r.channel,
-                math.exp(r.gain),
-                "1",
-                expected="1",
-                detail="times what the rig would give, which fits no unit",
-                remedy=RIGHT_RIG,
-            )
-        )
-    if not found:
-        found.append(
-            Finding(
-                "green",
-                "scale",
+                "red" if r.odd else "green",
+                "wrong_rig" if r.odd else "scale",
                 r.channel,
                 math.exp(r.gain),
                 "1",
                 expected="about 1",
-                detail="times what the rig would give",
+                detail=f"times what the rig would give{', which fits no unit' if r.odd else ''}",
+                remedy=RIGHT_RIG if r.odd else "",
             )
         )
     return found

@@ -30,6 +30,8 @@ _BETTER = 10.0
 _FREE = 3.0
 _CLEAR = 60.0
 """Difference of phase costs from which the better sign needs no trial."""
+_EXACT = 0.4
+"""Logarithm: what is left of every gain where two units at once are to be believed."""
 _NEAR = 0.7
 """Logarithm: so close to a factor's value a gain must be for the factor to be tried."""
 
@@ -78,6 +80,8 @@ def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: 
     found = {n: _named(n, signs[n], gains[n], rig) for n in fit.channels}
     if command is not None:
         found["command"] = _named("command", command[0], command[1], rig)
+    elif any(r.odd for r in found.values()):
+        found = _in_a_unit_of_the_command(signs, gains, rig) or found
     applied = fit.fit({n: _prior(n, found) for n in fit.channels})
     shaped = float(np.median(list(applied.error.values()))) < SHAPED
     if not shaped or applied.cost > plain.cost - _BETTER:
@@ -133,6 +137,31 @@ def _command_apart(
         {n: sign * signs[n] for n in channels},
         {n: gains[n] - common for n in channels},
     )
+
+
+def _in_a_unit_of_the_command(
+    signs: Mapping[str, float], gains: Mapping[str, float], rig: Rig
+) -> dict[str, Reading] | None:
+    """Return readings in which a unit of the command makes every gain one of a unit, None where none does.
+
+    Commands in mN m make every sensor look a thousand times too small, whatever unit each has of its own.
+    The one that leaves the most channels in SI counts, one sensor at least, then the one that leaves least of
+    all gains: a rig whose every channel would be in another unit is another rig.
+    """
+    tried = []
+    for factor in factors("command", rig):
+        moved = {n: gain + math.log(factor.value) for n, gain in gains.items()}
+        readings = {n: _named(n, signs[n], gain, rig) for n, gain in moved.items()}
+        exact = not any(r.odd or abs(r.gain) > _EXACT for r in readings.values())
+        if exact and any(r.factor is None for n, r in readings.items() if n != "motor_torque"):
+            readings["command"] = Reading("command", 1.0, factor, 0.0)
+            tried.append(readings)
+    return min(tried, key=_oddness, default=None)
+
+
+def _oddness(readings: Mapping[str, Reading]) -> tuple[int, float]:
+    """Return how many channels are in another unit, and what is left of the gains."""
+    return sum(r.factor is not None for r in readings.values()), sum(abs(r.gain) for r in readings.values())
 
 
 def _named(channel: str, sign: float, gain: float, rig: Rig) -> Reading:

@@ -62,20 +62,25 @@ class Number:
         return self.value - _Z95 * self.sd, self.value + _Z95 * self.sd
 
 
+class Brought(NamedTuple):
+    """What data bring of a value: the share of what is known of it then, and its one sigma over its size."""
+
+    share: float
+    relative_sd: float
+
+
 @dataclass(frozen=True)
 class Linear:
     """What the linearised fit says. offset: s at the start of the record, drift: s/s, by channel.
 
-    misfit: RMS of the residual over the noise by channel. told: by value of the rig, the share of what is
-    known of it that these data bring (0 to 1). relative: its one sigma over its value then. settled: whether
-    the clocks stood still at last; else their numbers mean nothing.
+    misfit: RMS of the residual over the noise by channel. values: what these data bring of the rig's values.
+    settled: whether the clocks stood still at last; else their numbers mean nothing.
     """
 
     offset: Mapping[str, Number]
     drift: Mapping[str, Number]
     misfit: Mapping[str, float]
-    told: Mapping[str, float]
-    relative: Mapping[str, float]
+    values: Mapping[str, Brought]
     settled: bool
 
 
@@ -135,13 +140,11 @@ def _cut(
 def _linear(setting: _Setting, state: _State, rows: _Rows, sd: FloatArray, settled: bool) -> Linear:
     n, m = len(setting.values), len(setting.timed)
     late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
-    told, relative = _told(setting, rows)
     return Linear(
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
         misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
-        told=told,
-        relative=relative,
+        values=_brought(setting, rows),
         settled=settled,
     )
 
@@ -286,14 +289,14 @@ def _scores(rows: _Rows, left: FloatArray) -> FloatArray:
     return scores
 
 
-def _told(setting: _Setting, rows: _Rows) -> tuple[dict[str, float], dict[str, float]]:
-    """Return by value of the rig what the data bring of it, and its relative one sigma after.
+def _brought(setting: _Setting, rows: _Rows) -> dict[str, Brought]:
+    """Return by value of the rig what the data bring of it.
 
     Gains and drifts count as known: they are what a check looks for, not what a fit frees.
     """
     values, n, m = setting.values, len(setting.values), len(setting.timed)
     if not n:
-        return {}, {}
+        return {}
     keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
     columns = rows.matrix[:, keep]
     clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
@@ -301,9 +304,11 @@ def _told(setting: _Setting, rows: _Rows) -> tuple[dict[str, float], dict[str, f
     part = columns.T @ columns + np.diag(doubt**-2.0)
     scale = np.sqrt(np.diag(part) + 1e-300)
     after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale
-    told = {u.name: float(max(0.0, 1.0 - (after[i] / doubt[i]) ** 2)) for i, u in enumerate(values)}
     size = [1.0 if u.logarithmic else abs(u.start) or 1.0 for u in values]
-    return told, {u.name: float(after[i] / size[i]) for i, u in enumerate(values)}
+    return {
+        u.name: Brought(float(max(0.0, 1.0 - (sd / before) ** 2)), float(sd / scale))
+        for u, sd, before, scale in zip(values, after, doubt, size, strict=False)
+    }
 
 
 def _doubt(u: Unknown) -> float:

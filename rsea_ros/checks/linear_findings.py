@@ -91,9 +91,9 @@ def _beside(linear: Linear, name: str) -> str:
 def identifiability(linear: Linear, rig: Rig) -> list[Finding]:
     """Return for each value that a fit may move whether these data tell it."""
     found = []
-    for name, told in linear.told.items():
-        percent = 100.0 * linear.relative[name]
-        amber = told < _TOLD
+    for name, brought in linear.values.items():
+        percent = 100.0 * brought.relative_sd
+        amber = brought.share < _TOLD
         found.append(
             Finding(
                 "amber" if amber else "green",

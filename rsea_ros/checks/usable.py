@@ -24,7 +24,8 @@ def check_diagnosable(record: Record) -> None:
     for name, channel in record.channels.items():
         if len(channel) < 2 or np.median(np.diff(channel.t)) <= 0.0:
             raise IdentificationError(
-                f"{record.source}: {name}: {len(channel)} samples, expected rising stamps"
+                f"{record.source}: {name}: {len(channel)} samples, expected rising stamps: "
+                "stamp each message when its value takes effect or was measured"
             )
     length = float(np.ptp(driving.t))
     if length < SHORTEST:
@@ -35,9 +36,15 @@ def check_diagnosable(record: Record) -> None:
     if not measured:
         left_out = "; ".join(f"{f.channel}: {FAULT_KINDS[f.kind]}" for f in record.faults)
         reason = f" ({left_out})" if left_out else ""
-        raise IdentificationError(f"{record.source}: no measurement beside the command{reason}, expected one")
+        raise IdentificationError(
+            f"{record.source}: no measurement beside the command{reason}, expected one of ft, position and "
+            "velocity, stamped by the command's clock"
+        )
     if all(_constant(c) for c in measured):
-        raise IdentificationError(f"{record.source}: every measured channel holds one value, expected motion")
+        raise IdentificationError(
+            f"{record.source}: every measured channel holds one value, expected motion: "
+            "is the drive enabled, are the sensors alive?"
+        )
     require_motion(record)
 
 

@@ -188,7 +188,7 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     rest in the clocks. None for a model without a delay.
     """
     names = [u.name for u in solution.problem.unknowns]
-    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock]
+    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
     if DELAY not in names or not clocks:
         return None
     theta = solution.theta.copy()

@@ -174,7 +174,7 @@ def _next_experiment(
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained") and not is_at_floor(stages[-1].test):
-        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))))
+        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))), stages[0].solution.problem.rig)
     return None
 
 

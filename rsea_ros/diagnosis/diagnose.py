@@ -21,6 +21,7 @@ from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.steady import steadied
 from rsea_ros.identification.workers import worker_pools
@@ -59,7 +60,8 @@ def diagnose(
     nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
     effects = [e for name, e in catalogue().items() if name not in settings.without]
     with worker_pools() as pools:
-        selection = select_stepwise(nominal, effects, pools, tell, settings)
+        start = joint_start(checked[0].record, rig) if rig.loop is not None else None
+        selection = select_stepwise(nominal, effects, pools, tell, settings, start)
         tell("looking for a simpler model", 0.9)
         selection = eliminate_backwards(selection, effects, pools, settings)
         tell("evaluating on the test blocks", 0.95)

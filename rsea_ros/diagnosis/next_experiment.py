@@ -14,13 +14,14 @@ import numpy as np
 
 from rsea_ros.diagnosis.result import Experiment
 from rsea_ros.errors import RseaError
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import JOINT, Settings, excitation
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import UNITS, Channel, FloatArray, Record
 from rsea_ros.wording import listed
 
 _DURATION = 12.0
@@ -73,14 +74,21 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
         if told > _ENOUGH:
             break
     told, best = max(tried, key=lambda item: item[0])
-    return _worded(cause, names, told, best, present)
+    return _worded(cause, names, told, best, present, unit_of_commands(accepted.problem.rig))
 
 
-def _worded(cause: str, names: str, told: float, best: ExcitationOption, present: float) -> Experiment:
+def unit_of_commands(rig: Rig) -> str:
+    """Return the unit of what commands a rig: torques, or target positions."""
+    return UNITS["command" if rig.loop is None else "reference"]
+
+
+def _worded(
+    cause: str, names: str, told: float, best: ExcitationOption, present: float, unit: str
+) -> Experiment:
     run: dict[str, float | str] = {
         "kind": best.kind,
         "amplitude": round(best.relative * present, 3),
-        "unit": "N m",
+        "unit": unit,
         "low": best.low,
         "high": best.high,
         "duration": _DURATION,
@@ -158,8 +166,11 @@ def _left_over(problem: Problem, theta: FloatArray) -> float:
     return float(min(max(rms), np.sqrt(np.mean(residual**2)) * len(rms)))
 
 
-def amplitude_series(amplitude: float) -> Experiment:
-    """Return the run that says of an unexplained residual whether it grows with the amplitude."""
+def amplitude_series(amplitude: float, rig: Rig) -> Experiment:
+    """Return the run that says of an unexplained residual whether it grows with the amplitude.
+
+    amplitude: of the present run, in the unit of what commands the rig.
+    """
     why = (
         "nothing in the catalogue explains the residual: repeat at half the amplitude with an odd multisine, "
         "whose empty lines show distortion apart from noise; "
@@ -170,9 +181,9 @@ def amplitude_series(amplitude: float) -> Experiment:
         {
             "kind": "multisine",
             "amplitude": round(0.5 * amplitude, 3),
-            "unit": "N m",
+            "unit": unit_of_commands(rig),
             "low": 0.1,
-            "high": 120.0,
+            "high": 120.0 if rig.loop is None else JOINT.high,
             "duration": 60.0,
         },
     )

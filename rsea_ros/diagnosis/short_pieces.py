@@ -14,6 +14,9 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
+_ROUNDING = 0.05
+"""Of a period: up to this much less than a whole number of samples is one, jitter of the stamps."""
+
 
 def short_pieces_of(
     case: Case, outputs: Mapping[str, FloatArray], rule: PieceSettings = DEFAULT.pieces
@@ -24,9 +27,10 @@ def short_pieces_of(
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
     fit = part(case, TRAIN)
-    drive = case.drive
+    thinner = _as_often_as_commands(fit)
+    drive = thinner.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
-        return (fit,)
+        return (thinner,)
     length = 2.0 * block_length(case)
     starts = train_starts(case)[1:]
     half = round(0.5 * rule.enough / length)
@@ -35,7 +39,37 @@ def short_pieces_of(
     misfit[spread] = -1.0
     worst = np.argsort(misfit)[len(spread) - 2 * half :]
     chosen = starts[np.sort(np.concatenate([spread, worst]))]
-    return tuple(_piece(fit, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
+    return tuple(_piece(thinner, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
+
+
+def _as_often_as_commands(case: Case) -> Case:
+    """Return a case with every k-th sample of a channel that has k or more to a command.
+
+    What a command does shows at its own rate; the rest tells noise from noise, at several times the cost.
+    """
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return case
+    period = drive.hold * drive.step
+    every = {n: slice(None, None, _samples_in(period, t)) for n, t in case.t.items()}
+    thinner = replace(
+        drive,
+        at={n: at[every[n]] for n, at in drive.at.items()},
+        impulse={n: i[every[n]] for n, i in drive.impulse.items()},
+    )
+    return replace(
+        case,
+        drive=thinner,
+        t={n: t[every[n]] for n, t in case.t.items()},
+        measured={n: y[every[n]] for n, y in case.measured.items()},
+        mask={n: m[every[n]] for n, m in case.mask.items()},
+    )
+
+
+def _samples_in(period: float, t: FloatArray) -> int:
+    """Return how many samples of a channel a period holds, 1 at least."""
+    between = float(np.median(np.diff(t))) if len(t) > 1 else period
+    return max(1, int(period / max(between, 1e-3 * period) + _ROUNDING))
 
 
 def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:

@@ -23,17 +23,28 @@ from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.unknowns import vector_of
 from rsea_ros.identification.workers import Pools
+from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 
 
 def select_stepwise(
-    nominal: Problem, effects: Sequence[Effect], pools: Pools, tell: Progress, settings: DiagnosisSettings
+    nominal: Problem,
+    effects: Sequence[Effect],
+    pools: Pools,
+    tell: Progress,
+    settings: DiagnosisSettings,
+    start: Rig | None = None,
 ) -> Selection:
-    """Select up to max_causes causes among some effects, the one that explains most first."""
+    """Select up to max_causes causes among some effects, the one that explains most first.
+
+    start: a rig whose values the first fit begins with.
+    """
     setup = FitSetup(nominal.cases, settings.fits, pools.run)
     first = fit_candidate(FitSetup(nominal.cases, settings.fits, pools.run,
-                                   iterations=settings.fits.first_iterations), nominal)  # fmt: skip
+                                   iterations=settings.fits.first_iterations),
+                          nominal, vector_of(nominal.unknowns, start) if start else None)  # fmt: skip
     models = [refit(with_noise_reestimated(first), setup)]
     trials: list[Trial] = []
     rivals: dict[str, tuple[Candidate, ...]] = {}

@@ -25,13 +25,12 @@ SCATTER = 0.005
 _FARTHEST = 0.45
 """Of a period: a stamp further off an even clock could belong to another sample."""
 _SURE = 4.0
-"""Standard deviations of a period, up to which it may be that of the command: one clock makes both."""
+"""Standard deviations of a period, up to which it may be that of all others: one clock makes them."""
 _FALL = 0.8
 """Of the residual at the stamps: the even clock must leave less."""
 _NO_WORSE = 1.02
 """Of a sensor's residual: an even clock of the command that raises it by more is not the one that acted."""
-_TINY = 1e-300
-_DRIVING = ("command", "reference")
+_TINY = 1e-30
 
 
 @dataclass(frozen=True)
@@ -75,30 +74,54 @@ def may_be_even(record: Record) -> bool:
 def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
-    shared: period of another channel, s: taken where the stamps do not speak against it, for it is surer.
+    shared: period of all channels, s: taken where the stamps do not speak against it, for it is surer.
     Returns t itself where no even clock comes near to all of it, or where t is even already.
     """
-    period = float(np.median(np.diff(t)))
-    place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / period))])
-    slope, first = np.polyfit(place, t, 1)
-    off = np.abs(t - (first + slope * place))
-    doubt = np.sqrt(np.mean(off**2)) / (np.std(place) * np.sqrt(len(place)))
-    if abs(slope - shared) < _SURE * doubt:
-        slope, first = shared, float(np.mean(t - shared * place))
-    even = first + slope * place
-    if off.max() > _FARTHEST * period or np.sqrt(np.mean(off**2)) < SCATTER * period:
+    line = _line(t)
+    period = shared if abs(line.period - shared) < _SURE * line.doubt else line.period
+    even = period * line.place + float(np.mean(t - period * line.place))
+    usual = float(np.median(np.diff(t)))
+    if line.farthest > _FARTHEST * usual or line.scatter < SCATTER * usual:
         return t
     return np.asarray(even)
 
 
+@dataclass(frozen=True)
+class _Line:
+    """Stamps over the number of their sample, by least squares: period and its one sigma, s.
+
+    place: the number of each sample. farthest, scatter: largest and RMS distance of a stamp from it, s.
+    """
+
+    place: FloatArray
+    period: float
+    doubt: float
+    farthest: float
+    scatter: float
+
+
+def _line(t: FloatArray) -> _Line:
+    usual = float(np.median(np.diff(t)))
+    place = np.concatenate([[0.0], np.cumsum(np.round(np.diff(t) / usual))])
+    period, first = np.polyfit(place, t, 1)
+    off = np.abs(t - (first + period * place))
+    scatter = float(np.sqrt(np.mean(off**2)))
+    doubt = scatter / (float(np.std(place)) * float(np.sqrt(len(place))))
+    return _Line(place, float(period), doubt, float(off.max()), scatter)
+
+
+def _shared_period(record: Record) -> float:
+    """Return the period, s, of all channels that may have the one of the surest, each by its doubt."""
+    lines = [_line(c.t) for n, c in record.channels.items() if n != "reference"]
+    best = min(lines, key=lambda line: line.doubt)
+    alike = [x for x in lines if abs(x.period - best.period) <= _SURE * np.hypot(x.doubt, best.doubt)]
+    return float(np.average([x.period for x in alike], weights=[1.0 / (x.doubt**2 + _TINY) for x in alike]))
+
+
 def _on_even_clocks(record: Record) -> tuple[Record, dict[str, float]]:
     """Return a record on even clocks, and the RMS scatter of the channels that changed, s."""
-    command = record["command"].t
-    shared = float((command[-1] - command[0]) / np.round((command[-1] - command[0]) * record["command"].rate))
-    clocks = {"command": even_clock(command)}
-    if clocks["command"] is not command:
-        shared = float(np.median(np.diff(clocks["command"])))
-    clocks |= {n: even_clock(c.t, shared) for n, c in record.channels.items() if n not in _DRIVING}
+    shared = _shared_period(record)
+    clocks = {n: even_clock(c.t, shared) for n, c in record.channels.items() if n != "reference"}
     changed = {n: t for n, t in clocks.items() if t is not record[n].t}
     steady = record.with_channels(**{n: Channel(t, record[n].y) for n, t in changed.items()})
     return steady, {n: float(np.std(record[n].t - t)) for n, t in changed.items()}

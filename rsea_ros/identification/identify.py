@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
+from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
 from rsea_ros.identification.confidence import (
     Confidence,
     confidence_of,
@@ -42,6 +43,7 @@ from rsea_ros.identification.unknowns import (
     start_vector,
     unknowns_of_effect,
     unknowns_of_rig,
+    vector_of,
 )
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
@@ -49,6 +51,7 @@ from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
+from rsea_ros.units import in_motion
 
 CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
@@ -74,19 +77,23 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
     with one_blas_thread(), ThreadPoolExecutor(2) as pool:
-        solution, cases = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
+        solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         while misfits and (more := evened(steady.records, rig, solution)).scatter:
             steady = Evened(more.records, {**steady.scatter, **more.scatter})
             cases = tuple(case_from(record, rig) for record in steady.records)
-            solution, cases = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
+            solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=identified_rig(solution, ()))
             misfits = _misfits(solution, cases)
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
     result = _result(solution, outputs, records, cases, responses, others)
     report("done", 1.0)
-    return replace(result, statements=(*steady.sentences, *result.statements))
+    return replace(
+        result,
+        statements=(*steady.sentences, *result.statements),
+        notes=(*result.notes, *asked.sentences),
+    )
 
 
 def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
@@ -133,14 +140,17 @@ def _check_excited(records: Sequence[Record]) -> None:
 
 def fit(
     cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
-) -> tuple[Solution, tuple[Case, ...]]:
-    """Fit the rig's free values, its effects and the sensors' clocks; return the cases with their noise too.
+) -> tuple[Solution, tuple[Case, ...], Asked]:
+    """Fit the rig's free values, its effects and the clocks that the data ask for.
+
+    Returns the cases with their noise too, and what was asked of the clocks.
 
     The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
     weight becomes that residual, as maximum likelihood with unknown noise has it. start: where to begin,
     should the records fit it better than `rig`.
     """
-    problem = Problem(tuple(cases), rig, unknowns_of(rig, cases), CHANNELS)
+    unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
+    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = _with_noise_of(problem, outputs)
@@ -148,6 +158,13 @@ def fit(
         solution = solve(replace(problem, cases=known), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
         known = _with_noise_of(solution.problem, outputs)
+    asked = asked_of(solution, run)
+    if asked.clocks:
+        solution = solve(*freed(solution, asked), run=run)
+        solution = solve(*without_needless(solution), run=run)
+        problem = solution.problem
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(problem, outputs)
     for _ in range(_REWEIGHTINGS):
         ratios = ratios_of(problem, solution.problem.cases, outputs)
         if max(ratios.values()) < _MISFIT:
@@ -155,7 +172,7 @@ def fit(
         heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
         solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
         outputs = problem.outputs(solution.theta)
-    return solution, known
+    return solution, known, asked
 
 
 def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
@@ -175,8 +192,7 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
     own = start_vector(problem.unknowns)
     if start is None:
         return own
-    values = start.values()
-    other = np.array([u.inner(values.get(u.name, u.start)) for u in problem.unknowns])
+    other = vector_of(problem.unknowns, start)
     costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
     return other if costs[1] < costs[0] else own
 
@@ -257,7 +273,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
         ParameterEstimate(
             name=u.name,
             value=u.outer(float(theta)),
-            unit=u.unit,
+            unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
             spread=u.doubt,
@@ -272,7 +288,12 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
 def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
     """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
-    sensors = {n: replace(s, clock=s.clock + clocks.get(n, 0.0)) for n, s in rig.sensors.items()}
+    sensors = {
+        n: replace(
+            s, clock=s.clock + clocks.offset.get(n, 0.0), clock_rate=s.clock_rate + clocks.rate.get(n, 0.0)
+        )
+        for n, s in rig.sensors.items()
+    }
     quantities = dict(rig.quantities)
     for estimate in parameters:
         if estimate.name in quantities:

@@ -12,6 +12,8 @@ from rsea_ros.signals import FloatArray
 FEWEST_PERIODS = 3
 """One settles, two tell noise from signal."""
 _SAME = 0.02
+_MOVES = 0.5
+"""Of a command's standard deviation: a period moves more; a slow command is alike from sample to sample."""
 _LIKELY = 0.5
 _TRIED = 12
 
@@ -55,4 +57,6 @@ def _stretch(command: FloatArray, lag: int) -> Periods | None:
         return None
     longest = int(np.argmax(stops - starts))
     count = int((stops[longest] - starts[longest]) // lag + 1)
-    return Periods(int(stops[longest] + lag - count * lag), lag, count)
+    found = Periods(int(stops[longest] + lag - count * lag), lag, count)
+    period = command[found.first : found.first + lag]
+    return found if np.ptp(period) > _MOVES * np.std(command) else None

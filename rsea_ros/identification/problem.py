@@ -11,7 +11,7 @@ import numpy as np
 
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
-from rsea_ros.identification.unknowns import Unknown, apply
+from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import commanded
@@ -100,7 +100,7 @@ def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
     if not set(channels) - {"motor_torque"}:
         raise IdentificationError(
             f"{record.source}: no ft, deflection, position or velocity channel for rig {rig.name}, "
-            "expected one"
+            "expected one: record it, or name its topic with --topic"
         )
     start = float(record["command"].t[0]) + SETTLE
     counts = {n: int(np.sum((record[n].t >= start) & np.isfinite(record[n].y))) for n in channels}
@@ -144,13 +144,13 @@ def _inverse_case(record: Record, rig: Rig) -> Case:
 
 
 def simulated(
-    cases: Sequence[Case], rig: Rig, offsets: Mapping[str, float], *, ride: bool = False
+    cases: Sequence[Case], rig: Rig, clocks: Clocks, *, ride: bool = False
 ) -> list[dict[str, FloatArray]]:
-    """Return the simulated channels of cases, sensors read `offsets` seconds later than stamped.
+    """Return the simulated channels of cases, sensors read as their clocks have it.
 
     A channel whose zero is unknown comes with the measured mean.
     """
-    drives = [_shifted(c.drive, offsets) for c in cases if isinstance(c.drive, Drive)]
+    drives = [_shifted(c.drive, clocks) for c in cases if isinstance(c.drive, Drive)]
     simulations = iter(simulate_drives(rig, drives, ride=ride))
     return [
         {"motor_torque": inverse_torque(rig, c.drive)}
@@ -167,10 +167,11 @@ def _on_measured_zero(case: Case, outputs: dict[str, FloatArray]) -> dict[str, F
     return outputs
 
 
-def _shifted(drive: Drive, offsets: Mapping[str, float]) -> Drive:
-    if not any(offsets.values()):
+def _shifted(drive: Drive, clocks: Clocks) -> Drive:
+    if clocks.are_right:
         return drive
-    return replace(drive, at={n: at + offsets.get(n, 0.0) / drive.step for n, at in drive.at.items()})
+    late = {n: clocks.later(n, drive.origin + drive.step * at) for n, at in drive.at.items()}
+    return replace(drive, at={n: at + late[n] / drive.step for n, at in drive.at.items()})
 
 
 def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[str]) -> FloatArray:
@@ -209,8 +210,8 @@ class Problem:
 
     def outputs(self, theta: FloatArray) -> list[dict[str, FloatArray]]:
         """Return the simulated channels of every case at theta."""
-        rig, offsets = apply(self.rig, self.unknowns, theta)
-        return simulated(self.cases, rig, offsets, ride=self.ride)
+        rig, clocks = apply(self.rig, self.unknowns, theta)
+        return simulated(self.cases, rig, clocks, ride=self.ride)
 
     def residual_of(self, outputs: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return the weighted residuals of all cases, shape (m,)."""
@@ -229,6 +230,18 @@ class Problem:
             for n in self.present(case)
         ]
         return np.concatenate(parts)
+
+    def since_start(self) -> FloatArray:
+        """Return for every residual the time since the start of its record, s, shape (m,)."""
+        return np.concatenate(
+            [
+                case.t[n][case.mask[n]]
+                - case.start
+                + (case.drive.origin if isinstance(case.drive, Drive) else 0.0)
+                for case in self.cases
+                for n in self.present(case)
+            ]
+        )
 
     def present(self, case: Case) -> list[str]:
         """Return the channels of a case that count, in a fixed order."""

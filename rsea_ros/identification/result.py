@@ -42,6 +42,10 @@ class FrequencyResponse:
     distortion: FloatArray | None = None
 
 
+CLOCKS = ("clock.", "clock_rate.")
+"""What the names of the sensors' clocks begin with."""
+
+
 @dataclass(frozen=True)
 class ParameterEstimate:
     """A parameter in SI with its 95 % interval.
@@ -126,6 +130,6 @@ class Identification:
         """
         if not self.at_noise or self.silent:
             return "misfit"
-        physical = [p for p in self.parameters if not p.name.startswith("clock.")]
+        physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
         told = any(p.told_by_data >= _TOLD for p in physical)
         return "adequate" if told or not physical else "not_identifiable"

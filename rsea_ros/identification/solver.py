@@ -71,7 +71,7 @@ def jacobian_columns(
     Zero where a step of the unknown makes the simulation run away.
     """
 
-    clocks = {i: problem.unknowns[i].name.split(".")[1] for i in which if problem.unknowns[i].is_clock}
+    clocks = {i: problem.unknowns[i] for i in which if problem.unknowns[i].is_clock}
     others = [i for i in which if i not in clocks]
 
     def column(i: int) -> FloatArray:
@@ -87,11 +87,26 @@ def jacobian_columns(
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:
-        later, earlier = run(lambda sign: _read_later(problem, theta, sign * _CLOCK_DIFFERENCE), (1, -1))
-        rate = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE)
-        channel = problem.by_row(lambda case, n: problem.channels.index(n))
-        columns |= {i: np.where(channel == problem.channels.index(n), rate, 0.0) for i, n in clocks.items()}
+        made = clock_columns(problem, theta, tuple(clocks.values()), run)
+        columns |= dict(zip(clocks, made.T, strict=True))
     return np.column_stack([columns[i] for i in which]) if len(which) else np.empty((len(residual), 0))
+
+
+def clock_columns(
+    problem: Problem, theta: FloatArray, clocks: Sequence[Unknown], run: Map = serial
+) -> FloatArray:
+    """Return d residual / d clock for unknown clocks, be they among the problem's or not, shape (m, n)."""
+    later, earlier = run(lambda sign: _read_later(problem, theta, sign * _CLOCK_DIFFERENCE), (1, -1))
+    slope = (later - earlier) / (2.0 * _CLOCK_DIFFERENCE)
+    channel = problem.by_row(lambda case, n: problem.channels.index(n))
+    since = 1e-6 * problem.since_start()
+    return np.column_stack(
+        [
+            np.where(channel == problem.channels.index(c.name.split(".")[1]), slope, 0.0)
+            * (since if c.is_rate else 1.0)
+            for c in clocks
+        ]
+    )
 
 
 def power(residual: FloatArray) -> float:
@@ -101,8 +116,8 @@ def power(residual: FloatArray) -> float:
 
 def _read_later(problem: Problem, theta: FloatArray, delay: float) -> FloatArray:
     """Return the weighted residuals with every sensor read `delay` s later than it was."""
-    rig, offsets = apply(problem.rig, problem.unknowns, theta)
-    shifted = {n: offsets.get(n, 0.0) + delay for n in problem.channels}
+    rig, clocks = apply(problem.rig, problem.unknowns, theta)
+    shifted = clocks.moved(delay, problem.channels)
     return problem.residual_of(simulated(problem.cases, rig, shifted, ride=problem.ride))
 
 
@@ -111,7 +126,8 @@ def central_jacobian(problem: Problem, theta: FloatArray) -> FloatArray:
     columns = []
     for i, unknown in enumerate(problem.unknowns):
         step = np.zeros(len(theta))
-        step[i] = _CLOCK_DIFFERENCE if unknown.is_clock else _DIFFERENCE * unknown.scale
+        is_offset = unknown.is_clock and not unknown.is_rate
+        step[i] = _CLOCK_DIFFERENCE if is_offset else _DIFFERENCE * unknown.scale
         columns.append((problem.residual(theta + step) - problem.residual(theta - step)) / (2.0 * step[i]))
     return np.column_stack(columns)
 

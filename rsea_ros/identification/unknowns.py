@@ -13,7 +13,34 @@ from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.model.rig import FIELDS, EffectSetting, Rig
 from rsea_ros.signals import FloatArray
 
-CLOCK = "clock"
+CLOCK, CLOCK_RATE = "clock", "clock_rate"
+RATE_DOUBT, FASTEST = 50.0, 500.0
+"""ppm, one sigma and bound. How much faster the clock of a sensor may run: cheap crystals differ by 100."""
+
+
+@dataclass(frozen=True)
+class Clocks:
+    """By channel how much later than stamped it is read.
+
+    offset: s, at the start of a record. rate: ppm of the time since then.
+    """
+
+    offset: Mapping[str, float]
+    rate: Mapping[str, float]
+
+    def later(self, channel: str, since: FloatArray) -> FloatArray:
+        """Return how much later than stamped a channel is read at times since the start of the record, s."""
+        late: FloatArray = self.offset.get(channel, 0.0) + 1e-6 * self.rate.get(channel, 0.0) * since
+        return late
+
+    def moved(self, delay: float, channels: Iterable[str]) -> Clocks:
+        """Return the clocks with some channels read `delay` s later still."""
+        return Clocks({**self.offset, **{n: self.offset.get(n, 0.0) + delay for n in channels}}, self.rate)
+
+    @property
+    def are_right(self) -> bool:
+        """Whether every channel is read when its stamps say."""
+        return not any(self.offset.values()) and not any(self.rate.values())
 
 
 WELL_KNOWN = 0.3
@@ -40,8 +67,13 @@ class Unknown:
 
     @property
     def is_clock(self) -> bool:
-        """Whether it is the clock error of a sensor."""
-        return self.name.startswith(CLOCK + ".")
+        """Whether it is the clock error of a sensor, or its rate."""
+        return self.name.split(".")[0] in (CLOCK, CLOCK_RATE)
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether it is the rate of a sensor's clock."""
+        return self.name.startswith(CLOCK_RATE + ".")
 
     @property
     def reach(self) -> float:
@@ -119,13 +151,25 @@ def _clock(channel: str, doubt: float) -> Unknown:
     return Unknown(f"{CLOCK}.{channel}", 0.0, "s", -3.0 * doubt, 3.0 * doubt, False, doubt, doubt)
 
 
-def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, dict[str, float]]:
-    """Return the rig with the values of theta, effects included, and the clock errors by channel, s."""
+def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
+    """Return the rates of the sensors' clocks, ppm: read later and later than stamped when positive."""
+    return tuple(
+        Unknown(f"{CLOCK_RATE}.{c}", 0.0, "ppm", -FASTEST, FASTEST, False, RATE_DOUBT, RATE_DOUBT)
+        for c in channels
+        if c != "motor_torque"
+    )
+
+
+def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
+    """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
     values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
     own = {n: v for n, v in values.items() if n in FIELDS}
-    offsets = {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock}
+    offset, rate = (
+        {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
+        for of_rate in (False, True)
+    )
     effects = tuple(_moved(e, values) for e in rig.effects)
-    return rig.with_values(own).with_effects(*effects), offsets
+    return rig.with_values(own).with_effects(*effects), Clocks(offset, rate)
 
 
 def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:
@@ -137,6 +181,12 @@ def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting
 def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
     """Return where the fit begins, in its own coordinates."""
     return np.array([u.inner(u.start) for u in unknowns])
+
+
+def vector_of(unknowns: Sequence[Unknown], rig: Rig) -> FloatArray:
+    """Return the coordinates of a rig's values, of what it does not state where the fit begins."""
+    values = rig.values()
+    return np.array([u.inner(values.get(u.name, u.start)) for u in unknowns])
 
 
 def with_effect(rig: Rig, name: str, parameters: Mapping[str, float]) -> Rig:

@@ -95,13 +95,14 @@ def diagnose(
     progress: hears a step's name and the share done. Raises IdentificationError for records that cannot be
     diagnosed, RigError for the rig. Not to be confused with identify, which trusts the rig's structure.
     """
+    from rsea_ros.checks.carried import held_against
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.diagnosis.diagnose import diagnose as diagnose_records
-    from rsea_ros.library.inputs import checked, records_of
+    from rsea_ros.library.inputs import records_of
 
     rig, records = load_rig(rig), records_of(data)
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
-    carrying = [checked(record, rig, masks=True) for record in records]
+    carrying = [held_against(record, rig, masks=True) for record in records]
     result = diagnose_records(carrying, rig, holdout, progress, settings=settings)
     return Diagnosed(result, records[0])

@@ -95,9 +95,10 @@ def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progr
     rig: a rig, its file, or the name of one in config/rigs. progress: hears a step's name and the share done.
     Raises IdentificationError for records from which the rig cannot be identified, RigError for the rig.
     """
+    from rsea_ros.checks.carried import held_against
     from rsea_ros.identification.identify import identify as identify_records
-    from rsea_ros.library.inputs import checked, records_of
+    from rsea_ros.library.inputs import records_of
 
     rig = load_rig(rig)
-    records = [checked(record, rig, masks=False) for record in records_of(data)]
+    records = [held_against(record, rig, masks=False) for record in records_of(data)]
     return Fit(identify_records(records, rig, progress))

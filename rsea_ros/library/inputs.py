@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 
 
@@ -21,13 +20,3 @@ def records_of(data: Record | Sequence[Record]) -> list[Record]:
     if not records:
         raise ParameterError("data: no record, expected one or more")
     return records
-
-
-def checked(record: Record, rig: Rig, *, masks: bool) -> Record:
-    """Return a record that carries what the checks find wrong with it into the result."""
-    from rsea_ros.checks.carried import with_faults
-    from rsea_ros.checks.check import check_record
-    from rsea_ros.checks.usable import require_motion
-
-    require_motion(record)
-    return with_faults(record, check_record(record, rig), masks=masks)

@@ -16,6 +16,7 @@ from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate
+from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
 SETTLE = 0.3
@@ -71,7 +72,8 @@ def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
 def _why(record: Record) -> str:
     """Return which channels the reading left out, and why."""
     reasons = "; ".join(f"{f.channel}: {f.detail}" for f in record.faults if f.share == 1.0 and f.detail)
-    return f" ({reasons}), expected one channel" if reasons else ", expected one channel"
+    expected = f"expected one channel of {', '.join(OUTPUTS)}: record it, or name its topic with --topic"
+    return f" ({reasons}), {expected}" if reasons else f", {expected}"
 
 
 def _on_measured_zero(c: Comparison) -> Comparison:

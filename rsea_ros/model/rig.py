@@ -15,6 +15,7 @@ from typing import Literal
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
 from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.signals import FloatArray
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
 """Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
@@ -99,8 +100,9 @@ class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
 
     zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
-    so only changes of its values tell something. clock: s, how much later than its stamps it reads;
-    clock_doubt: s, one sigma of that: a fit looks for the rest.
+    so only changes of its values tell something. clock: s, how much later than its stamps it reads at the
+    start of a record; clock_rate: ppm, by how much more with time. clock_doubt: s, one sigma of `clock`: a
+    fit looks for the rest.
     """
 
     noise: float = 0.0
@@ -108,6 +110,7 @@ class Sensor:
     zero_unknown: bool = False
     clock: float = 0.0
     clock_doubt: float = CLOCK_DOUBT
+    clock_rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +140,7 @@ class Controller:
 class Rig:
     """A bench. See the module docstring.
 
+    linear: it moves along a line: m, N and kg stand for rad, N m and kg m^2.
     other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
     may move. proximal: which end the paper's *proximal* is. ft_end: which end the
     F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
@@ -151,6 +155,7 @@ class Rig:
     quantities: Mapping[str, Quantity]
     clamped: frozenset[str] = frozenset()
     rigid_spring: bool = False
+    linear: bool = False
     train: Train = "planetary"
     other_trains: tuple[Train, ...] = ()
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
@@ -225,9 +230,10 @@ class Rig:
         """Tell whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
-    def clock(self, channel: str) -> float:
-        """Return how much later than its stamps a channel is read, s."""
-        return self.sensors[channel].clock if channel in self.sensors else 0.0
+    def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
+        """Return how much later than its stamps a channel is read, s; since: of the record's start, s."""
+        sensor = self.sensors.get(channel, Sensor())
+        return sensor.clock + 1e-6 * sensor.clock_rate * since
 
     def clock_doubt(self, channel: str) -> float:
         """Return one sigma of what a channel's clock may be off beside `clock`, s."""

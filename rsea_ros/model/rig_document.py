@@ -30,12 +30,24 @@ from rsea_ros.model.rig import (
     Sensor,
     check_value,
 )
-from rsea_ros.model.rig_keys import CLOCK, CONTROLLER, EFFECT, GROUPS, QUANTITY, SENSOR, SWITCHES, TOP
+from rsea_ros.model.rig_keys import (
+    CLOCK,
+    CLOCK_RATE,
+    CONTROLLER,
+    EFFECT,
+    GROUPS,
+    QUANTITY,
+    SENSOR,
+    SWITCHES,
+    TOP,
+)
 from rsea_ros.signals import UNITS
 from rsea_ros.wording import shown
 
 _LATEST = 0.01
 """s. A clock further off than this is no clock error but a delay of the bench."""
+_FASTEST = 1000.0
+"""ppm. A clock that runs faster than this counts in other units."""
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -61,6 +73,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         quantities=quantities,
         clamped=clamped,
         rigid_spring=switch(groups["spring"], "spring.rigid"),
+        linear=switch(document, "linear"),
         train=groups["gear"].get("train", "planetary"),
         other_trains=_other_trains(groups["gear"].get("or", [])),
         sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
@@ -86,6 +99,8 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
         "source": rig.source,
         "proximal": rig.proximal,
     }
+    if rig.linear:
+        document["linear"] = True
     if rig.ft_end != "spring_end":
         document["ft_end"] = rig.ft_end
     if rig.encoder_end != "gear_output":
@@ -125,7 +140,7 @@ def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
         body["clock"] = {"value": sensor.clock, "unit": "s"}
     if sensor.clock_doubt != CLOCK_DOUBT:
         body["clock"]["doubt"] = sensor.clock_doubt
-    return body
+    return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
 
 
 def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
@@ -188,6 +203,18 @@ def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
     return value, doubt
 
 
+def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
+    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
+    field = f"sensors.{name}.clock_rate"
+    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
+    only_keys(item, names(CLOCK_RATE), field)
+    unit(item.get("unit"), f"{field}.unit", "ppm")
+    value = number(item.get("value"), f"{field}.value", "ppm")
+    if not abs(value) < _FASTEST:
+        raise RigError(f"{field}.value = {value:g} ppm, expected less than {_FASTEST:g} either way", field)
+    return value
+
+
 def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
     only_keys(body, set(UNITS), "sensors")
     sensors = {}
@@ -204,7 +231,7 @@ def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
                 f"sensors.{name}",
             )
         floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock)
+        sensors[name] = Sensor(noise, quantum, floating, *clock, _clock_rate(fields, name))
     return sensors
 
 

@@ -71,7 +71,7 @@ def load_rig(name_or_path: str | Path | Rig) -> Rig:
     except FieldError as error:
         raise RigError(f"{path}: {error}") from None
     if not isinstance(document.content, Mapping):
-        held = type(document.content).__name__
+        held = "nothing" if document.content is None else type(document.content).__name__
         raise RigError(f"{path}: holds {held}, expected a mapping with the keys of a rig")
     try:
         return rig_from_document(document.content, default_name=path.stem)

@@ -52,6 +52,7 @@ TOP = (
     Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "which end the paper calls proximal"),
     Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "what the encoder reads"),
     Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "where the F/T sensor sits"),
+    Key("linear", "true or false", "false", "it moves along a line: m, N, kg stand for rad, N m, kg m^2"),
     Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
     Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
     Key("controller", "mapping", "none", "position loop that ran during the record, see below"),
@@ -78,12 +79,14 @@ SENSOR = (
     Key("source", "text", "empty", "where the values come from"),
     Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
     Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
+    Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "by how much later still with time"),
 )
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
     Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma: a fit looks for the rest"),
 )
+CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
 LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "its targets command the bench")
 _LOOP_MEANINGS = {
     "k_p": "torque for an error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",

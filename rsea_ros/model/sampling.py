@@ -18,7 +18,10 @@ def _sample_smooth(values, at, command):  # type: ignore[no-untyped-def]
     out, last = np.empty(len(at)), len(values) - 1
     for i in range(len(at)):
         u = min(max(at[i], 0.0), float(last))
-        k = min(int(u), last - 1)
+        k = int(u)
+        if u == k:
+            out[i] = values[k]
+            continue
         left, right = k, k + 1
         if left > 0 and command[left - 1] == command[k]:
             left -= 1
@@ -26,18 +29,18 @@ def _sample_smooth(values, at, command):  # type: ignore[no-untyped-def]
             right += 1
         while left > 0 and right - left < 3 and command[left - 1] == command[k]:
             left -= 1
-        out[i] = _newton(values[left : right + 1], u - left)
+        out[i] = _newton(values, left, right, u - left)
     return out
 
 
 @njit(cache=True, nogil=True)
-def _newton(v, u):  # type: ignore[no-untyped-def]
-    """Return Newton's polynomial through two to four values at 0, 1, 2, … at u."""
-    value = v[0] + u * (v[1] - v[0])
-    if len(v) > 2:
-        value += u * (u - 1) / 2 * (v[2] - 2 * v[1] + v[0])
-    if len(v) > 3:
-        value += u * (u - 1) * (u - 2) / 6 * (v[3] - 3 * (v[2] - v[1]) - v[0])
+def _newton(v, left, right, u):  # type: ignore[no-untyped-def]
+    """Return Newton's polynomial through the two to four values from left to right, u steps after left."""
+    value = v[left] + u * (v[left + 1] - v[left])
+    if right - left > 1:
+        value += u * (u - 1) / 2 * (v[left + 2] - 2 * v[left + 1] + v[left])
+    if right - left > 2:
+        value += u * (u - 1) * (u - 2) / 6 * (v[left + 3] - 3 * (v[left + 2] - v[left + 1]) - v[left])
     return value
 
 

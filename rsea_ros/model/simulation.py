@@ -28,7 +28,7 @@ from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.model.structure import structured
 from rsea_ros.signals import Channel, FloatArray, Record
 
-_AFTER_DELAY = 5
+_AFTER_DELAY = 1
 """Order of a position loop at its port: its targets come late, and what it asks is limited and lags."""
 _SENSORS = 1
 """Stream of the random numbers of sensor noise: other numbers than an excitation of the same seed."""
@@ -105,7 +105,8 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
-    at = {n: drive.at[n] + rig.clock(n) / drive.step for n in channels}
+    since = {n: drive.origin + drive.step * drive.at[n] for n in channels}
+    at = {n: drive.at[n] + rig.clock(n, since[n]) / drive.step for n in channels}
     kinks = drive.kinks
     sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
     return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}

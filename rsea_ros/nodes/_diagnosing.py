@@ -13,6 +13,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
 from rsea_ros.new_files import Place
 from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.signals import Record
 
 _POLL = 0.02
@@ -61,10 +62,11 @@ class Diagnosing:
         self._pool.shutdown()
 
     def _diagnose(self, record: Record) -> Diagnosis:
+        from rsea_ros.checks.carried import held_against
         from rsea_ros.diagnosis.diagnose import diagnose
         from rsea_ros.report.diagnosis_files import write_diagnosis
 
-        result = diagnose([record], self._rig, progress=self._tell)
+        result = diagnose([held_against(record, self._rig, masks=True)], self._rig, progress=self._tell)
         self._report = write_diagnosis(result, record, Place(self._out, fresh=True), write_overlay)
         return result
 
@@ -89,7 +91,7 @@ class Waiting:
 
 
 def report_of(diagnosis: Diagnosis, report: Path) -> Report:
-    """Return verdict and causes with their sizes and gains as the values of a diagnostic."""
+    """Return verdict, causes with sizes and gains, and faults of the data as the values of a diagnostic."""
     values: dict[str, object] = {
         "verdict": diagnosis.verdict,
         "causes": ", ".join(c.name for c in diagnosis.causes),
@@ -97,5 +99,6 @@ def report_of(diagnosis: Diagnosis, report: Path) -> Report:
     for cause in diagnosis.causes:
         values |= {f"{cause.name}.{name}": f"{p.value:.6g} {p.unit}" for name, p in cause.parameters.items()}
         values[f"{cause.name}.gain"] = f"{cause.gain_holdout:.4f}"
-    level = OK if diagnosis.verdict == "nothing_wrong" else WARN
+    values["faults"] = "; ".join(fault_lines(diagnosis.faults))
+    level = OK if diagnosis.verdict == "nothing_wrong" and not diagnosis.faults else WARN
     return Report(level, diagnosis.sentence, {**values, "report": report})

@@ -18,6 +18,7 @@ from msg_adapters.reading import record_from
 from msg_adapters.ros import Trigger, message_type
 from msg_adapters.topics import ROLES, TYPES, TopicMap
 from rsea_ros.errors import RseaError
+from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, unused
 from rsea_ros.nodes._diagnosing import Diagnosing
@@ -26,6 +27,8 @@ from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
+from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.identification_words import verdict_sentence
 from rsea_ros.signals import Record
 
 DEFAULT = "out/identify"
@@ -64,6 +67,7 @@ class Identify:
         check_free(self._out / name for name in NAMES)
         self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
+        self._identified: Report | None = None
         group = ReentrantCallbackGroup()
         self._diagnose = node.create_service(Trigger, "~/diagnose", self._on_diagnose, callback_group=group)
         self._health = Health(node, self._report)
@@ -111,6 +115,7 @@ class Identify:
 
     def conclude(self) -> None:
         """Identify and write the results, or do nothing when stopped before."""
+        from rsea_ros.checks.carried import held_against
         from rsea_ros.identification.identify import identify
         from rsea_ros.report.results import write_results
 
@@ -118,8 +123,14 @@ class Identify:
             return
         log = self._node.get_logger()
         log.info(f"identifying from {self._gathered()}")
-        result = identify([self._record()], self._rig, self._progress)
+        record = held_against(self._record(), self._rig, self._values["axis"], masks=False)
+        result = identify([record], self._rig, self._progress)
         report = write_results(result, self._out)
+        self._identified = report_of(result, report)
+        self._health.publish()
+        log.info(self._identified.summary)
+        for line in fault_lines(result.faults):
+            log.warning(f"data: {line}")
         for p in result.parameters:
             log.info(f"{p.name} = {p.value:.6g} {p.unit}, 95 %: {p.ci95[0]:.6g} to {p.ci95[1]:.6g}")
         log.info(f"report: {report}")
@@ -147,11 +158,21 @@ class Identify:
         self._node.get_logger().info(self._gathered() if self._commanded else "waiting for torque_command")
 
     def _report(self) -> Report:
+        if self._identified is not None:
+            return self._identified
         lost = sum(tap.lost for tap in self._taps.values())
         counts = {role: tap.count for role, tap in self._taps.items()}
         if (told := self._diagnosing.report()) is not None:
             return Report(told.level, told.summary, {**counts, **told.values})
         return Report(WARN if lost else OK, f"{lost} messages lost" if lost else "gathering", counts)
+
+
+def report_of(result: Identification, report: Path) -> Report:
+    """Return verdict, parameters and faults of the data as the values of a diagnostic."""
+    values: dict[str, object] = {"verdict": result.verdict, "faults": "; ".join(fault_lines(result.faults))}
+    values |= {p.name: f"{p.value:.6g} {p.unit}" for p in result.parameters}
+    level = OK if result.verdict == "adequate" and not result.faults else WARN
+    return Report(level, verdict_sentence(result), {**values, "report": report})
 
 
 def main() -> int:

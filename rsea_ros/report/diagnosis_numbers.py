@@ -7,6 +7,7 @@ import numpy as np
 from rsea_ros.diagnosis.result import Diagnosis, Estimate
 from rsea_ros.report import words
 from rsea_ros.signals import UNITS
+from rsea_ros.units import in_motion
 
 
 def times_noise(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
@@ -41,7 +42,7 @@ def residual_change(diagnosis: Diagnosis, channel: str) -> str:
 def rms_change(diagnosis: Diagnosis, channel: str) -> str:
     """Return the same as RMS in the channel's unit beside the noise."""
     before, after, noise = (
-        words.quantity(v[channel], UNITS[channel])
+        words.quantity(v[channel], in_motion(UNITS[channel], linear=diagnosis.baseline_rig.linear))
         for v in (diagnosis.residual_rms, diagnosis.extended_residual_rms, diagnosis.noise_rms)
     )
     return f"{before} → {after}, noise {noise}" if diagnosis.causes else f"{before}, noise {noise}"

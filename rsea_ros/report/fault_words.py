@@ -48,7 +48,7 @@ def _by_channel(items: Sequence[Fault]) -> str:
 
 
 def _size(f: Fault) -> str:
-    size = "" if f.size is None else f", {words.number(f.size, 3)} {words.unit(f.unit)}"
+    size = "" if f.size is None else f", {words.number(f.size, 3)} {words.unit(f.unit)}".rstrip()
     share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
     return size + share
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.identification.result import Identification, Overlay
+from rsea_ros.identification.result import CLOCKS, Identification, Overlay
 from rsea_ros.report import words
 from rsea_ros.report.bode import bode_figure
 from rsea_ros.report.correlation import correlation_section
@@ -91,7 +91,7 @@ def _statics(identification: Identification) -> str:
 
 
 def _parameter_finding(identification: Identification) -> str:
-    physical = [p for p in identification.parameters if not p.name.startswith("clock.")]
+    physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
     settled = [p for p in physical if told(p) == "yes"]
     if len(settled) == len(physical):
         return f"The data tell all {len(physical)} parameters"

@@ -6,21 +6,20 @@ import math
 from collections.abc import Sequence
 from html import escape
 
-from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.result import CLOCKS, ParameterEstimate
 from rsea_ros.report import words
 from rsea_ros.report.palette import AFTER, GRID, QUIET, faint
 
 _WIDTH, _HEIGHT = 190.0, 26.0
 _TOLD = 0.9
 _UNTOLD = 0.5
-_CLOCK = "clock."
 _LOPSIDED = 1.5
 """Ratio of the sides of an interval, from which its ends are shown instead of ± its half."""
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the HTML table of the physical parameters, sensor clocks left out."""
-    physical = [p for p in parameters if not p.name.startswith(_CLOCK)]
+    physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
     head = (
         "<tr><th>Parameter</th><th class='number'>Value ± 95 %</th><th>Unit</th>"
         "<th>Against what the rig stated</th><th class='number'>Rig</th><th class='number'>Change</th>"
@@ -32,12 +31,13 @@ def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     """Return what was found of the sensors' clocks, empty where all may be true to their stamps."""
-    clocks = [p for p in parameters if p.name.startswith(_CLOCK) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
+    clocks = [p for p in parameters if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
     if not clocks:
         return ""
     parts = [
-        f"{words.channel(p.name.removeprefix(_CLOCK))} {words.quantity(p.value, 's', 2)} "
-        f"(95 %: {words.quantity(p.ci95[0], 's', 2)} to {words.quantity(p.ci95[1], 's', 2)})"
+        f"{words.channel(p.name.split('.')[1])} {words.quantity(p.value, p.unit, 2)} "
+        f"(95 %: {words.quantity(p.ci95[0], p.unit, 2)} to {words.quantity(p.ci95[1], p.unit, 2)})"
+        f"{' of the time passed' if p.unit == 'ppm' else ''}"
         for p in clocks
     ]
     return f"Sensors read later than stamped by: {'; '.join(parts)}."

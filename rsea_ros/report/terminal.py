@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from rich.table import Table
 
-from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.identification.result import CLOCKS, Identification, ParameterEstimate
 from rsea_ros.report import words
 from rsea_ros.report.parameters import told, value_text
 
@@ -23,7 +23,7 @@ def terminal_table(identification: Identification, truth: Mapping[str, float] | 
         table.add_column("in interval")
     table.add_column("told by data")
     for p in identification.parameters:
-        if not p.name.startswith("clock."):
+        if not p.name.startswith(CLOCKS):
             table.add_row(*_cells(p, truth))
     return table
 

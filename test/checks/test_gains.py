@@ -99,3 +99,36 @@ def test_another_rig_is_asked_about(name):
     findings = check_record(good(), load_rig(name))
     assert "wrong_rig" in {f.kind for f in findings.findings if f.light == "red"}
     assert findings.rig_name == name
+
+
+@pytest.mark.parametrize("samples", [5, 9])
+def test_a_moving_average_is_named_with_its_length(samples):
+    """It was `177 times the noise`."""
+    y = np.convolve(good()["ft"].y, np.ones(samples) / samples)[: len(good()["ft"])]
+    findings = check_record(good().with_channels(ft=Channel(good()["ft"].t, y)), RIG)
+    (found,) = findings.of("smoothing")
+    assert found.value == pytest.approx(1e3 * samples / 280.0, rel=1e-3)
+    assert f"average of {samples} samples" in found.detail
+    assert "smoothing" in {f.kind for f in findings.faults}
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameters"),
+    [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3}), (None, {})],
+)
+def test_a_lag_of_the_sensor_or_of_the_drive_is_no_average(effect, parameters):
+    bench = drawn_bench(np.random.default_rng(1))
+    bench = hide(bench, effect, parameters) if effect else bench
+    assert check_record(record_run(bench, 3, duration=8.0), RIG).of("smoothing") == ()
+
+
+def test_commands_and_sensors_may_each_have_another_unit():
+    """Position and velocity `fit no unit`, the F/T torque `looks like kN m`."""
+    record = scaled(good(), command=1e3, position=57.29578, velocity=9.549297)
+    record = record.with_channels(motor_torque=record["command"])
+    findings = check_record(record, RIG)
+    assert told(findings, "sign", "scale", "wrong_rig") == {
+        ("scale", "command"), ("scale", "motor_torque"), ("scale", "position"), ("scale", "velocity")
+    }  # fmt: skip
+    remedies = " ".join(f.remedy for f in findings.of("scale"))
+    assert all(f"unit: {unit}" in remedies for unit in ("mN m", "deg", "rpm"))

@@ -14,10 +14,16 @@ from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.identify import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.model.simulation import measure, simulate, synthesize
+from rsea_ros.signals import Channel, Record
 
 RATE = 280.0
+
+
+def with_stated_noise(case, rig):
+    sensors = {n: rig.sensors[n] for n in case.noise}
+    noise = {n: math.hypot(s.noise, s.quantum / math.sqrt(12.0)) for n, s in sensors.items()}
+    return replace(case, noise=noise)
 
 
 @pytest.mark.parametrize("kind", ["multisine", "white_noise", "chirp"])
@@ -48,10 +54,7 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
     stamps = np.arange(len(command)) / rate
     stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
     record = synthesize(rig, Channel(stamps, command), seed=5)
-    case = case_from(record, rig)
-    sensors = {n: rig.sensors[n] for n in case.noise}
-    noise = {n: math.hypot(s.noise, s.quantum / math.sqrt(12.0)) for n, s in sensors.items()}
-    case = replace(case, noise=noise)
+    case = with_stated_noise(case_from(record, rig), rig)
     pieces = short_pieces_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
     assert len(pieces) > 5
     for problem in (
@@ -60,3 +63,26 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
     ):
         residual = problem.residual(np.zeros(0))
         assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
+@pytest.mark.parametrize(("times", "kept"), [(0.2, 0.2), (1.0, 1.0), (1.5, 1.5), (2.0, 1.0), (4.0, 1.0)])
+def test_pieces_hold_a_channel_no_more_than_about_as_often_as_commands(times, kept, jitter):
+    """Joint states at four times the rate of the commands took twice as long and told no more."""
+    rig = load_rig("paper_high_impedance")
+    t = np.arange(round(40.0 * RATE)) / RATE
+    command = Channel(t, excitation("white_noise", Settings(rate=RATE, duration=40.0, seed=5)))
+    stamps = (np.arange(round(40.0 * RATE * times)) + 1.0) / (RATE * times)
+    stamps += jitter / (RATE * times) * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
+    blank = Channel(stamps, np.zeros(len(stamps)))
+    asked = Record({"command": command, "ft": Channel(t + 1.0 / RATE, np.zeros(len(t))), "position": blank})
+    rng = np.random.default_rng(5)
+    measured = {n: measure(rig, n, y, rng) for n, y in simulate(rig, asked).items()}
+    record = asked.with_channels(**{n: Channel(asked[n].t, y) for n, y in measured.items()})
+    case = with_stated_noise(case_from(record, rig), rig)
+    problem = Problem((case,), rig, (), CHANNELS)
+    pieces = Problem(short_pieces_of(case, problem.outputs(np.zeros(0))[0]), rig, (), CHANNELS)
+    counts = {n: sum(np.count_nonzero(p.mask[n]) for p in pieces.cases) for n in ("ft", "position")}
+    assert counts["position"] == pytest.approx(kept * counts["ft"], rel=0.02)
+    residual = pieces.residual(np.zeros(0))
+    assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)

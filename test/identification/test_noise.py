@@ -15,6 +15,7 @@ from rsea_ros.identification.noise import noise_floor, top_of_band
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import case_from, simulated
 from rsea_ros.identification.quantum import step_of
+from rsea_ros.identification.unknowns import Clocks
 from rsea_ros.model.rig import EffectSetting, Sensor
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
@@ -50,7 +51,7 @@ def test_white_noise_of_a_short_record_is_not_called_coloured(duration):
     rig = load_rig("paper_high_impedance")
     for seed in range(15):
         case = case_from(recorded(rig, seed, duration), rig)
-        known = reestimate_noise(case, simulated((case,), rig, {})[0])
+        known = reestimate_noise(case, simulated((case,), rig, Clocks({}, {}))[0])
         assert known.coloured == frozenset(), seed
 
 

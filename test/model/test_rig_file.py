@@ -152,7 +152,7 @@ NONSENSE = [
     (("sensors", "ft", "unit"), "lbf ft", "sensors.ft.unit = 'lbf ft', expected 'N m'"),
     (("sensors", "ft", "noise"), -1, "sensors.ft = -1, 0 N m, expected finite values >= 0"),
     (("sensors", "ft", "noise"), "low", "sensors.ft.noise = 'low', expected a number (N m)"),
-    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, noise"),
+    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, clock_rate"),
     (("controller",), 3, "controller = 3, expected a mapping"),
     (("controller",), {"k_v": 1.0}, "controller.k_p = None, expected a number (1/s)"),
     (
@@ -198,7 +198,7 @@ def test_a_known_field_must_be_stated(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "holds NoneType, expected a mapping with the keys of a rig"),
+        (b"", "holds nothing, expected a mapping with the keys of a rig"),
         (b"- 1\n", "holds list, expected a mapping"),
         (b"name: [", "not YAML: "),
         (b"\xff\xfe\x00", "not YAML: "),

@@ -9,6 +9,10 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from msg_adapters.tables import import_record, load_map
+from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.prediction import predict
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -71,3 +75,22 @@ def test_pendulum_gravity_is_that_of_the_read_me():
     sine = np.sin(position)
     assert np.dot(sine, torque) / np.dot(sine, sine) == pytest.approx(3.31, abs=0.01)
     assert record["command"].rate == pytest.approx(1000, rel=0.01)
+
+
+def test_sea_gamma_has_one_spring_behind_two_sensors():
+    """Where the motion is slow the F/T torque over the encoder's angle is the stiffness of the drawing."""
+    record = _imported("sea_gamma/open_5_1_31.csv", "sea_gamma")
+    slow = record.between(0.5, 2.0)
+    torque, angle = slow["ft"].y, slow["deflection"].y
+    assert np.corrcoef(torque, angle)[0, 1] > 0.9
+    assert np.polyfit(angle, torque, 1)[0] == pytest.approx(2155.0, rel=0.25)
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_so101_joints_hold_what_their_targets_ask(joint):
+    """A joint begins where a regression along its motion says, and explains most of a slow run."""
+    mapping = load_map(REPOSITORY / "config" / "imports" / "so101.yaml")
+    rig = load_rig("so101_joint")
+    record = commanded(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)
+    begun = joint_start(record, rig).with_effect("coulomb_friction", torque=0.05)
+    assert predict(begun, record.between(0.0, 30.0))["position"].fit_percent > 60.0

@@ -1,0 +1,74 @@
+"""An F/T channel that was smoothed before it was logged: a moving average is tried, never guessed.
+
+Measured over predicted of the F/T torque, over the same of the joint, is the sensor's own response H times a
+gain: what drive, inertia and damping do wrong is in both. An average of the last n samples has
+
+    H(f) = sin(pi f n T) / (n sin(pi f T)) exp(-i pi f (n - 1) T)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rsea_ros.checks.finding import Finding
+from rsea_ros.checks.spectra import Quotient, usable
+from rsea_ros.signals import ComplexArray, FloatArray
+
+_MOST = 60
+"""Samples of the longest average that is tried."""
+_LAGS = np.geomspace(2e-4, 0.1, 60)
+"""s. Time constants of a lag, which is a sensor's, not a program's."""
+_FALLS = 0.2
+"""Of what no filter leaves, and of what the best lag leaves: the average must leave less."""
+_FITS = 0.15
+"""Of the response: what the average may leave."""
+_FEWEST = 8
+
+
+def smoothing_findings(related: Mapping[str, Quotient], period: float) -> list[Finding]:
+    """Return the finding of an F/T channel that is a moving average. period: of its samples, s."""
+    joint = next((related[n] for n in ("position", "velocity") if n in related), None)
+    ft = related.get("ft")
+    if ft is None or joint is None or not np.array_equal(ft.frequency, joint.frequency):
+        return []
+    keep = usable(ft) & usable(joint)
+    if np.count_nonzero(keep) < _FEWEST:
+        return []
+    response, sd = ft.value / joint.value, np.hypot(ft.sd, joint.sd)
+    number = _average(ft.frequency[keep], response[keep], sd[keep], period)
+    if number < 2:
+        return []
+    return [
+        Finding(
+            "amber",
+            "smoothing",
+            "ft",
+            1e3 * number * period,
+            "ms",
+            expected="none",
+            detail=f"looks like a moving average of {number} samples",
+            remedy="log the sensor unfiltered: a fit takes its lag for the machine's",
+        )
+    ]
+
+
+def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: float) -> int:
+    """Return over how many samples a response was averaged, 1 for none."""
+    weight = 1.0 / (sd**2 + 0.05**2)
+    turn = np.pi * f * period
+    tried = [_left(response, np.ones(len(f), complex), weight)]
+    for n in range(2, _MOST + 1):
+        h = np.sin(n * turn) / (n * np.sin(turn)) * np.exp(-1j * (n - 1) * turn)
+        tried.append(_left(response, h, weight))
+    lagged = min(_left(response, 1.0 / (1.0 + 2j * np.pi * f * tau), weight) for tau in _LAGS)
+    best = int(np.argmin(tried))
+    clear = tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2
+    return best + 1 if clear else 1
+
+
+def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> float:
+    """Return the share of a response's power that a filter leaves, whatever its gain."""
+    gain = float(np.sum(weight * (h.conj() * response).real) / np.sum(weight * np.abs(h) ** 2))
+    return float(np.sum(weight * np.abs(response - gain * h) ** 2) / np.sum(weight * np.abs(response) ** 2))

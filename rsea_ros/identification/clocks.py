@@ -1,0 +1,137 @@
+"""Which clocks of the sensors a fit must move, asked of its residual, and what they would cost.
+
+With c = d r / d clock, the other unknowns projected out of it, and r the weighted residual without the clock,
+
+    z = c'r / sqrt(max(sum_b s_b^2, c'c)),   s_b = c_b' (r_b - c_b c'r / c'c) of blocks of one second
+
+is a standard normal where the clock is right (score test; blocks as in confidence.py). A clock that is not
+asked for is taken as right: free, it takes the place of damping, for a late F/T sensor looks like more b_m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.identification.confidence import BLOCK, sample_blocks
+from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.solver import Map, Solution, clock_columns, serial
+from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.signals import FloatArray, IntArray
+
+ASKED = 3.5
+"""Standard deviations from which a clock is asked for: one of six in 360 records where all are right."""
+KEPT = 2.0
+"""Standard deviations from right, below which a clock that was asked for is taken as right after all."""
+MISFIT = 1.3
+"""RMS of what clocks leave over the noise, above which something else is wrong and the rate of one stands in
+for it."""
+WORTH = 2.0
+"""Times the interval of a value with the clocks as right, from which what they would cost is said."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Clocks that the data ask for, and by unknown how much wider its interval were with the others free."""
+
+    clocks: tuple[Unknown, ...] = ()
+    cost: Mapping[str, float] | None = None
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What taking the other clocks as right saves; none where it saves little."""
+        name, times = max((self.cost or {"": 0.0}).items(), key=lambda item: item[1])
+        if times < WORTH:
+            return ()
+        return (
+            "The sensors' clocks are taken as right where the data ask for no correction: each unknown by "
+            f"{1e6 * CLOCK_DOUBT:.0f} µs, they would make the interval of {name} {times:.1f} times as wide.",
+        )
+
+
+def asked_of(solution: Solution, run: Map = serial) -> Asked:
+    """Return the clocks that a fit without any must move, offsets and rates."""
+    problem = solution.problem
+    if is_inverse(problem.rig):
+        return Asked()
+    channels = sorted({n for case in problem.cases for n in problem.present(case)})
+    left = [*clocks(channels, problem.rig), *clock_rates(channels)]
+    columns, blocks = clock_columns(problem, solution.theta, left, run), sample_blocks(problem, BLOCK)
+    taken: list[int] = []
+    for _ in left:
+        rest = [i for i in range(len(left)) if i not in taken]
+        z = [_score(solution, columns, [*taken, i], left, blocks) for i in rest]
+        if max(z) < ASKED:
+            break
+        taken.append(rest[int(np.argmax(z))])
+    if _left_over(solution, columns[:, taken], [left[i] for i in taken]) > MISFIT:
+        taken = [i for i in taken if not left[i].is_rate]
+    others = [i for i, c in enumerate(left) if not c.is_rate and i not in taken]
+    return Asked(
+        tuple(left[i] for i in taken), _cost(solution, columns[:, others], [left[i] for i in others])
+    )
+
+
+def freed(solution: Solution, asked: Asked) -> tuple[Problem, FloatArray]:
+    """Return the problem of a fit with the clocks asked for beside its unknowns, and where to begin."""
+    problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *asked.clocks))
+    return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])
+
+
+def without_needless(solution: Solution) -> tuple[Problem, FloatArray]:
+    """Return the problem of a fit without clocks that it leaves near enough to right, and where it is."""
+    problem, prior = solution.problem, np.diag([u.doubt**-2 for u in solution.problem.unknowns])
+    sd = np.sqrt(np.diag(np.linalg.pinv(solution.jacobian.T @ solution.jacobian + prior, hermitian=True)))
+    kept = [
+        i
+        for i, (u, theta) in enumerate(zip(problem.unknowns, solution.theta, strict=True))
+        if not u.is_clock or abs(theta) > KEPT * sd[i]
+    ]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in kept)), solution.theta[kept]
+
+
+def _score(
+    solution: Solution, columns: FloatArray, which: Sequence[int], left: Sequence[Unknown], blocks: IntArray
+) -> float:
+    """Return |z| of the last of some clocks, beside the fit's unknowns and the clocks before it."""
+    base = np.column_stack([solution.jacobian, columns[:, list(which[:-1])]])
+    known = (*solution.problem.unknowns, *(left[i] for i in which[:-1]))
+    normal = base.T @ base + np.diag([u.doubt**-2 for u in known])
+    column = columns[:, which[-1]]
+    column = column - base @ np.linalg.lstsq(normal, base.T @ column, rcond=None)[0]
+    clocked = base[:, solution.jacobian.shape[1] :]
+    slope = np.concatenate([np.zeros(solution.jacobian.shape[1]), clocked.T @ solution.residual])
+    residual = solution.residual - base @ np.linalg.lstsq(normal, slope, rcond=None)[0]
+    total, information = float(column @ residual), float(column @ column)
+    if information == 0.0:
+        return 0.0
+    scores = np.bincount(blocks, column * (residual - column * total / information))
+    return abs(total) / math.sqrt(max(float(scores @ scores), information))
+
+
+def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:
+    """Return the RMS over the noise of what a fit would leave with some clocks free, by its derivatives."""
+    base = np.column_stack([solution.jacobian, columns])
+    known = (*solution.problem.unknowns, *taken)
+    normal = base.T @ base + np.diag([u.doubt**-2 for u in known])
+    step = np.linalg.lstsq(normal, base.T @ solution.residual, rcond=None)[0]
+    return float(np.sqrt(np.mean((solution.residual - base @ step) ** 2)))
+
+
+def _cost(solution: Solution, columns: FloatArray, free: Sequence[Unknown]) -> dict[str, float]:
+    """Return by unknown how many times as wide its interval would be, were some clocks free beside it."""
+    unknowns = solution.problem.unknowns
+    without, beside = (
+        np.diag(np.linalg.pinv(base.T @ base + np.diag([u.doubt**-2 for u in known]), hermitian=True))
+        for base, known in (
+            (solution.jacobian, unknowns),
+            (np.column_stack([solution.jacobian, columns]), (*unknowns, *free)),
+        )
+    )
+    wider = np.sqrt(beside[: len(unknowns)] / np.maximum(without, 1e-300))
+    return {u.name: float(w) for u, w in zip(unknowns, wider, strict=True)}

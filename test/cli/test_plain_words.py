@@ -1,0 +1,87 @@
+"""What is wrong with a file is said in words for people, not in those of a parser."""
+
+from __future__ import annotations
+
+import gzip
+
+import pytest
+
+from msg_adapters import metadata
+from msg_adapters.contents import Contents
+from rsea_ros.cli.main import main
+
+PARSERS = ("None", "codec", "miMATRIX", "Mat file", "int()", "end-of-stream", "gzipped", "indices")
+MAP = "time: {rate: 100}\nchannels: {command: {column: u, unit: N m}}\n"
+PACKED = gzip.compress(b"u\n1\n2\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "holds nothing, expected a mapping"),
+        (b"name: caf\xe9\n", "byte 9 is 0xe9, which is no UTF-8"),
+        (b"\xff\xfe\x00", "byte 0 is 0xff, which is no UTF-8"),
+    ],
+)
+def test_of_a_rig(content, said, tmp_path, capsys):
+    (tmp_path / "rig.yaml").write_bytes(content)
+    assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2
+    _assert_plain(capsys.readouterr().err, said)
+
+
+def test_of_an_import_map(tmp_path, capsys):
+    (tmp_path / "map.yaml").write_bytes(b"")
+    (tmp_path / "run.csv").write_text("u\n1\n2\n")
+    assert main(["import", *_files(tmp_path, "run.csv")]) == 2
+    _assert_plain(capsys.readouterr().err, "map is empty, expected a mapping")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("run.mat", b"hello", "no MAT file that can be read, expected one up to version 7"),
+        ("run.csv.gz", PACKED[:12], "damaged or no gzip file"),
+        ("run.csv.gz", b"\xff\xfe\x00", "damaged or no gzip file"),
+    ],
+)
+def test_of_a_table(name, content, said, tmp_path, capsys):
+    (tmp_path / "map.yaml").write_text(MAP)
+    (tmp_path / name).write_bytes(content)
+    assert main(["import", *_files(tmp_path, name)]) == 2
+    _assert_plain(capsys.readouterr().err, said)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "no mapping rosbag2_bagfile_information"),
+        (b"rosbag2_bagfile_information: null", "no mapping rosbag2_bagfile_information"),
+        (b"rosbag2_bagfile_information: {}", "no relative_file_paths"),
+        (b"rosbag2_bagfile_information: {relative_file_paths: null}", "'null', expected a list"),
+        (b"\xff\xfe", "byte 0 is 0xff, which is no UTF-8"),
+        (
+            b"rosbag2_bagfile_information: {relative_file_paths: [], topics_with_message_count: "
+            b"[{topic_metadata: {name: /a}, message_count: null}]}",
+            "message_count 'null', expected a number",
+        ),
+        (
+            b"rosbag2_bagfile_information: {relative_file_paths: [], topics_with_message_count: [a]}",
+            "not in the form that rosbag2 writes",
+        ),
+    ],
+)
+def test_of_metadata(content, said, tmp_path):
+    (tmp_path / metadata.NAME).write_bytes(content)
+    contents = Contents()
+    metadata.known(tmp_path, contents)
+    (fault,) = contents.faults
+    _assert_plain(fault.detail, said)
+
+
+def _files(folder, name):
+    return [str(folder / name), "--map", str(folder / "map.yaml"), "--out", str(folder / "bag")]
+
+
+def _assert_plain(text, said):
+    assert said in text
+    assert not [word for word in PARSERS if word in text]

@@ -1,0 +1,45 @@
+"""A joint that positions command: what is wrong with it is found from its log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.excitation import JOINT, excitation
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel, Record
+
+TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "current_loop_lag")
+SETTINGS = DiagnosisSettings(max_causes=2, without=tuple(n for n in catalogue() if n not in TRIED))
+
+
+def logged(rig: Rig, high: float = 3.0) -> Record:
+    """Return 14 s of a joint whose inertia, damping and gravity are not those of its rig."""
+    targets = excitation("chirp", replace(JOINT, duration=14.0, high=high))
+    off = {"rotor.reflected_inertia": 0.026, "rotor.reflected_damping": 0.35, "spring_end.gravity": 0.6}
+    stamps = np.arange(len(targets)) / JOINT.rate
+    return synthesize(rig.with_values(off), Channel(stamps, targets), seed=6)
+
+
+def test_friction_and_a_delay_of_the_targets():
+    rig = load_rig("pd_joint")
+    true = rig.with_effect("coulomb_friction", torque=0.2).with_effect("command_delay", delay=0.015)
+    found = diagnose([logged(true)], rig, settings=SETTINGS)
+    assert {c.name for c in found.causes} == {"coulomb_friction", "command_delay"}
+    sizes = {c.name: next(iter(c.parameters.values())).value for c in found.causes}
+    assert sizes["coulomb_friction"] == pytest.approx(0.2, rel=0.03)
+    assert sizes["command_delay"] == pytest.approx(0.015, abs=3e-4)
+    assert found.verdict == "explained"
+
+
+def test_a_joint_that_is_as_its_rig_says_but_for_its_values():
+    rig = load_rig("pd_joint")
+    found = diagnose([logged(rig)], rig, settings=SETTINGS)
+    assert (found.verdict, found.causes) == ("nothing_wrong", ())

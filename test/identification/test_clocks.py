@@ -1,0 +1,68 @@
+"""Clocks enter a fit where the data ask for them, and only there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benches import bench, recorded
+
+from rsea_ros.identification.identify import identify
+from rsea_ros.model.rig import Sensor
+from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.simulation import simulate
+from rsea_ros.signals import Channel, Record
+
+
+def with_clock(record: Record, channel: str, offset: float, ppm: float) -> Record:
+    """Return a record whose sensor was read later than stamped, by s at the start and ppm of the time."""
+    t = record[channel].t
+    stamps = t - offset - 1e-6 * ppm * (t - record["command"].t[0])
+    return replace(record, channels={**record.channels, channel: Channel(stamps, record[channel].y)})
+
+
+def clocks(result):
+    """Return the clocks that a fit moved, with their intervals."""
+    return {p.name: p for p in result.parameters if p.name.startswith("clock")}
+
+
+def test_right_clocks_are_left_alone_and_their_cost_is_said():
+    nominal, true = bench("paper_high_impedance", 1)
+    result = identify([recorded(true, 1, 20.0)], nominal)
+    assert clocks(result) == {}
+    (note,) = result.notes
+    assert "taken as right" in note and "times as wide" in note
+    damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
+    assert (damping.ci95[1] - damping.ci95[0]) / 2 < 5e-4 * damping.value
+
+
+@pytest.mark.parametrize(
+    ("offset", "ppm", "moved"),
+    [
+        (8e-5, 0.0, {"clock.ft"}),
+        (0.0, 90.0, {"clock_rate.ft"}),
+        (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"}),
+    ],
+)
+def test_a_wrong_clock_is_asked_for_with_its_size(offset, ppm, moved):
+    nominal, true = bench("paper_high_impedance", 1)
+    result = identify([with_clock(recorded(true, 1, 20.0), "ft", offset, ppm)], nominal)
+    assert set(clocks(result)) == moved
+    for name, p in clocks(result).items():
+        size = ppm if name.startswith("clock_rate") else offset
+        assert p.ci95[0] - 0.1 * abs(size) < size < p.ci95[1] + 0.1 * abs(size), name
+    assert max(result.times_noise.values()) < 1.05
+    sensor = result.rig.sensors["ft"]
+    assert (sensor.clock_rate != 0.0) == ("clock_rate.ft" in moved)
+
+
+def test_a_rate_is_part_of_the_rig():
+    _, true = bench("paper_high_impedance", 1)
+    record = recorded(true, 1, 5.0)
+    fast = replace(true, sensors={**true.sensors, "ft": Sensor(0.03, 0.0, clock_rate=200.0)})
+    assert rig_from_document(rig_to_document(fast)).sensors["ft"].clock_rate == 200.0
+    late = simulate(fast, record)["ft"]
+    moved = simulate(true, with_clock(record, "ft", 0.0, -200.0))["ft"]
+    assert np.abs(late - moved)[:-1].max() < 1e-6
+    assert np.abs(late - simulate(true, record)["ft"]).max() > 0.02
