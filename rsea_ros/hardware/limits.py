@@ -144,7 +144,7 @@ class Guard:
         return self.torque
 
     def _ramped(self, age: float | None) -> float:
-        """Return how large the torque may be in the ramp: less by each cycle, and by the time that has passed.
+        """Return how large the torque may be in the ramp: less by each cycle and by the time that passed.
 
         Cycles are late on a busy machine, and the torque of a dead publisher must not last as long as they.
         """
