@@ -59,13 +59,17 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "coherence", "data_split", "residual_peaks", "screening"},
+    {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
     {"result", "score", "short_pieces", "initial_guess"},
-    {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences"},
-    {"selection", "step_fits"},
-    {"forward_step", "backward_elimination", "evaluation"},
-    {"replacement", "conclusion"},
-    {"stepwise"},
+    {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
+    {"selection", "step_fits", "signature"},
+    {"forward_step", "backward_elimination", "evaluation", "flexible"},
+    {"replacement", "evidence"},
+    {"stepwise", "claims", "probability"},
+    {"promotion"},
+    {"weighing"},
+    {"naming"},
+    {"conclusion"},
     {"diagnose"},
 )
 """Layers of rsea_ros/diagnosis: a module imports those of the lines above its own only."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +12,23 @@ from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.naming import Named, named
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Rejected, Verdict
+from rsea_ros.diagnosis.result import (
+    Alternative,
+    Cause,
+    Diagnosis,
+    Estimate,
+    Experiment,
+    Reason,
+    Rejected,
+    Verdict,
+)
 from rsea_ros.diagnosis.score import Score, gain, score_on
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.sentences import (
+    also_in_model,
     coherence_lost,
     coloured_noise,
     evidence_of,
@@ -25,13 +36,15 @@ from rsea_ros.diagnosis.sentences import (
     verdict_sentence,
 )
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.verdict import is_at_floor, verdict_of
+from rsea_ros.diagnosis.verdict import is_at_floor, takes_most, verdict_of
+from rsea_ros.diagnosis.weighing import Weighed, Weighing
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError
-from rsea_ros.identification.confidence import what_is_not_told
+from rsea_ros.identification.confidence import confidence_of, what_is_not_told
 from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.identification.solver import solve
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.rig import CLOCK_DOUBT, Rig
 from rsea_ros.signals import Record
@@ -43,34 +56,39 @@ PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
 
 
 def diagnosis_of(
-    selection: Selection,
-    stages: list[Evaluated],
+    weighing: Weighing,
     checked: Sequence[Checked],
     records: Sequence[Record],
     rig: Rig,
     pools: Pools,
     settings: DiagnosisSettings,
 ) -> Diagnosis:
-    """Return what a search and its judged stages come to; checked: of the records and the held-out one."""
+    """Return what weighed causes come to. checked: of the records and the held-out one."""
+    selection, stages = weighing.selection, weighing.stages
     channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
     if channel is None:
         raise IdentificationError(
             f"{records[0].source}: no sample is left to judge by, expected a longer record"
         )
     faults = tuple(f for c in checked for f in c.faults)
-    levels, causes_named = settings.floor, selection.last.causes
-    has_rivals = bool(causes_named) and bool(selection.rivals_of(causes_named[0]))
-    verdict = verdict_of([s.test for s in stages], has_rivals, levels, faults)
-    dropped: list[Rejected] = []
+    levels, said = settings.floor, naming_of(weighing, settings)
+    dropped = [_dropped(a, b, said, channel) for a, b in itertools.pairwise(stages) if not is_named(b, said)]
+    stages = without_unnamed_end(stages, said)
+    statuses = [said[s.added].status if s.added in said else None for s in stages[1:]]
+    verdict = verdict_of([s.test for s in stages], statuses, levels, faults)
     if verdict == "unexplained":
-        channel = main_channel(stages[0].test, channel, levels.reached)
-        dropped = [_dropped(a, b, channel) for a, b in itertools.pairwise(stages)]
-        stages = stages[:1]
+        channel, stages = main_channel(stages[0].test, channel, levels.reached), stages[:1]
     first, last = stages[0], stages[-1]
-    causes = tuple(_cause(selection, a, b, last, channel) for a, b in itertools.pairwise(stages))
+    causes = tuple(
+        _cause(selection, a, b, last, channel, said[b.added])
+        for a, b in itertools.pairwise(stages)
+        if is_named(b, said)
+    )
     main = causes[0].channel if causes else channel
-    named = {c.name for c in causes} | {r.name for r in dropped}
-    others = [t for t in _latest(selection.trials) if t.name not in named]
+    decided = {c.name for c in causes} | {r.name for r in dropped}
+    others = [t for t in _latest(selection.trials) if t.name not in decided]
+    against = [(c.name, w, p) for c in causes for w, p in said[c.name].rivals]
+    alternatives = tuple(pools.fits.map(lambda item: alternative(*item), against))
     rejected = pools.fits.map(lambda t: _rejected(t, selection.cases, main), others)
     case = selection.cases[0]
     where = misfits(case, first.outputs[0], main, rig)
@@ -79,7 +97,8 @@ def diagnosis_of(
         verdict=verdict,
         channel=main,
         sentence=verdict_sentence(
-            verdict, causes, main, first.test.ratio(main), last.test.ratio(main), faults
+            verdict, causes, main, first.test.ratio(main), last.test.ratio(main), faults,
+            at_floor=is_at_floor(last.test, levels),
         ),
         rig_name=rig.name,
         sources=tuple(r.source for r in records),
@@ -97,6 +116,7 @@ def diagnosis_of(
         at_noise_floor=is_at_floor(last.test, levels),
         misfit=where,
         causes=causes,
+        alternatives=alternatives,
         rejected=(*dropped, *rejected),
         next_experiment=_next_experiment(selection, stages, verdict, records[0]),
         remaining=misfits(case, last.outputs[0], main, rig),
@@ -106,6 +126,7 @@ def diagnosis_of(
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),
         statements=(
+            *also_in_model([n for n in last.solution.problem.added if n not in {c.name for c in causes}]),
             *what_is_not_told(first.solution.problem.unknowns, first.confidence),
             *coherence_lost(lost_above(case, main), main),
             *on_measured_angle(last.solution.problem),
@@ -114,16 +135,41 @@ def diagnosis_of(
     )
 
 
+def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Named]:
+    """Return by cause what may be said of it."""
+    first, last = weighing.stages[0].test, weighing.stages[-1].test
+    at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
+    return {n.cause.evidence.name: n for n in named(weighing.places, at_floor, most, settings)}
+
+
+def is_named(stage: Evaluated, said: Mapping[str, Named]) -> bool:
+    """Tell whether the cause that a stage adds may be named."""
+    return stage.added in said and said[stage.added].status is not None
+
+
+def without_unnamed_end(stages: Sequence[Evaluated], said: Mapping[str, Named]) -> list[Evaluated]:
+    """Return the stages without the last ones whose cause is not named: no other was fitted beside it."""
+    kept = list(stages)
+    while len(kept) > 1 and not is_named(kept[-1], said):
+        kept.pop()
+    return kept
+
+
 def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reached) -> str:
     """Return the channel that shows an unexplained residual: `channel` if above noise, else the worst."""
     return channel if test.ratio(channel) > reached else test.worst
 
 
 def _cause(
-    selection: Selection, without: Evaluated, with_it: Evaluated, last: Evaluated, channel: str
+    selection: Selection,
+    without: Evaluated,
+    with_it: Evaluated,
+    last: Evaluated,
+    channel: str,
+    said: Named,
 ) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its own gain on data that took no part."""
-    effect = effect_named(with_it.solution.problem.added[-1])
+    effect = effect_named(with_it.added)
     speaks = (
         channel
         if without.test.ratio(channel) > 1.02 * with_it.test.ratio(channel)
@@ -131,14 +177,9 @@ def _cause(
     )
     held_out, interval = gain(with_it.test, without.test, speaks)
     train, _ = gain(with_it.train, without.train, speaks)
-    estimates = {
-        p.name.split(".")[1]: p
-        for p in parameters_of(last.solution, last.confidence)
-        if p.name.startswith(effect.name + ".")
-    }
     return Cause(
         name=effect.name,
-        parameters={k: with_model_uncertainty(e) for k, e in estimates.items()},
+        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence)),
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
@@ -148,7 +189,31 @@ def _cause(
         equation=effect.equation,
         channel=speaks,
         confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
+        status=said.status or "leading",
+        probability=said.probability,
     )
+
+
+def alternative(instead_of: str, weighed: Weighed, probability: float) -> Alternative:
+    """Return a rival of a cause with its size where it acts in that cause's place."""
+    claim, evidence = weighed.claim, weighed.evidence
+    solution = solve(claim.problem, claim.theta, iterations=0)
+    held_out, interval = gain(claim.with_it, claim.without, evidence.channel)
+    return Alternative(
+        name=claim.name,
+        instead_of=instead_of,
+        parameters=sizes(claim.name, parameters_of(solution, confidence_of(solution))),
+        gain_holdout=held_out,
+        gain_holdout_ci95=interval,
+        channel=evidence.channel,
+        probability=probability,
+    )
+
+
+def sizes(effect: str, estimates: Sequence[ParameterEstimate]) -> dict[str, Estimate]:
+    """Return the parameters of an effect among estimates, by their names without the effect's."""
+    own = [p for p in estimates if p.name.startswith(effect + ".")]
+    return {p.name.split(".")[1]: with_model_uncertainty(p) for p in own}
 
 
 def with_model_uncertainty(estimate: ParameterEstimate) -> Estimate:
@@ -170,7 +235,7 @@ def _next_experiment(
 ) -> Experiment | None:
     """Return the run that would tell what these data cannot; None when nothing is left to tell."""
     for stage in stages[1:]:
-        rivals = selection.rivals_of(stage.solution.problem.added[-1])
+        rivals = selection.rivals_of(stage.added)
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained") and not is_at_floor(stages[-1].test):
@@ -196,10 +261,16 @@ def _rejected(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
     return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 
-def _dropped(without: Evaluated, with_it: Evaluated, channel: str) -> Rejected:
-    """Return an effect that was accepted and is no cause, for the verdict is `unexplained`."""
-    name = with_it.solution.problem.added[-1]
-    return Rejected(name, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
+def _dropped(
+    without: Evaluated, with_it: Evaluated, said: Mapping[str, Named], channel: str
+) -> Rejected:
+    """Return an effect that was accepted and may not be named, with the gain of what it helps most."""
+    weighed = said.get(with_it.added)
+    if weighed is None:
+        return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
+    evidence = weighed.cause.evidence
+    reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
+    return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
 
 
 def _rms(test: Score, case: Case) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Diagnosis: what a rig's simulation gets wrong, by stepwise selection among the effects of the catalogue.
 
 The nominal model is fitted; effects are added one after another, each fitted to the training blocks and
-accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is reported
-with its gain on the test blocks.
+accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is weighed on
+the test blocks (weighing.py), and named with its gain and probability where it may be (naming.py).
 """
 
 from __future__ import annotations
@@ -14,17 +14,19 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.conclusion import diagnosis_of
-from rsea_ros.diagnosis.evaluation import evaluate
+from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
+from rsea_ros.diagnosis.weighing import weigh
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.steady import steadied
-from rsea_ros.identification.workers import worker_pools
+from rsea_ros.identification.workers import Pools, worker_pools
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
@@ -54,21 +56,44 @@ def diagnose(
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
     checked, sentences = _steady([check(r, rig) for r in records], rig)
-    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
+    nominal = nominal_problem(checked, rig)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
-    stated = frozenset(e.name for e in rig.effects)
-    nominal = Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
-    effects = [e for name, e in catalogue().items() if name not in settings.without]
     with worker_pools() as pools:
-        start = joint_start(checked[0].record, rig) if rig.loop is not None else None
-        selection = select_stepwise(nominal, effects, pools, tell, settings, start)
-        tell("looking for a simpler model", 0.9)
-        selection = eliminate_backwards(selection, effects, pools, settings)
-        tell("evaluating on the test blocks", 0.95)
-        stages = [evaluate(selection, m, tested, pools, settings) for m in selection.models]
+        selection, stages = search(nominal, checked[0].record, tested, pools, tell, settings)
+        tell("weighing the causes", 0.97)
+        weighing = weigh(selection, stages, tested, pools, settings)
         every = [*checked, *([tested] if tested else [])]
-        result = diagnosis_of(selection, stages, every, records, rig, pools, settings)
+        result = diagnosis_of(weighing, every, records, rig, pools, settings)
     return replace(result, statements=(*sentences, *torque_scale(nominal), *result.statements))
+
+
+def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
+    """Return the fit of a rig to checked records: the nominal model."""
+    cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
+    stated = frozenset(e.name for e in rig.effects)
+    return Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
+
+
+def search(
+    nominal: Problem,
+    record: Record,
+    holdout: Checked | None,
+    pools: Pools,
+    tell: Progress,
+    settings: DiagnosisSettings,
+) -> tuple[Selection, list[Evaluated]]:
+    """Select causes beside the nominal model and evaluate every model of the selection.
+
+    record: the first one, from which a joint in its loop gets its start.
+    """
+    rig = nominal.rig
+    effects = [e for name, e in catalogue().items() if name not in settings.without]
+    start = joint_start(record, rig) if rig.loop is not None else None
+    selection = select_stepwise(nominal, effects, pools, tell, settings, start)
+    tell("looking for a simpler model", 0.9)
+    selection = eliminate_backwards(selection, effects, pools, settings)
+    tell("evaluating on the test blocks", 0.95)
+    return selection, [evaluate(selection, m, holdout, pools, settings) for m in selection.models]
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[str, ...]]:

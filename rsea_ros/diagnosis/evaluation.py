@@ -33,6 +33,12 @@ class Evaluated:
     train: Score
     test: Score
 
+    @property
+    def added(self) -> str:
+        """Name of the effect that the model adds to the one before; empty for the nominal model."""
+        added = self.solution.problem.added
+        return added[-1] if added else ""
+
     @cached_property
     def confidence(self) -> Confidence:
         """The doubt that is left of the fit's values."""

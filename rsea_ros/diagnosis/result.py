@@ -24,13 +24,20 @@ Reason = Literal[
     "no_better_than_simpler",
     "no_better_than_likelier",
     "redundant",
+    "replaced",
+    "improbable",
     "leaves_too_much",
 ]
 """Why an effect is no cause.
 
 far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound. not_sure,
 too_small: the gain on the validation blocks. explains_less, no_better_than_…: than the accepted rival.
-redundant: beside the other causes. leaves_too_much: it was accepted, but the verdict is `unexplained`.
+redundant: beside the other causes. replaced: it was accepted, and gave way later. improbable: it was
+accepted, but its law does not fit what it takes away. leaves_too_much: it was, but does not surely help.
+"""
+Status = Literal["confirmed", "leading", "one_of"]
+"""confirmed: right beyond reasonable doubt. leading: surely helps, part of the truth, and more is missing.
+one_of: it or one of the alternatives that stand against it.
 """
 
 
@@ -63,7 +70,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Cause:
-    """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`."""
+    """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`.
+
+    probability: that it is part of the truth under this name, 0 to 1, calibrated (bench/calibration.py).
+    """
 
     name: str
     parameters: Mapping[str, Estimate]
@@ -74,6 +84,21 @@ class Cause:
     equation: str = ""
     channel: str = "ft"
     confusable_with: tuple[str, ...] = ()
+    status: Status = "confirmed"
+    probability: float = 1.0
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """What may be right in a cause's place, with its size; gain_…: held out, of `channel`."""
+
+    name: str
+    instead_of: str
+    parameters: Mapping[str, Estimate]
+    gain_holdout: float
+    gain_holdout_ci95: tuple[float, float]
+    channel: str
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -81,7 +106,7 @@ class Rejected:
     """An effect that was tried and is no cause, with its gain on data that it was not fitted to.
 
     rival: the effect that was preferred, empty for none. is_fitted: fitted to all training blocks; otherwise
-    only to short pieces of them, and its gain says little.
+    only to short pieces of them, and its gain says little. probability: where it was weighed as a cause.
     """
 
     name: str
@@ -89,6 +114,7 @@ class Rejected:
     reason: Reason
     rival: str = ""
     is_fitted: bool = True
+    probability: float | None = None
 
 
 @dataclass(frozen=True)
@@ -138,6 +164,7 @@ class Diagnosis:
     at_noise_floor: bool
     misfit: tuple[Misfit, ...]
     causes: tuple[Cause, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
     rejected: tuple[Rejected, ...] = ()
     remaining: tuple[Misfit, ...] = ()
     next_experiment: Experiment | None = None

@@ -30,8 +30,12 @@ def verdict_sentence(
     before: float,
     after: float,
     faults: Sequence[Fault],
+    at_floor: bool = False,
 ) -> str:
-    """Return the verdict as one sentence. before, after: held-out residual over noise."""
+    """Return the verdict as one sentence.
+
+    before, after: held-out residual of the channel over its noise. at_floor: of all channels with all causes.
+    """
     name, data = _CHANNELS[channel], _data(faults)
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
@@ -50,6 +54,9 @@ def verdict_sentence(
     if verdict == "unexplained":
         size = f"{math.ceil(100.0 * before) / 100.0:.2f}" if before < 2.0 else f"{before:.1f}"
         return f"The {name} residual is {size} times the noise; no known effect explains it.{data}"
+    if verdict == "partly_explained" and at_floor:
+        doubt = "but another law may do the same"
+        return f"{named.capitalize()}, probably: {fall} {after:.2f} times the noise, {doubt}.{data}"
     if verdict == "explained":
         return f"{named.capitalize()}: {fall} {after:.2f} times the noise, which is the floor.{data}"
     return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
@@ -60,6 +67,17 @@ def evidence_of(effect: Effect, channel: str, before: float, after: float, gain:
     return (
         f"With {effect.about}, the {_CHANNELS[channel]} residual of data that took no part falls "
         f"from {before:.2f} to {after:.2f} times the noise (gain {gain:.1%})."
+    )
+
+
+def also_in_model(names: Sequence[str]) -> tuple[str, ...]:
+    """Return what the extended model has beside the causes, as sentences."""
+    if not names:
+        return ()
+    effects = listed([n.replace("_", " ") for n in names])
+    return (
+        f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
+        "law than that.",
     )
 
 

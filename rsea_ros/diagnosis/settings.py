@@ -138,6 +138,32 @@ class ForwardSettings:
 
 
 @dataclass(frozen=True)
+class NamingSettings:
+    """From which probability a cause is named, and as what (naming.py)."""
+
+    confirmed_at_floor: float = number(
+        0.8, "1", "probability from which a cause is confirmed where all causes together leave only noise",
+        "another law could leave that too, but hardly by chance",
+    )  # fmt: skip
+    confirmed: float = number(
+        0.98, "1", "the same where more is missing", "two wrong names in a hundred are the most that may be"
+    )
+    likely: float = number(
+        0.5, "1", "probability of a cause and its rivals from which it is named if it surely helps at all",
+        "likelier than none of these",
+    )  # fmt: skip
+    possible: float = number(
+        0.2, "1", "the same where it surely brings what a cause must bring (acceptance.fall)",
+        "below it four to one speak against the name",
+    )  # fmt: skip
+    rival: float = number(0.05, "1", "probability from which a rival is an alternative", "one in twenty")
+    clear: float = number(
+        0.8, "1", "share of the probability of a cause and its rivals, below which it is `one_of` them",
+        "four to one over all rivals together",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class DiagnosisSettings:
     """What a diagnosis tries, and every number that steers its verdict.
 
@@ -154,6 +180,7 @@ class DiagnosisSettings:
     fits: FitSettings = FitSettings()
     pieces: PieceSettings = PieceSettings()
     forward: ForwardSettings = ForwardSettings()
+    naming: NamingSettings = NamingSettings()
 
     def __post_init__(self) -> None:
         if self.max_causes < 1:
@@ -162,7 +189,7 @@ class DiagnosisSettings:
 
     def listed(self) -> Iterator[Setting]:
         """Yield every number of the groups with its meaning, unit and reason."""
-        for group in ("floor", "acceptance", "fits", "pieces", "forward"):
+        for group in ("floor", "acceptance", "fits", "pieces", "forward", "naming"):
             values = getattr(self, group)
             for f in fields(values):
                 yield Setting(f"{group}.{f.name}", getattr(values, f.name), **f.metadata)

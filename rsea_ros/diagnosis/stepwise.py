@@ -19,7 +19,7 @@ from rsea_ros.diagnosis.candidate import (
 )
 from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep
 from rsea_ros.diagnosis.replacement import replacement_step
-from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Problem
@@ -61,6 +61,7 @@ def select_stepwise(
         if step.accepted is None:
             break
         rivals[step.accepted.newest] = step.equals
+        trials.append(trial_of(step.accepted, step.accepted.newest, present, "replaced"))
         models.append(refit(with_noise_reestimated(step.accepted), setup))
     cases = models[-1].cases
     return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)

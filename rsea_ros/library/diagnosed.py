@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.progress import Progress
@@ -38,8 +38,16 @@ class Diagnosed:
 
     @property
     def causes(self) -> tuple[Cause, ...]:
-        """The causes in the order in which they were accepted, each with `name`, `parameters` and gains."""
+        """The causes in the order in which they were accepted.
+
+        Each has `name`, `parameters`, gains, `status` (`confirmed`, `leading` or `one_of`) and `probability`.
+        """
         return self.result.causes
+
+    @property
+    def alternatives(self) -> tuple[Alternative, ...]:
+        """What may be right in a cause's place: `name`, `instead_of`, `parameters`, gains, `probability`."""
+        return self.result.alternatives
 
     def summary(self) -> str:
         """Return the verdict and what it rests on, as plain text."""
@@ -72,7 +80,7 @@ class Diagnosed:
 
     def __repr__(self) -> str:
         """Return the verdict and the causes in one line."""
-        causes = ", ".join(cause.name for cause in self.causes) or "none"
+        causes = ", ".join(f"{cause.name} ({cause.status})" for cause in self.causes) or "none"
         return f"Diagnosed({self.result.rig_name}: {self.verdict}, causes: {causes})"
 
     def _repr_html_(self) -> str:

@@ -99,6 +99,8 @@ def report_of(diagnosis: Diagnosis, report: Path) -> Report:
     for cause in diagnosis.causes:
         values |= {f"{cause.name}.{name}": f"{p.value:.6g} {p.unit}" for name, p in cause.parameters.items()}
         values[f"{cause.name}.gain"] = f"{cause.gain_holdout:.4f}"
+        values[f"{cause.name}.status"] = cause.status
+        values[f"{cause.name}.probability"] = f"{cause.probability:.2f}"
     values["faults"] = "; ".join(fault_lines(diagnosis.faults))
     level = OK if diagnosis.verdict == "nothing_wrong" and not diagnosis.faults else WARN
     return Report(level, diagnosis.sentence, {**values, "report": report})

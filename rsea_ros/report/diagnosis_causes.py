@@ -10,6 +10,7 @@ from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected
 from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
+from rsea_ros.report.diagnosis_standing import STATUS, standing
 from rsea_ros.report.diagnosis_tables import table
 from rsea_ros.report.page import bullets, equation, paragraph, section
 from rsea_ros.report.palette import AFTER, GRID, MEASURED, QUIET, faint
@@ -19,10 +20,12 @@ _WIDTH, _HEIGHT = 180.0, 18.0
 _GAIN = "Gain: share of the residual that is gone, on data that took no part in any fit or choice."
 
 
-def cause_section(cause: Cause) -> str:
-    """Return what a cause is, how large, and why it was accepted."""
+def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
+    """Return what a cause of a diagnosis is, how large, how sure, and why it was accepted."""
     share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
-    body = [_sizes(cause), equation(cause.equation) if cause.equation else "", paragraph(cause.evidence)]
+    how_sure = standing(cause, diagnosis.alternatives, diagnosis.at_noise_floor)
+    body = [_sizes(cause), paragraph(words.sentence(f"{say.prose(how_sure)}."))]
+    body += [equation(cause.equation) if cause.equation else "", paragraph(cause.evidence)]
     body += [paragraph(_gain(cause)), _rivals(cause)]
     return section(words.sentence(f"{say.effect(cause.name)}: {share}"), *body)
 
@@ -62,7 +65,7 @@ def tried_section(diagnosis: Diagnosis) -> str:
     """Return all that was tried: causes and fitted rivals with their gains, then the others by reason."""
     if not (diagnosis.causes or diagnosis.rejected):
         return ""
-    rows = [_row(c.name, c.gain_holdout, "accepted", strong=True) for c in diagnosis.causes]
+    rows = [_row(c.name, c.gain_holdout, STATUS[c.status], strong=True) for c in diagnosis.causes]
     rows += [_row(r.name, r.gain_holdout, say.rejection(r)) for r in fitted_rivals(diagnosis)]
     shown = table(("Cause", "#Gain", "", "Outcome"), rows) if rows else ""
     others = bullets(_by_reason([r for r in diagnosis.rejected if not r.is_fitted]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report.identification_json import fault_json, finite, numbers, parameter
@@ -36,6 +36,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "misfit": [_misfit(m) for m in d.misfit],
         "causes": [_cause(c) for c in d.causes],
+        "alternatives": [_alternative(a) for a in d.alternatives],
         "rejected": [_rejected(r) for r in d.rejected],
         "extended": {
             "residual_rms": numbers(d.extended_residual_rms),
@@ -69,10 +70,10 @@ def _misfit(m: Misfit) -> dict[str, Any]:
 def _cause(cause: Cause) -> dict[str, Any]:
     return {
         "name": cause.name,
+        "status": cause.status,
+        "probability": finite(cause.probability),
         "channel": cause.channel,
-        "parameters": {
-            name: _estimate(p) for name, p in cause.parameters.items()
-        },
+        "parameters": _sizes(cause.parameters),
         "gain": {
             "train": finite(cause.gain_train),
             "holdout": finite(cause.gain_holdout),
@@ -82,6 +83,21 @@ def _cause(cause: Cause) -> dict[str, Any]:
         "equation": cause.equation,
         "confusable_with": list(cause.confusable_with),
     }
+
+
+def _alternative(a: Alternative) -> dict[str, Any]:
+    return {
+        "name": a.name,
+        "instead_of": a.instead_of,
+        "probability": finite(a.probability),
+        "channel": a.channel,
+        "parameters": _sizes(a.parameters),
+        "gain": {"holdout": finite(a.gain_holdout), "holdout_ci95": _pair(a.gain_holdout_ci95)},
+    }
+
+
+def _sizes(parameters: Mapping[str, Estimate]) -> dict[str, Any]:
+    return {name: _estimate(p) for name, p in parameters.items()}
 
 
 def _estimate(p: Estimate) -> dict[str, Any]:
@@ -107,6 +123,7 @@ def _rejected(rejected: Rejected) -> dict[str, Any]:
         "reason": rejected.reason,
         "rival": rejected.rival or None,
         "fitted": rejected.is_fitted,
+        "probability": rejected.probability,
     }
 
 

@@ -46,7 +46,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     where = profiles(d, main)
     if where:
         yield where_figure(where, bool(d.causes), AFTER if d.at_noise_floor and not d.causes else BEFORE)
-    yield from (cause_section(c) for c in d.causes)
+    yield from (cause_section(c, d) for c in d.causes)
     yield _final(d)
     yield tried_section(d)
     yield channel_section(d)

@@ -11,6 +11,7 @@ from rsea_ros.report import diagnosis_numbers as num
 from rsea_ros.report import diagnosis_words as say
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis_causes import fitted_rivals
+from rsea_ros.report.diagnosis_standing import standing
 from rsea_ros.report.fault_words import fault_lines
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
@@ -32,6 +33,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
+        yield "status", standing(cause, d.alternatives, d.at_noise_floor)
     if d.misfit:
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
     for rival in fitted_rivals(d)[:_MOST]:

@@ -23,6 +23,8 @@ _REASONS: Mapping[Reason, str] = {
     "no_better_than_simpler": "no better than {rival}, which is simpler",
     "no_better_than_likelier": "no better than {rival}, which needs less of what is known beforehand",
     "redundant": "not needed beside the other causes",
+    "replaced": "another took its place beside the causes that came later",
+    "improbable": "helps, but its law does not fit what it takes away: probability {probability:.2f}",
     "leaves_too_much": "helps, but leaves so much that it may stand in for something else",
 }
 _RESPECTS = {
@@ -41,7 +43,8 @@ def effect(name: str) -> str:
 
 def rejection(rejected: Rejected) -> str:
     """Return why an effect is no cause, as a part of a sentence."""
-    return _REASONS[rejected.reason].format(rival=rejected.rival)
+    probability = rejected.probability or 0.0
+    return _REASONS[rejected.reason].format(rival=rejected.rival, probability=probability)
 
 
 def respect(what: str) -> str:
@@ -80,6 +83,9 @@ def headline(diagnosis: Diagnosis) -> str:
         size = f"{near if before < 2.0 else _times(before)} the noise"
         return f"The {channel} residual is {size}, and nothing in the catalogue explains it"
     is_, it, explains = ("is", "it", "explains") if len(d.causes) == 1 else ("are", "them", "explain")
+    if d.at_noise_floor and d.verdict == "partly_explained":
+        rest = f"{is_} probably what the simulation lacks; with {it}, only noise is left"
+        return words.sentence(f"{named(d.causes)} {rest}")
     rest = f"{explains} a part of what the simulation gets wrong; the rest stays unexplained"
     if d.verdict == "explained":
         rest = f"{is_} what the simulation lacks; with {it}, only noise is left"

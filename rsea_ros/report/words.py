@@ -81,11 +81,17 @@ def number(value: float, digits: int = 3) -> str:
 
 def quantity(value: float, of: str, digits: int = 3) -> str:
     """Return a value with its unit, small ones with a prefix: 6.1e-6 rad as `6.10 µrad`."""
+    factor, prefixed = scaled(value, of)
+    return f"{number(value * factor, digits)} {prefixed}".strip()
+
+
+def scaled(value: float, of: str) -> tuple[float, str]:
+    """Return by what a value is to be multiplied to be read, and its unit then: 6.1e-6 rad is 1e6, `µrad`."""
     simple = of and " " not in of.split("/")[0] and of != "1"
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
-        return f"{number(value, digits)} {unit(of)}".strip()
+        return 1.0, unit(of)
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
-    return f"{number(value / factor, digits)} {prefix}{unit(of)}"
+    return 1.0 / factor, f"{prefix}{unit(of)}"
 
 
 LOPSIDED = 1.5

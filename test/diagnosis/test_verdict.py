@@ -29,13 +29,13 @@ def scored(ratios):
 def test_nothing_is_wrong_exactly_when_every_residual_is_the_noise(ratios):
     score = scored(ratios)
     at_noise = all(score.ratio(n) <= FLOOR for n in ratios)
-    assert verdict_of([score], has_rivals=False) == ("nothing_wrong" if at_noise else "unexplained")
+    assert verdict_of([score]) == ("nothing_wrong" if at_noise else "unexplained")
 
 
 @given(RATIOS | NEAR)
 def test_the_sentence_speaks_of_a_channel_that_bears_the_verdict_out(ratios):
     score = scored(ratios)
-    verdict = verdict_of([score], has_rivals=False)
+    verdict = verdict_of([score])
     channel = main_channel(score, "ft") if verdict == "unexplained" else "ft"
     sentence = verdict_sentence(verdict, (), channel, score.ratio(channel), score.ratio(channel), ())
     number = float(re.search(r"([\d.]+) times the noise", sentence)[1])

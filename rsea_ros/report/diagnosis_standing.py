@@ -1,0 +1,54 @@
+"""How sure a diagnosis is of each cause, in sentences: status, size, interval, probability, rivals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
+from rsea_ros.report import words
+from rsea_ros.wording import listed
+
+STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
+_REASON = {
+    "confirmed": "with its siblings it is what the simulation lacks",
+    "leading": "it surely helps on held-out data, and more is missing",
+    "one_of": "these data do not tell which",
+}
+
+
+def standing(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: bool = False) -> str:
+    """Return `leading: command_delay 9.10 ms [8.40, 9.80], probability 0.87; …` of a cause.
+
+    alternatives: of the whole diagnosis. at_floor: the residual with all causes is noise.
+    """
+    rivals = against(cause, alternatives)
+    items: list[Cause | Alternative] = [cause, *rivals]
+    said = [f"{sized(item)}, probability {item.probability:.2f}" for item in items]
+    reason = _REASON[cause.status]
+    if at_floor and cause.status == "leading":
+        reason = "it takes the residual to the noise, but another law may do the same"
+    if cause.status == "one_of" and rivals:
+        return f"one of: {listed(said, 'or')}; {reason}"
+    text = f"{STATUS[cause.status]}: {said[0]}; {reason}"
+    return f"{text}; less likely instead: {listed(said[1:], 'or')}" if rivals else text
+
+
+def standings(diagnosis: Diagnosis) -> list[str]:
+    """Return the standing of every cause of a diagnosis."""
+    d = diagnosis
+    return [standing(c, d.alternatives, d.at_noise_floor) for c in d.causes]
+
+
+def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternative]:
+    """Return what stands against a cause, the likeliest first."""
+    return sorted((a for a in alternatives if a.instead_of == cause.name), key=lambda a: -a.probability)
+
+
+def sized(item: Cause | Alternative) -> str:
+    """Return name and main parameter with its 95 % interval: `command_delay 9.10 ms [8.40, 9.80]`."""
+    if not item.parameters:
+        return item.name
+    parameter = next(iter(item.parameters.values()))
+    factor, unit = words.scaled(parameter.value, parameter.unit)
+    value, low, high = (words.number(v * factor) for v in (parameter.value, *parameter.ci95))
+    return f"{item.name} {value}{f' {unit}' if unit else ''} [{low}, {high}]"

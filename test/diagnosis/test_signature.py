@@ -1,0 +1,68 @@
+"""The signature of a cause: 0 for a law of the right shape, and where a law of another shape is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.signature import Rows, projected, signature
+
+BLOCKS, LENGTH = 48, 100
+RNG = np.random.default_rng(5)
+TIME = np.arange(BLOCKS * LENGTH) / LENGTH
+CONTRIBUTION = 5.0 * np.sin(2.0 * np.pi * 0.21 * TIME**1.4)
+"""A sweep of amplitude 5 times the noise."""
+
+
+def rows(residual):
+    """Return rows of one channel whose nominal model has one derivative, a ramp."""
+    return Rows(
+        contribution=CONTRIBUTION,
+        residual=residual + RNG.normal(size=len(TIME)),
+        others=TIME[:, None] - TIME.mean(),
+        prior=np.array([1e-3]),
+        block=np.repeat(np.arange(BLOCKS), LENGTH),
+        tests=np.repeat(np.arange(BLOCKS) % 4 == 3, LENGTH),
+        runs=(slice(0, len(TIME)),),
+    )
+
+
+def test_a_law_of_the_right_shape_and_size_spreads_no_more_than_by_chance():
+    s = signature(rows(np.zeros(len(TIME))))
+    assert s.scale == pytest.approx(1.0, abs=0.03)
+    assert s.overall < 1.5 * s.chance
+    assert max(s.amplitude, s.time, s.frequency) < 0.04
+
+
+def test_a_size_that_is_wrong_everywhere_alike_moves_the_scale_and_not_the_spread():
+    s = signature(rows(0.3 * CONTRIBUTION))
+    assert s.scale == pytest.approx(1.3, abs=0.03)
+    assert s.overall < 1.5 * s.chance
+
+
+@pytest.mark.parametrize(
+    ("law", "respect"),
+    [
+        (CONTRIBUTION * (TIME - TIME.mean()) / TIME.mean(), "time"),
+        (CONTRIBUTION * (np.abs(CONTRIBUTION) - 3.5) / 2.5, "amplitude"),
+        (np.gradient(CONTRIBUTION, TIME) / 10.0, "frequency"),
+    ],
+)
+def test_a_law_of_another_shape_shows_where_it_is_wrong(law, respect):
+    s, right = signature(rows(0.5 * law)), signature(rows(0.0 * law))
+    assert getattr(s, respect) > 3.0 * getattr(right, respect) + 0.05
+
+
+def test_what_the_other_unknowns_can_imitate_does_not_count():
+    imitated = replace(rows(np.zeros(len(TIME))), contribution=7.0 * (TIME - TIME.mean()))
+    assert np.abs(projected(imitated, imitated.contribution)).max() < 1e-6
+    assert signature(imitated).kept < 1e-10
+
+
+def test_a_residual_that_has_nothing_to_do_with_the_cause_is_chance():
+    other = 20.0 * np.convolve(RNG.normal(size=len(TIME)), np.ones(30) / 30.0, mode="same")
+    s = signature(rows(other))
+    assert s.chance > 0.02
+    assert s.overall < 2.0 * s.chance
