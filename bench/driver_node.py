@@ -62,10 +62,10 @@ def main() -> int:
         times.extend((stamp, time.monotonic_ns(), 0, 0))
         step(self, stamp)
 
-    def noted_publish(self: Bench, state: State) -> None:
-        publish(self, state)
+    def noted_publish(self: Bench, state: State, shift: int = 0) -> None:
+        publish(self, state, shift)
         now = time.monotonic_ns()
-        times[-2], times[-1] = state.stamp - time.time_ns() + now, now
+        times[-2], times[-1] = state.stamp + shift - time.time_ns() + now, now
 
     driver.Driver._step, Bench.publish = noted_step, noted_publish
     atexit.register(lambda: np.save(os.environ[MARK], np.array(times).reshape(-1, 4)))

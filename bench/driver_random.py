@@ -132,7 +132,7 @@ def random_faults(args: argparse.Namespace, folder: Path) -> list[tuple[str, str
         with suppress(DeviceError):
             watched.loop.device.close()
     what = f"{args.minutes:g} min of random faults, seed {args.seed}: violations"
-    first = f": {watched.violations[0]}" if watched.violations else ""
+    first = f": {' | '.join(watched.violations[:5])}" if watched.violations else ""
     told = f"{len(watched.violations)}{first}; {watched.faults} faults, torque in {watched.seen} cycles"
     told += f"; the bench itself stood still under torque {len(watched.excused)} times"
     return [(what, "0", told)]

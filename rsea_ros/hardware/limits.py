@@ -104,7 +104,7 @@ class Guard:
         self.limited = 0
         self.torque = 0.0
         self.halted = False
-        self._ramp = self._room = 0.0
+        self._ramp = self._ramp_from = self._room = 0.0
         self._written: deque[float] = deque(maxlen=HEARD_LATE)
         self._missed = 0
 
@@ -112,7 +112,8 @@ class Guard:
         """Latch a fault, unless there is one."""
         if self.fault is None:
             self.fault = fault
-            self._ramp = abs(self.torque) * self._period / max(self.limits.ramp, self._period)
+            self._ramp_from = abs(self.torque)
+            self._ramp = self._ramp_from * self._period / max(self.limits.ramp, self._period)
 
     def clear(self) -> None:
         """Forget the fault. The torque begins at zero, and softly."""
@@ -136,11 +137,20 @@ class Guard:
             self._open(age)
             self.torque = self._within(0.0 if age is None else wanted)
         elif self.fault.cause == COMMAND_TIMEOUT:
-            self.torque = math.copysign(max(0.0, abs(self.torque) - self._ramp), self.torque)
+            self.torque = math.copysign(self._ramped(age), self.torque)
         else:
             self.torque = 0.0
         self._written.append(self.torque)
         return self.torque
+
+    def _ramped(self, age: float | None) -> float:
+        """Return how large the torque may be in the ramp: less by each cycle and by the time that passed.
+
+        Cycles are late on a busy machine, and the torque of a dead publisher must not last as long as they.
+        """
+        over = 0.0 if age is None else age - self.limits.command_timeout
+        left = 1.0 - max(0.0, over) / max(self.limits.ramp, self._period)
+        return max(0.0, min(abs(self.torque) - self._ramp, self._ramp_from * left))
 
     def _open(self, age: float | None) -> None:
         """Let the largest torque grow while commands come; it begins anew when they have ceased."""

@@ -177,3 +177,21 @@ def test_limits_hold_for_every_rig(limits, reading, told):
     seen = guard(**limits)
     seen.look(State(0, **({"position": 0.0, "velocity": 0.0, "motor_torque": 0.0} | reading)))
     assert str(seen.fault) == told
+
+
+def test_the_ramp_after_the_last_command_takes_its_time_not_cycles():
+    """Seed 2 of bench/driver.py random: cycles of 60 ms on a busy machine made 340 ms of a ramp of 20 ms."""
+    guard = Guard(Limits(68.0, command_timeout=0.05, ramp=0.02), 1.0 / 280.0)
+    for _ in range(3):
+        guard.allowed(10.0, 0.0)
+    assert guard.allowed(10.0, 0.06) == pytest.approx(5.0)
+    assert guard.fault.cause == "command_timeout"
+    assert guard.allowed(10.0, 0.12) == 0.0
+
+
+def test_the_ramp_goes_on_when_commands_come_again():
+    guard = Guard(Limits(68.0, command_timeout=0.05, ramp=0.02), 1.0 / 280.0)
+    for _ in range(3):
+        guard.allowed(10.0, 0.0)
+    torques = [guard.allowed(10.0, 0.06), *(guard.allowed(10.0, 0.0) for _ in range(6))]
+    assert torques[-1] == 0.0 and torques == sorted(torques, reverse=True)
