@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main, verbs
-from rsea_ros.diagnosis.initial_guess import ResidualView, initial_guesses
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
 from rsea_ros.identification.identify import identify
@@ -148,7 +148,7 @@ def test_a_simulation_that_runs_away_is_refused():
 
 def test_a_limit_is_guessed_without_a_motor_torque():
     case = case_from(record(), load_rig("paper_high_impedance"))
-    seen = ResidualView(case, load_rig("paper_high_impedance"), dict(case.measured))
+    seen = RecordView(case, load_rig("paper_high_impedance"), dict(case.measured))
     limits = [start["limit"] for start in initial_guesses(effect_named("torque_saturation"), seen)]
     assert len(limits) == 4 and min(limits) > 0.0
 

@@ -45,6 +45,7 @@ def diagnose(
     """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
 
     rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
+    Effects that it only guesses do not: they are looked for as all others.
     holdout: a record on which the models are tested; without it, the test blocks of the records.
     settings: what is tried and by which numbers, DiagnosisSettings() by default.
     Raises IdentificationError when the records are too short or do not hold what the rig needs.
@@ -52,6 +53,7 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
     tell("checking the data", 0.0)
+    rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
     records = [bounded(commanded(r, rig)) for r in records]
     holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
@@ -89,7 +91,7 @@ def search(
     record: the first one, from which a joint in its loop gets its start.
     """
     rig = nominal.rig
-    effects = [e for name, e in catalogue().items() if name not in settings.without]
+    effects = [e for name, e in catalogue().items() if e.is_searched and name not in settings.without]
     start = joint_start(record, rig) if rig.loop is not None else None
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)

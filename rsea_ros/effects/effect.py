@@ -94,6 +94,7 @@ class Effect:
     function: compiled `f(s, p, x)` with the signal table s, the parameters p in order, its own states x.
     structure: instead of a function, a change to the rig: `f(rig, parameters) -> rig`.
     main: the parameter that says how large the effect is.
+    is_searched: a diagnosis tries it unasked; one that is not acts only where a rig states it.
     reads: the signals among FIRST_READ … LAST_READ that the function looks at.
     guesses: where fits begin by what a residual shows; without it, at `default_guesses`.
     """
@@ -107,6 +108,7 @@ class Effect:
     states: int = 0
     reads: tuple[int, ...] = ()
     order: int = 0
+    is_searched: bool = True
     about: str = ""
     equation: str = ""
     guesses: Guesses | None = None

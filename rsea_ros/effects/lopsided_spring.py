@@ -3,8 +3,10 @@
     T_s = K_s d (1 + quadratic d)
 
 On its softer side it keeps its largest torque beyond d = -1 / (2 quadratic), where the parabola would turn
-back. Source: Wigren, Schoukens, Three free data sets for development and benchmarking in nonlinear system
-identification, ECC 2013 (the silverbox's spring is asymmetric).
+back. A diagnosis does not try it unasked: springs are made symmetric, and beside friction that differs
+with direction and play it takes the place of both. Source: Wigren, Schoukens, Three free data sets for
+development and benchmarking in nonlinear system identification, ECC 2013 (the silverbox's spring is
+asymmetric).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -28,6 +30,7 @@ EFFECT = Effect(
     parameters=(Parameter("quadratic", "1/rad", null=0.0, low=-50.0, high=50.0, typical=3.0),),
     claims=Claims("position", "even", amplitude_exponent=2.0),
     function=apply,
+    is_searched=False,
     reads=(DEFLECTION,),
     about="spring that is stiffer one way than the other",
     equation="T_s = K_s · d · (1 + quadratic · d)",

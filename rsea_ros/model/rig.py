@@ -115,10 +115,14 @@ class Sensor:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """An effect of the catalogue that acts on this rig, with its parameters in SI."""
+    """An effect of the catalogue that acts on this rig, with its parameters in SI.
+
+    guess: it is where a fit may begin, not what is known of the bench: a diagnosis has to find it by itself.
+    """
 
     name: str
     parameters: Mapping[str, float]
+    guess: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))

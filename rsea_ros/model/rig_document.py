@@ -128,7 +128,12 @@ def rig_to_document(rig: Rig) -> dict[str, Any]:
             "limit": rig.controller.limit,
         }
     document["effects"] = [
-        {"name": e.name, "parameters": {k: float(v) for k, v in e.parameters.items()}} for e in rig.effects
+        {
+            "name": e.name,
+            "parameters": {k: float(v) for k, v in e.parameters.items()},
+            **({"guess": True} if e.guess else {}),
+        }
+        for e in rig.effects
     ]
     return document
 
@@ -299,6 +304,7 @@ def _effects(items: Any) -> tuple[EffectSetting, ...]:
         only_keys(body, names(EFFECT), f"effects[{i}]")
         parameters = mapping(body.get("parameters", {}), f"effects[{i}].parameters")
         values = {k: number(v, f"effects[{i}].{k}", "SI") for k, v in parameters.items()}
-        settings.append(EffectSetting(text(body.get("name", ""), f"effects[{i}].name"), values))
+        name = text(body.get("name", ""), f"effects[{i}].name")
+        settings.append(EffectSetting(name, values, switch(body, f"effects[{i}].guess")))
     check_effects(settings)
     return tuple(settings)

@@ -109,6 +109,7 @@ CONTROLLER = (
 EFFECT = (
     Key("name", "name of an effect, each once", NEEDED),
     Key("parameters", "mapping of numbers in SI, within their bounds", NEEDED),
+    Key("guess", "true or false", "false", "identify begins with it, diagnose has to find it by itself"),
     Key("ci95", "mapping", "none", "95 % intervals that a diagnosis has written"),
 )
 

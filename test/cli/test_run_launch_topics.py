@@ -85,7 +85,7 @@ def heard(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
 
 def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it(tmp_path):
     page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    code = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0]
     (tmp_path / "my_controller.py").write_text(code)
     graph = subprocess.Popen(
         rsea("launch", "simulation", "model:=false", "identify:=false"), cwd=ROOT

@@ -11,7 +11,7 @@ from independent.severities import drawn_parameters
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 
-DURATION = 24.0
+DURATION = 16.0
 
 
 @pytest.mark.parametrize(
