@@ -156,8 +156,9 @@ def test_pendulum_is_not_given_a_friction_that_gains_nothing():
 
 
 MECHANICAL = {
-    "asymmetric_friction", "backlash", "coulomb_friction", "dead_zone", "hard_stop", "load_dependent_friction",
-    "nonlinear_spring", "quadratic_drag", "spring_hysteresis", "stribeck_friction", "torque_saturation",
+    "asymmetric_friction", "backlash", "coulomb_friction", "dead_zone", "hard_stop",
+    "load_dependent_friction", "nonlinear_spring", "quadratic_drag", "spring_hysteresis",
+    "stribeck_friction", "torque_saturation",
 }  # fmt: skip
 
 
