@@ -12,7 +12,7 @@ from rsea_ros.cli.main import main
 
 PARSERS = ("None", "codec", "miMATRIX", "Mat file", "int()", "end-of-stream", "gzipped", "indices")
 MAP = "time: {rate: 100}\nchannels: {command: {column: u, unit: N m}}\n"
-PACKED = gzip.compress(b"u\n1\n2\n")
+PACKED = gzip.compress(b"u\n1\n2\n", mtime=0)
 
 
 @pytest.mark.parametrize(
