@@ -49,7 +49,7 @@ class Candidate:
 
     @property
     def size(self) -> int:
-        """How many numbers describe the effects, optional ones not counted."""
+        """How many numbers describe the effects; some optional ones do not count."""
         return sum(effect_size(name) for name in self.causes)
 
     @property
@@ -141,8 +141,8 @@ def leaves_only_noise(model: Candidate, limit: float = DEFAULT.floor.only_noise)
 
 
 def effect_size(name: str) -> int:
-    """Return how many numbers describe an effect, optional ones not counted."""
-    return sum(not p.optional for p in effect_named(name).parameters)
+    """Return how many numbers describe an effect; some optional ones do not count."""
+    return sum(p.is_counted for p in effect_named(name).parameters)
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:

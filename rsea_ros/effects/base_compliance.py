@@ -82,7 +82,7 @@ EFFECT = Effect(
         Parameter(
             "damping_ratio", "1", null=0.02, low=1e-3, high=1.0, typical=0.02, logarithmic=True, optional=True
         ),
-        Parameter("above_sensor", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True),
+        Parameter("above_sensor", "1", null=0.0, low=0.0, high=1.0, typical=0.0, optional=True, shapes=True),
     ),
     claims=Claims(
         "position", "odd", amplitude_exponent=1.0, passive=True, confusable_with=("structural_resonance",)

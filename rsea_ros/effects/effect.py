@@ -43,8 +43,9 @@ class Parameter:
 
     null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
     may well have. starts: where fits begin besides `typical`, for problems with several minima.
-    optional: may be left out; then it is `null`. per_record: another in every record, such as the phase that
-    the mains had when it began.
+    optional: may be left out; then it is `null`.
+    shapes: counts in the size of the law although it may be left out: it makes another law of it.
+    per_record: another in every record, such as the phase that the mains had when it began.
     """
 
     name: str
@@ -56,7 +57,13 @@ class Parameter:
     starts: tuple[float, ...] = ()
     logarithmic: bool = False
     optional: bool = False
+    shapes: bool = False
     per_record: bool = False
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether a law with this parameter is larger than one without."""
+        return self.shapes or not self.optional
 
     @property
     def possible(self) -> tuple[float, float]:
