@@ -10,7 +10,7 @@ from rsea_ros.wording import listed
 
 STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
 _REASON = {
-    "confirmed": "with its siblings it is what the simulation lacks",
+    "confirmed": "it is surely part of what the simulation lacks",
     "leading": "it surely helps on held-out data, and more is missing",
     "one_of": "these data do not tell which",
 }
