@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import re
-import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping
 from itertools import count
 from pathlib import Path
 from types import TracebackType
 
+from rsea_ros.cli._node_process import POLL, start, stop
 from rsea_ros.errors import RseaError
 from rsea_ros.interrupts import undisturbed
 
 ROOT = Path(__file__).resolve().parents[2]
-POLL = 0.1
-PATIENCE = 10.0
-"""Seconds that a node gets to close."""
-_PRCTL, _PARENT_DEATH_SIGNAL = ctypes.CDLL(None).prctl, 1
 
 
 class Processes:
@@ -60,11 +54,9 @@ class Processes:
         names = (self._logs / (f"{node}-{k}.log" if k > 1 else f"{node}.log") for k in count(1))
         self._log_of[node] = next(name for name in names if not name.exists())
         with undisturbed(), self.log(node).open("xb") as log:
-            self._running[node] = subprocess.Popen(
-                [sys.executable, "-m", f"rsea_ros.nodes.{node}", "--ros-args", *options],
-                env=self._environment, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
-                start_new_session=True, preexec_fn=_follow,
-            )  # fmt: skip
+            self._running[node] = start(
+                node, ["--ros-args", *options], env=self._environment, stdout=log, stderr=subprocess.STDOUT
+            )
 
     def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
         """Wait until a node has ended, telling the share that it last logged as a percentage.
@@ -87,16 +79,7 @@ class Processes:
 
     def stop(self, *nodes: str) -> None:
         """Ask nodes to end (SIGTERM) and wait for it; kill what does not."""
-        processes = [self._running.pop(node) for node in nodes]
-        for process in processes:
-            if process.poll() is None:
-                process.terminate()
-        for process in processes:
-            try:
-                process.wait(PATIENCE)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+        stop([self._running.pop(node) for node in nodes])
 
     def _share(self, node: str) -> float:
         found = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
@@ -107,11 +90,6 @@ class Processes:
         lines = self.log(node).read_text(errors="replace").splitlines()
         last = re.sub(r"^\[\w+\] \[[\d.]+\] \[[^]]*\]: ", "", lines[-1]) if lines else "no output"
         return RseaError(f"{node} {what}: {last} (log: {self.log(node)})")
-
-
-def _follow() -> None:
-    """Have the kernel end this process when the one that started it is killed."""
-    _PRCTL(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
 
 
 def _text(value: object) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
+from rsea_ros.cli._columns import columns
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
@@ -164,8 +165,7 @@ def table(start: Rig, true: Rig, found: Rig) -> str:
                 found.unit(name),
             )
         )
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows)
+    return columns(rows)
 
 
 def losses(bag: Path, identify_log: Path) -> str:
