@@ -23,10 +23,11 @@ def tree(top: str) -> list[tuple[str, list[str]]]:
     return [(str(SHARE / path.parent), [str(path)]) for path in files]
 
 
-def requirements() -> list[str]:
-    """Return what runs, the first part of requirements.in; what tests and checks stands after it."""
-    running = Path("requirements.in").read_text(encoding="utf-8").partition("# What tests")[0]
-    return [line for line in running.splitlines() if line and not line.startswith("#")]
+def requirements(part: str) -> list[str]:
+    """Return what a part of requirements.in asks for; its parts begin with a comment and end with an empty line."""
+    parts = Path("requirements.in").read_text(encoding="utf-8").split("\n\n")
+    (lines,) = (text.splitlines() for text in parts if text.startswith(f"# {part}"))
+    return [line for line in lines if not line.startswith("#")]
 
 
 setup(
@@ -38,7 +39,8 @@ setup(
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["rsea_ros*", "msg_adapters*"]),
     python_requires=">=3.10",
-    install_requires=requirements(),
+    install_requires=requirements("What runs"),
+    extras_require={"fleet": requirements("fleet")},
     zip_safe=False,
     package_data={
         "": ["py.typed"],
