@@ -60,7 +60,7 @@ def make(root: Path, ros: str, key: str, lock: int) -> None:
     """Make the environment from nothing and stamp it."""
     venv = root / ".venv"
     (venv / "complete").unlink(missing_ok=True)
-    say(f"making .venv with Python {platform.python_version()}, this once: about a minute, about 1 GB")
+    say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about 1.6 GB")
     site = ["--system-site-packages"] if ros == "sourced" else []
     run([sys.executable, "-m", "venv", "--clear", *site, str(venv)], root / ".venv.log", lock)
     locks = [root / "requirements.lock"]
