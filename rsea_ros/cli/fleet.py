@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql
+from rsea_ros.fleet.extra import need_extra
 
 HELP = "many bags of many joints become one store (run), a report on trends (report), answers (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
@@ -36,4 +37,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do what is asked for."""
+    need_extra()
     return ACTIONS[args.action].run(args)

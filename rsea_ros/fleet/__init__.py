@@ -17,5 +17,8 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         import importlib
 
+        from rsea_ros.fleet.extra import need_extra
+
+        need_extra()
         return getattr(importlib.import_module("rsea_ros.fleet.columns"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,20 +1,24 @@
 """Dask's workers: a cluster on this machine, or one that runs already.
 
 A worker is a process with one thread. Spilling is off: a task that takes more memory than its worker may have
-ends that worker, and the engine counts how often.
+ends that worker, and the engine counts how often. Only `rsea fleet run` imports this module.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import dask
+import distributed
+from distributed.scheduler import KilledWorker
+
 from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
-from rsea_ros.fleet.extra import extra
 
 SETTINGS: Mapping[str, Any] = {
     "distributed.worker.memory.target": False,
@@ -38,7 +42,6 @@ class OnDask:
         self._client = client
         self._done: queue.Queue[Any] = queue.Queue()
         self._jobs: dict[str, tuple[Job, Any]] = {}
-        self._killed = extra("distributed").scheduler.KilledWorker
 
     @property
     def places(self) -> int:
@@ -63,7 +66,7 @@ class OnDask:
             raise self._lost()
         try:
             return Done(job, future.result())
-        except self._killed as error:
+        except KilledWorker as error:
             return Done(job, error=WorkerLost(str(error)))
         except Exception as error:
             self._check()
@@ -82,7 +85,6 @@ class OnDask:
 @contextmanager
 def on_scheduler(address: str) -> Iterator[OnDask]:
     """Give an executor on a cluster that runs already. Raises FleetError where nobody answers."""
-    distributed = extra("distributed")
     try:
         client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
@@ -98,9 +100,6 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
 
     memory: bytes that each worker may have. dashboard: host and port, port 0 for any.
     """
-    import logging
-
-    dask, distributed = extra("dask"), extra("distributed")
     with dask.config.set(SETTINGS):
         cluster = distributed.LocalCluster(
             n_workers=workers,
@@ -122,4 +121,4 @@ def cores() -> int:
 
 def memory_for(workers: int) -> int:
     """Return the bytes that each of some workers may have: what Dask takes for this machine's, shared."""
-    return int(0.9 * extra("distributed.system").MEMORY_LIMIT / workers)
+    return int(0.9 * distributed.system.MEMORY_LIMIT / workers)

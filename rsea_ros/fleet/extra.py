@@ -1,19 +1,17 @@
-"""Packages of the extra `fleet`, imported when they are needed."""
+"""Packages of the extra `fleet`: all there before anything begins."""
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
+from importlib.util import find_spec
 
 from rsea_ros.fleet.errors import FleetError
 
+PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
 
-def extra(name: str) -> Any:
-    """Return a module of the extra `fleet`. Raises FleetError in one line where it is not installed."""
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        package = (error.name or name).split(".")[0]
-        raise FleetError(
-            f"{package} is not installed, expected it for rsea fleet: pip install 'rsea_ros[fleet]'"
-        ) from None
+
+def need_extra() -> None:
+    """Refuse to begin where a package of the extra `fleet` is not installed. Raises FleetError."""
+    missing = [name for name in PACKAGES if find_spec(name) is None]
+    if missing:
+        install = "pip install 'rsea_ros[fleet]'"
+        raise FleetError(f"{', '.join(missing)}: not installed, expected for rsea fleet: {install}")

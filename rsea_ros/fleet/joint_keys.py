@@ -19,7 +19,7 @@ JOINT = (
     Key("joint", "name", "the only one", "in the messages, where they hold several joints"),
     Key("axis", "`torque.z`, `-force.x`, …", "`torque.z`", "of the wrench that the actuator turns about"),
     Key("temperature", "topic", "none", "a sensor_msgs/Temperature whose mean stands in the row"),
-    Key("date", "text such as `%Y-%m-%d`", "none", "where stamps have no date: the date in the path (strptime, UTC)"),
+    Key("date", "such as `%Y-%m-%d`", "none", "the date in the path, of stamps without (strptime, UTC)"),
     Key("import", "name or file", "bags", "an import map: its recordings are tables, see import.md"),
     Key("index", "0 or more", "none", "which joint, of tables whose cells hold several"),
     Key("diagnose", "`misfit`, `always`, `never`", "`misfit`", "which bags are diagnosed too"),

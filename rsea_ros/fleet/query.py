@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import duckdb
+
 from rsea_ros.fleet.errors import FleetError
-from rsea_ros.fleet.extra import extra
 from rsea_ros.fleet.store import Store
 
 _ANALYSES = """
@@ -47,7 +48,6 @@ def connected(store: Store) -> Iterator[Any]:
 
     Raises FleetError for a store without rows.
     """
-    duckdb = extra("duckdb")
     rows = str(store.rows.resolve())
     pattern = f"{_quoted(rows)}/joint=*/month=*/*.parquet"
     with duckdb.connect(":memory:") as database:
@@ -67,11 +67,10 @@ def connected(store: Store) -> Iterator[Any]:
 
 
 def answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
-    """Return column names and rows of a query. Raises FleetError for one that is wrong or does not just read."""
-    duckdb = extra("duckdb")
+    """Return column names and rows of a query. Raises FleetError for one that fails or does not just read."""
     with connected(store) as database:
         try:
-            _check_reads(duckdb, duckdb.extract_statements(query))
+            _check_reads(duckdb.extract_statements(query))
             table = database.sql(query).to_arrow_table()
         except duckdb.Error as error:
             text = " ".join(str(error).split())
@@ -80,7 +79,7 @@ def answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
     return table.column_names, list(zip(*columns, strict=True))
 
 
-def _check_reads(duckdb: Any, statements: Sequence[Any]) -> None:
+def _check_reads(statements: Sequence[Any]) -> None:
     """Refuse more than one statement, and one that does more than read."""
     reading = (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN)
     if len(statements) != 1 or statements[0].type not in reading:

@@ -10,8 +10,9 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from fsspec.core import url_to_fs
+
 from rsea_ros.fleet.errors import FleetError
-from rsea_ros.fleet.extra import extra
 from rsea_ros.fleet.joints import Joint
 
 METADATA = "metadata.yaml"
@@ -105,7 +106,7 @@ def _each(sources: Iterable[str]) -> Iterator[str]:
 def _file_system(url: str) -> tuple[Any, str]:
     """Return the file system of a path or URL and the path in it."""
     try:
-        files, inner = extra("fsspec.core").url_to_fs(url)
+        files, inner = url_to_fs(url)
     except (ValueError, ImportError) as error:
         raise FleetError(f"{url}: {error}") from None
     return files, inner
