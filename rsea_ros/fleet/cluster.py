@@ -7,8 +7,10 @@ ends that worker, and the engine counts how often. Only `rsea fleet run` imports
 from __future__ import annotations
 
 import logging
+import math
 import os
 import queue
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -33,6 +35,8 @@ SETTINGS: Mapping[str, Any] = {
 PER_WORKER = 3
 """Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""
 CONNECT = "30s"
+COUNTED_EVERY = 10.0
+"""s, after which the workers are counted anew: those of another cluster come and go."""
 
 
 class OnDask:
@@ -42,11 +46,15 @@ class OnDask:
         self._client = client
         self._done: queue.Queue[Any] = queue.Queue()
         self._jobs: dict[str, tuple[Job, Any]] = {}
+        self._places, self._counted = 0, -math.inf
 
     @property
     def places(self) -> int:
         """How many jobs may be in flight at once."""
-        return PER_WORKER * max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
+        if time.monotonic() - self._counted > COUNTED_EVERY:
+            self._counted = time.monotonic()
+            self._places = PER_WORKER * max(1, self._client.scheduler_info(n_workers=0)["n_workers"])
+        return self._places
 
     def submit(self, job: Job) -> None:
         """Send a job to the scheduler."""

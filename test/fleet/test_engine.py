@@ -20,7 +20,7 @@ from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
 from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import locked, open_store
+from rsea_ros.fleet.store import Outcome, locked, open_store
 from rsea_ros.fleet.task import Changed, Task
 
 
@@ -173,9 +173,8 @@ def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folde
     """The compacted file replaced one of that name: finishing that must not take the new one."""
 
     def work(task: Task):
-        if task.bag.url.endswith("run2.mcap"):
-            raise TypeError("poison")
-        return stub_work(task)
+        poison = {"outcome": "quarantined"} if task.bag.url.endswith("run2.mcap") else {}
+        return Outcome(stub_work(task).row | poison)
 
     played(store, folder, work=work)
     store.take_out({"quarantined"})
@@ -189,7 +188,7 @@ def test_two_runs_take_turns(store):
     """Another process holds the lock: a run that does not wait says who, one that waits begins after it."""
     code = f"""
 import time
-from rsea_ros.fleet.store import locked, open_store
+from rsea_ros.fleet.store import Outcome, locked, open_store
 with locked(open_store({str(store.path)!r}), None):
     print("held", flush=True)
     time.sleep(30)
