@@ -24,7 +24,7 @@ def tree(top: str) -> list[tuple[str, list[str]]]:
 
 
 def requirements(part: str) -> list[str]:
-    """Return what a part of requirements.in asks for; its parts begin with a comment and end with an empty line."""
+    """Return what a part of requirements.in asks for: a comment, a package a line, an empty line."""
     parts = Path("requirements.in").read_text(encoding="utf-8").split("\n\n")
     (lines,) = (text.splitlines() for text in parts if text.startswith(f"# {part}"))
     return [line for line in lines if not line.startswith("#")]
