@@ -55,6 +55,17 @@ WEAR: tuple[Mapping[str, float], ...] = (
     {"ft_gain": 0.95},
     {"ft_gain": 0.9},
 )
+SLIGHT: tuple[Mapping[str, float], ...] = (
+    {},
+    {},
+    {"gap": 0.03e-3},
+    {"gap": 0.1e-3},
+    {"delay": 0.2e-3},
+    {"delay": 0.5e-3},
+    {"ft_gain": 0.98},
+    {"ft_gain": 0.99},
+)
+"""Where naming begins, and more joints without wear: what they are said to have is said in error."""
 SPOILT = ("dropped_samples", "outliers", "frozen_samples")
 """Faults of recording that a joint of the fleet can have."""
 TRUE = {
@@ -80,7 +91,8 @@ class Plan:
 def plans() -> Iterator[Plan]:
     """Yield the plans in an order in which every part of them is a fair sample."""
     states = [(wear, "") for wear in WEAR] + [({}, fault) for fault in SPOILT]
-    every = [(kind, *state) for kind in WORK for state in states]
+    slight = [(wear, "") for wear in SLIGHT]
+    every = [(kind, *state) for part in (states, slight) for kind in WORK for state in part]
     for k in np.random.default_rng(16).permutation(len(every)):
         kind, wear, fault = every[k]
         rng = np.random.default_rng([16, int(k)])

@@ -123,8 +123,19 @@ def _limit(size: FloatArray, gain: FloatArray) -> float:
     return float(np.median(size[usable] / of_noise) * least)
 
 
-def size_series(naming: Naming, recordings: Table) -> Series | None:
-    """Return the sizes of a cause in the recordings that name it, less its null; None without a size."""
+def temperatures(history: Table, recordings: Table) -> FloatArray:
+    """Return the temperature of each recording of a joint, °C, as the history has it; NaN where unknown."""
+    keys = zip(history["joint"], history["recording"], strict=True)
+    known = dict(zip(keys, np.asarray(history["temperature"], float), strict=True))
+    asked = zip(recordings["joint"], recordings["recording"], strict=True)
+    return np.array([known.get(key, np.nan) for key in asked], dtype=float)
+
+
+def size_series(naming: Naming, recordings: Table, temperature: FloatArray) -> Series | None:
+    """Return the sizes of a cause in the recordings that name it, less its null; None without a size.
+
+    temperature: of all recordings, °C, in the order of the table.
+    """
     if naming.size is None or naming.sd is None:
         return None
     rows = naming.row[naming.named]
@@ -137,7 +148,7 @@ def size_series(naming: Naming, recordings: Table) -> Series | None:
         naming.size[naming.named],
         np.maximum(naming.sd, 1e-9)[naming.named],
         told[naming.named],
-        np.full(len(rows), np.nan),
+        temperature[rows],
         np.asarray(recordings["recording"])[rows],
         np.asarray(recordings["artefacts"])[rows],
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.trends.appearing import appearances
-from rsea_ros.trends.causes import Naming, namings, size_series
+from rsea_ros.trends.causes import namings, size_series, temperatures
 from rsea_ros.trends.day_effect import DayEffect, day_effect
 from rsea_ros.trends.days import Days, day_means
 from rsea_ros.trends.outliers import outliers
@@ -30,9 +30,9 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.
     """
     check_columns(recordings, RECORDINGS, "recordings")
-    found = list(namings(recordings))
-    sized = [s for n in found if n.kind == "cause" and (s := size_series(n, recordings)) is not None]
-    own = list(all_series(history))
+    found, own = list(namings(recordings)), list(all_series(history))
+    warm = temperatures(history, recordings)
+    sized = [s for n in found if n.kind == "cause" and (s := size_series(n, recordings, warm)) is not None]
     trends, priors = _trends([*own, *sized], settings)
     mine = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in own}
     others = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
@@ -95,6 +95,3 @@ def _by_parameter(ready: Iterable[_Prepared]) -> Mapping[str, list[_Prepared]]:
 
 def _of(ready: Iterable[_Prepared], parameter: str) -> list[_Prepared]:
     return [r for r in ready if r.series.parameter == parameter]
-
-
-__all__ = ["FleetTrends", "Naming", "fleet_trends"]
