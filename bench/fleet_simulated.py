@@ -128,7 +128,9 @@ def _joint(
         true = _true(other if replaced else new, wear, share[k], temperature[k])
         true = {n: _shaken(n, v, of_day[n][day[k]]) for n, v in true.items()}
         fault = wear.fault if wear and wear.fault and share[k] > 0.0 and rng.random() < 0.7 else ""
-        state = {} if wear is None or wear.kind in ("replaced", "fault") else {wear.kind: _size(wear, share[k])}
+        state = (
+            {} if wear is None or wear.kind in ("replaced", "fault") else {wear.kind: _size(wear, share[k])}
+        )
         entry = _like(sample, kind, state, fault, rng)
         out.append(_row(name, k, START + DAY * time[k], temperature[k], entry, true, rng))
     return out
@@ -183,9 +185,21 @@ def _row(
     name: str, k: int, time: float, temperature: float, entry: Mapping[str, Any], true: Mapping[str, float],
     rng: np.random.Generator,
 ) -> dict[str, Any]:  # fmt: skip
-    row: dict[str, Any] = {"joint": name, "recording": f"{name}-{k:04d}", "time_s": time, "temperature": temperature}
-    row |= {"outcome": entry["outcome"], "verdict": entry.get("verdict", ""), "faults": entry.get("faults", [])}
-    row |= {"residual": entry.get("times_noise", float("nan")), "artefacts": f"artefacts/{name}/{name}-{k:04d}"}
+    row: dict[str, Any] = {
+        "joint": name,
+        "recording": f"{name}-{k:04d}",
+        "time_s": time,
+        "temperature": temperature,
+    }
+    row |= {
+        "outcome": entry["outcome"],
+        "verdict": entry.get("verdict", ""),
+        "faults": entry.get("faults", []),
+    }
+    row |= {
+        "residual": entry.get("times_noise", float("nan")),
+        "artefacts": f"artefacts/{name}/{name}-{k:04d}",
+    }
     row["parameters"] = {
         n: _estimate(v, entry["true"][n], true[n], rng) for n, v in entry.get("parameters", {}).items()
     }
@@ -208,8 +222,9 @@ def _cause(
     was, now = entry["true"].get(name, np.nan) - null, true.get(name, np.nan) - null
     ratio = now / was if np.isfinite(was) and was and np.isfinite(now) else 1.0
     shift = (played[2] - played[1]) / 3.92 * float(rng.normal())
-    value, low, high = sorted(null + ratio * (v - null + shift) for v in played)[1], *sorted(
-        null + ratio * (v - null + shift) for v in (played[1], played[2])
+    value, low, high = (
+        sorted(null + ratio * (v - null + shift) for v in played)[1],
+        *sorted(null + ratio * (v - null + shift) for v in (played[1], played[2])),
     )
     unit = {"torque": "N m", "gap": "rad", "delay": "s", "gain": "1"}.get(parameter, "1")
     size = {"name": parameter, "value": value, "low": low, "high": high, "unit": unit}
@@ -219,7 +234,17 @@ def _cause(
 
 def _history(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:
     flat = [
-        (r["joint"], n, UNITS[n], r["time_s"], *v[:3], v[3] >= TOLD, r["temperature"], r["recording"], r["artefacts"])
+        (
+            r["joint"],
+            n,
+            UNITS[n],
+            r["time_s"],
+            *v[:3],
+            v[3] >= TOLD,
+            r["temperature"],
+            r["recording"],
+            r["artefacts"],
+        )
         for r in rows
         for n, v in r["parameters"].items()
     ]

@@ -25,11 +25,11 @@ from independent.bench import Bench
 from independent.faults import FAULTS
 
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
 from rsea_ros.report.diagnosis_page import final_values
-from rsea_ros.diagnosis.settings import DiagnosisSettings
 
 SAMPLE = Path(__file__).with_name("fleet_trends_played.json")
 TRIED = (
@@ -130,9 +130,7 @@ def truth(bench: Bench) -> dict[str, float]:
 
 def said(d: Diagnosis) -> dict[str, Any]:
     """Return what a diagnosis says, rounded: parameters, causes, faults, verdict."""
-    parameters = {
-        p.name: [p.value, *p.ci95, p.told_by_data] for p in final_values(d) if p.name in TRUE
-    }
+    parameters = {p.name: [p.value, *p.ci95, p.told_by_data] for p in final_values(d) if p.name in TRUE}
     causes = [
         {
             "name": c.name,
@@ -176,10 +174,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         with args.log.open("a") as file:
             file.write(json.dumps(done[plan.name]) + "\n")
         names = ", ".join(c["name"] for c in done[plan.name].get("causes", []))
-        print(f"{plan.name:<34}{done[plan.name]['outcome']:<9}{done[plan.name]['seconds']:5.1f} s  {names}", flush=True)
-    print(f"{len(done)} of {sum(1 for _ in plans())} played; a healthy joint has {COULOMB:g} N m of Coulomb friction")
+        print(
+            f"{plan.name:<34}{done[plan.name]['outcome']:<9}{done[plan.name]['seconds']:5.1f} s  {names}",
+            flush=True,
+        )
+    print(
+        f"{len(done)} of {sum(1 for _ in plans())} played; a healthy joint has {COULOMB:g} N m of Coulomb friction"
+    )
     if args.write:
-        SAMPLE.write_text("[\n" + ",\n".join(json.dumps(done[p.name]) for p in plans() if p.name in done) + "\n]\n")
+        SAMPLE.write_text(
+            "[\n" + ",\n".join(json.dumps(done[p.name]) for p in plans() if p.name in done) + "\n]\n"
+        )
     return 0
 
 

@@ -24,7 +24,7 @@ class Alarm:
     cause or fault. since_s: POSIX s, with earliest_s and latest_s; NaN for an outlier. size: in `unit`, change
     from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over the
     level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of the
-    first recording that shows it.
+    first recording that shows it. share: of the days since then that name a cause or a fault.
     """
 
     key: str
@@ -40,6 +40,7 @@ class Alarm:
     confidence: float
     recording: str
     artefacts: str
+    share: float = 1.0
 
 
 def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> tuple[Alarm, ...]:
@@ -101,7 +102,7 @@ def _of_appearance(a: Appearance, recordings: Table) -> Alarm:
     return Alarm(
         f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s, a.size,
         a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
-        str(recordings["artefacts"][a.row]),
+        str(recordings["artefacts"][a.row]), a.share,
     )  # fmt: skip
 
 

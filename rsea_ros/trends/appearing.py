@@ -51,7 +51,9 @@ def _usual(found: Sequence[Naming], joints: int, settings: TrendSettings) -> dic
     lacking = {key: [0.0] * (joints - len(values)) for key, values in shares.items()}
     alone = joints < settings.fewest_joints
     return {
-        key: settings.background if alone else max(settings.background, float(np.median(values + lacking[key])))
+        key: settings.background
+        if alone
+        else max(settings.background, float(np.median(values + lacking[key])))
         for key, values in shares.items()
     }
 
@@ -100,7 +102,9 @@ def _appeared(scan: Scan, q: float, settings: TrendSettings) -> Appearance | Non
         n.joint, n.about, n.kind, since * DAY, min(earliest, since) * DAY,
         max(scan.t[likely[-1]], since) * DAY, first == 0, float(np.mean(scan.named[first:])), float(q), row,
     )  # fmt: skip
-    return replace(found, parameter=n.parameter, unit=n.unit, size=_size_now(n), limit=n.limit, status=n.status)
+    return replace(
+        found, parameter=n.parameter, unit=n.unit, size=_size_now(n), limit=n.limit, status=n.status
+    )
 
 
 def _size_now(n: Naming, last: int = 9) -> Interval | None:

@@ -40,6 +40,7 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     return FleetTrends(
         mine,
         others,
+        tuple(found),
         appearances(found, joints, settings),
         outliers(mine.values(), settings),
         settings.false_discovery,

@@ -29,7 +29,9 @@ class Regression:
     @cached_property
     def covariance(self) -> FloatArray:
         """Return that of b, shape (p, p)."""
-        scale = 1.0 / np.sqrt(np.maximum(np.sum(self.w[:, None] * self.x**2, axis=0) + self.precision, 1e-300))
+        scale = 1.0 / np.sqrt(
+            np.maximum(np.sum(self.w[:, None] * self.x**2, axis=0) + self.precision, 1e-300)
+        )
         normal = (self.x * scale).T @ (self.w[:, None] * self.x * scale) + np.diag(self.precision * scale**2)
         inverse: FloatArray = _inverse(normal) * np.outer(scale, scale)
         return inverse

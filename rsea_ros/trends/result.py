@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from rsea_ros.signals import FloatArray
+from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.series import Series
 
 State = Literal["steady", "changed", "trending", "untold"]
@@ -134,11 +135,12 @@ class FleetTrends:
     """All that is known of a fleet's course.
 
     trends: by joint and parameter, in the order of the history. sizes: of causes by joint and `cause.parameter`,
-    from the recordings that name them. false_discovery: rate that the findings keep, over `tests` tests.
+    from the recordings that name them. namings: which recordings name a cause or a fault. false_discovery: rate that the findings keep, over `tests` tests.
     """
 
     trends: Mapping[tuple[str, str], Trend]
     sizes: Mapping[tuple[str, str], Trend]
+    namings: tuple[Naming, ...]
     appearances: tuple[Appearance, ...]
     outliers: tuple[Outlier, ...]
     false_discovery: float

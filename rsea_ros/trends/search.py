@@ -47,9 +47,7 @@ def described(test: Tested, settings: TrendSettings) -> Course:
     price = scan_threshold(rate, _share(days, settings), test.effect.freedom) ** 2
     best = min(_candidates(test.course, price, settings), key=lambda c: cost(c, price))
     effect = day_effect(days, settings, best.fitted())
-    anew = replace(
-        course_of(days, effect.variance, test.prior), slope=best.slope, terms=best.terms
-    )
+    anew = replace(course_of(days, effect.variance, test.prior), slope=best.slope, terms=best.terms)
     return _completed(anew, price, settings)
 
 

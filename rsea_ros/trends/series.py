@@ -23,7 +23,17 @@ HISTORY = (
     "joint", "parameter", "unit", "time_s", "value", "low", "high", "identifiable", "temperature",
     "recording", "artefacts",
 )  # fmt: skip
-RECORDINGS = ("joint", "recording", "time_s", "outcome", "verdict", "residual", "faults", "causes", "artefacts")
+RECORDINGS = (
+    "joint",
+    "recording",
+    "time_s",
+    "outcome",
+    "verdict",
+    "residual",
+    "faults",
+    "causes",
+    "artefacts",
+)
 
 
 @dataclass(frozen=True)

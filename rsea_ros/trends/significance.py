@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtr
+from scipy.stats import t
 
 from rsea_ros.signals import FloatArray
 
+_SMALLEST = 1e-280
 _KINDS = 2
 """A scan looks for steps and for ramps."""
 
@@ -21,10 +25,12 @@ def scan_p(largest: float, share: float, freedom: int) -> float:
     b = _as_normal(abs(largest), freedom)
     if b < 1.5:
         return 1.0
-    rate = norm.pdf(b) * ((b - 1.0 / b) * np.log((1.0 - share) ** 2 / share**2) + 4.0 / b)
+    density = np.exp(-0.5 * b * b) / np.sqrt(2.0 * np.pi)
+    rate = density * ((b - 1.0 / b) * np.log((1.0 - share) ** 2 / share**2) + 4.0 / b)
     return float(min(1.0, _KINDS * rate))
 
 
+@lru_cache(maxsize=4096)
 def scan_threshold(rate: float, share: float, freedom: int) -> float:
     """Return the |z| that noise alone reaches with a probability of `rate`."""
     return float(brentq(lambda z: np.log(scan_p(z, share, freedom) / rate), 1.6, 200.0))
@@ -52,5 +58,5 @@ def adjusted(p: FloatArray) -> FloatArray:
 
 def _as_normal(score: float, freedom: int) -> float:
     """Return the normal score that is as rare as one of a Student variable."""
-    log_tail = float(t.logsf(score, freedom))
-    return float(norm.isf(np.exp(log_tail))) if log_tail > -600.0 else float(np.sqrt(-2.0 * log_tail))
+    tail = float(stdtr(freedom, -score))
+    return float(-ndtri(tail)) if tail > _SMALLEST else float(np.sqrt(-2.0 * t.logsf(score, freedom)))

@@ -9,7 +9,9 @@ START, DAY = 1_735_689_600.0, 86400.0  # 2025-01-01 UTC
 
 def columns(rows, names):
     """Return a table of rows (dicts) as columns."""
-    return {n: np.array([r[n] for r in rows], dtype=object if n in ("faults", "causes") else None) for n in names}
+    return {
+        n: np.array([r[n] for r in rows], dtype=object if n in ("faults", "causes") else None) for n in names
+    }
 
 
 def history(
@@ -68,5 +70,13 @@ def recordings(joints=("a",), days=250, causes=None, faults=None):
 
 def cause(name, size, parameter="gap", unit="rad", gain=0.5, doubt=0.02, status="confirmed", probability=0.9):
     """Return a cause as the store has it."""
-    sizes = [{"name": parameter, "value": size, "low": size * (1 - doubt), "high": size * (1 + doubt), "unit": unit}]
+    sizes = [
+        {
+            "name": parameter,
+            "value": size,
+            "low": size * (1 - doubt),
+            "high": size * (1 + doubt),
+            "unit": unit,
+        }
+    ]
     return {"name": name, "status": status, "probability": probability, "gain": gain, "sizes": sizes}
