@@ -1,4 +1,4 @@
-"""Joints of the simulated fleet: the second bench with wear, temperature and normal work instead of chirps."""
+"""Joints of the simulated fleet: the second bench with wear, temperature and normal work, no chirps."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def joint(
     ft_gain: float = 1.0,
     temperature: float = 25.0,
 ) -> Bench:
-    """Return a joint: its own plant by its seed, wear (stiffness, friction, ft_gain relative; gap rad; delay s)."""
+    """Return a joint: a plant by its seed, with wear.
+
+    stiffness, friction, ft_gain: relative; gap: rad; delay: s; temperature: °C.
+    """
     new = drawn_bench(np.random.default_rng(seed))
     warmer = temperature - 25.0
     drag = friction * (1.0 + FRICTION_PER_K * warmer)

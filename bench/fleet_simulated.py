@@ -76,7 +76,7 @@ class Fleet:
 
 
 def drawn_wear(rng: np.random.Generator, joints: int, days: int) -> dict[str, Wear]:
-    """Return what happens to whom: five that wear, one replaced in mid-year, three with faults of the data."""
+    """Return what happens to whom: five wear, one is replaced, three get faults of the data."""
     names = [f"J{i + 1:02d}" for i in rng.permutation(joints)]
     when = rng.uniform(0.2, 0.55, 5) * days
     kinds = [
@@ -211,7 +211,7 @@ def _estimate(played: list[float], was: float, true: float, rng: np.random.Gener
     """Return value, low, high and share told: the played error and interval, relative, on another truth."""
     value, low, high, told = played
     shift = (high - low) / 3.92 * float(rng.normal())
-    return tuple(true * (v + shift) / was for v in (value, low, high)) + (told,)
+    return (*(true * (v + shift) / was for v in (value, low, high)), told)
 
 
 def _cause(

@@ -62,7 +62,8 @@ def outcome(seed: int) -> dict[str, Any]:
     groups = by_joint(last)
     worn = [judged(made, joint, wear, groups.get(joint, []), first) for joint, wear in made.wear.items()]
     return {
-        "seed": seed, "worn": worn, "false": false, "beside": beside, "joint_days": 20 * 365, "looks": len(days),
+        "seed": seed, "worn": worn, "false": false, "beside": beside,
+        "joint_days": 20 * 365, "looks": len(days),
         "seconds": round(time.perf_counter() - begun, 1),
     }  # fmt: skip
 
@@ -165,9 +166,11 @@ def table(outcomes: Sequence[dict[str, Any]]) -> Iterator[str]:
     false = [k for o in outcomes for k in o["false"]]
     right = sum(w["right"] for w in real)
     yield f"{'asked':<52}measured ({len(outcomes)} fleets)"
-    yield f"{'worn joint and cause right >= 95 %':<52}{100.0 * right / len(real):.1f} % ({right} of {len(real)})"
+    share = 100.0 * right / len(real)
+    yield f"{'worn joint and cause right >= 95 %':<52}{share:.1f} % ({right} of {len(real)})"
     yield f"{'change date within 14 days (median)':<52}{np.median(dated):.1f} days"
-    yield f"{'false alarms <= 1 per 1000 joint-days':<52}{1000.0 * len(false) / days:.3f} ({len(false)} in {days})"
+    rate = 1000.0 * len(false) / days
+    yield f"{'false alarms <= 1 per 1000 joint-days':<52}{rate:.3f} ({len(false)} in {days})"
     yield ""
     yield f"{'':<14}{'right':>9}{'date error, days':>24}{'delay, days':>22}{'limit, days':>22}"
     for kind in dict.fromkeys(w["kind"] for w in worn):

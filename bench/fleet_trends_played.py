@@ -36,7 +36,7 @@ TRIED = (
     "coulomb_friction", "backlash", "command_delay", "ft_gain_error", "torque_constant_error",
     "stribeck_friction", "ft_sensor_lag", "current_loop_lag", "gear_compliance", "load_dependent_friction",
 )  # fmt: skip
-"""Effects that are tried: the fleet's, and those that they are most easily taken for. All would take an hour."""
+"""Effects that are tried: the fleet's, and those that they are easily taken for. All would take an hour."""
 WEAR: tuple[Mapping[str, float], ...] = (
     {},
     {},
@@ -78,7 +78,7 @@ TRUE = {
 
 @dataclass(frozen=True)
 class Plan:
-    """A recording to be made: the joint's seed and wear, kind of work, temperature (°C), fault of the data."""
+    """A recording to be made: the joint's seed and wear, kind of work, °C, fault of the data."""
 
     name: str
     seed: int
@@ -178,9 +178,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"{plan.name:<34}{done[plan.name]['outcome']:<9}{done[plan.name]['seconds']:5.1f} s  {names}",
             flush=True,
         )
-    print(
-        f"{len(done)} of {sum(1 for _ in plans())} played; a healthy joint has {COULOMB:g} N m of Coulomb friction"
-    )
+    every = sum(1 for _ in plans())
+    print(f"{len(done)} of {every} played; healthy joints have {COULOMB:g} N m of dry friction")
     if args.write:
         SAMPLE.write_text(
             "[\n" + ",\n".join(json.dumps(done[p.name]) for p in plans() if p.name in done) + "\n]\n"

@@ -21,10 +21,10 @@ class Alarm:
     """A finding of a joint.
 
     key: the same at every look at a growing history, for as long as it is the same thing. about: parameter,
-    cause or fault. since_s: POSIX s, with earliest_s and latest_s; NaN for an outlier. size: in `unit`, change
-    from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over the
-    level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of the
-    first recording that shows it. share: of the days since then that name a cause or a fault.
+    cause or fault. since_s: POSIX s, with earliest_s and latest_s; NaN for an outlier. size: in `unit`,
+    change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
+    the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
+    the first recording that shows it. share: of the days since then that name a cause or a fault.
     """
 
     key: str
@@ -100,8 +100,8 @@ def _together(sizes: list[Interval]) -> Interval:
 
 def _of_appearance(a: Appearance, recordings: Table) -> Alarm:
     return Alarm(
-        f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s, a.size,
-        a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
+        f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s,
+        a.size, a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
         str(recordings["artefacts"][a.row]), a.share,
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.series import BoolArray, Series, Table
@@ -55,7 +56,7 @@ def namings(recordings: Table) -> Iterator[Naming]:
         yield from _causes(str(name), rows[done[rows]], time_s, recordings["causes"])
 
 
-def _faults(joint: str, rows: np.ndarray, time_s: FloatArray, faults: Sequence[Any]) -> Iterator[Naming]:
+def _faults(joint: str, rows: np.ndarray, time_s: FloatArray, faults: npt.NDArray[Any]) -> Iterator[Naming]:
     kinds = [{_kind(f) for f in (faults[i] if faults[i] is not None else ())} for i in rows]
     for kind in sorted(set().union(*kinds)):
         yield Naming(joint, kind, "fault", rows, time_s[rows], np.array([kind in k for k in kinds]))
@@ -65,7 +66,7 @@ def _kind(fault: Any) -> str:
     return str(fault["kind"]) if isinstance(fault, Mapping) else str(fault)
 
 
-def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: Sequence[Any]) -> Iterator[Naming]:
+def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArray[Any]) -> Iterator[Naming]:
     stated = [[_stated(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
     of_row = [{c["name"]: c for c in row if _counts(c)} for row in stated]
     for name in sorted(set().union(*of_row)):
@@ -87,7 +88,7 @@ def _counts(cause: Mapping[str, Any]) -> bool:
 def _cause(
     joint: str, name: str, rows: np.ndarray, time_s: FloatArray, found: Sequence[Mapping[str, Any] | None]
 ) -> Naming:
-    main = next((list(c["sizes"])[0] for c in found if c is not None and len(c["sizes"])), None)
+    main = next((c["sizes"][0] for c in found if c is not None and len(c["sizes"])), None)
     named = np.array([c is not None for c in found])
     statuses = [c["status"] for c in found if c is not None]
     status = max(set(statuses), key=statuses.count)

@@ -24,9 +24,9 @@ class Term:
 class Course:
     """Days with their weights and the terms that describe them.
 
-    base: level, and temperature with the fleet's prior where it is logged. day_variance: of the day effect, in
-    units of the scale squared. slope: whether the first piece has
-    a slope of its own. warm: per K, the prior's mean, taken off the values already.
+    base: level, and temperature with the fleet's prior where it is logged. day_variance: of the day effect,
+    in units of the scale squared. slope: whether the first piece has a slope of its own. warm: per K, the
+    prior's mean, taken off the values already.
     """
 
     days: Days
@@ -39,7 +39,8 @@ class Course:
     @property
     def t(self) -> FloatArray:
         """Return days from the first one on, shape (n,)."""
-        return self.days.t - self.days.t[0]
+        since: FloatArray = self.days.t - self.days.t[0]
+        return since
 
     def regression(self, without: int = -1) -> Regression:
         """Return the regression with all terms but one; slope first, then the terms in their order."""
@@ -51,12 +52,13 @@ class Course:
     @property
     def at(self) -> int:
         """Return the place of the slope, or of the first term, among the coefficients."""
-        return self.base.x.shape[1]
+        return int(self.base.x.shape[1])
 
     def at_mean_temperature(self) -> FloatArray:
         """Return the days' means without what the temperature does, in units of the scale, shape (n,)."""
         r = self.regression()
-        return self.base.y - r.x[:, 1 : self.at] @ r.coefficients[1 : self.at]
+        values: FloatArray = self.base.y - r.x[:, 1 : self.at] @ r.coefficients[1 : self.at]
+        return values
 
     def fitted(self) -> FloatArray:
         """Return the course without temperature and without the level, shape (n,)."""
@@ -129,7 +131,7 @@ def _neighbours(course: Course) -> Iterator[Course]:
 
 def _allowed(gain: FloatArray, taken: Sequence[int], fewest: int) -> FloatArray:
     """Return the gains, none within `fewest` days of an end or of another term of the kind."""
-    allowed = gain.copy()
+    allowed: FloatArray = gain.copy()
     allowed[:fewest] = -1.0
     allowed[len(gain) - fewest + 1 :] = -1.0
     for k in taken:

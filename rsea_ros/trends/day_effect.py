@@ -58,7 +58,8 @@ def _criterion(
     def product(a: FloatArray, b: FloatArray) -> FloatArray:
         """Return the weighted product of two columns about their block means."""
         apart = np.add.reduceat(w * a, blocks, axis=1) * np.add.reduceat(w * b, blocks, axis=1) / total
-        return np.sum(w * a * b, axis=1) - np.sum(apart, axis=1)
+        total_of: FloatArray = np.sum(w * a * b, axis=1) - np.sum(apart, axis=1)
+        return total_of
 
     criterion = -np.sum(np.log(w), axis=1) + np.sum(np.log(total), axis=1)
     if days.warmth is None:

@@ -83,7 +83,8 @@ def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> T
 
 def _untold(series: Series, days: int, settings: TrendSettings) -> Trend:
     many = len(series.told)
-    reason = f"{int(np.sum(series.told))} of {many} recordings could tell it, on {days} days; {settings.fewest_days} days are needed"
+    told = f"{int(np.sum(series.told))} of {many} recordings could tell it, on {days} days"
+    reason = f"{told}; {settings.fewest_days} days are needed"
     return Trend(series, "untold", days, reason=reason)
 
 

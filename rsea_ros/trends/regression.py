@@ -10,6 +10,8 @@ import numpy as np
 
 from rsea_ros.signals import FloatArray
 
+_LARGEST = 1e10
+"""Entry of an inverse of scaled normal equations from which columns count as dependent."""
 Kind = Literal["step", "ramp"]
 """A step of the level, or a change of the slope, from a day on."""
 
@@ -56,10 +58,11 @@ class Regression:
 def _inverse(normal: FloatArray) -> FloatArray:
     """Return the inverse of scaled normal equations, the least one where columns depend on each other."""
     try:
-        inverse: FloatArray = np.linalg.inv(normal)
+        inverse = np.asarray(np.linalg.inv(normal), float)
     except np.linalg.LinAlgError:
-        return np.linalg.pinv(normal, hermitian=True)
-    return inverse if np.max(np.abs(inverse)) < 1e10 else np.linalg.pinv(normal, hermitian=True)
+        inverse = np.full_like(normal, np.inf)
+    sure = np.max(np.abs(inverse)) < _LARGEST
+    return inverse if sure else np.asarray(np.linalg.pinv(normal, hermitian=True), float)
 
 
 def term(kind: Kind, t: FloatArray, at: float) -> FloatArray:

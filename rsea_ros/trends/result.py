@@ -58,9 +58,9 @@ class Curve:
 class Trend:
     """A series and what is known of its course. All values in the parameter's unit.
 
-    first, now: level at the first and the last day, at the mean temperature. per_year: slope of the last piece.
-    per_kelvin: of the temperature, relative to the level, per K; None where it is not logged. day_sd: of the
-    day effect. detectable: the least step in mid-series that these recordings would have shown. q: false
+    first, now: level at the first and the last day, at the mean temperature. per_year: slope of the last
+    piece. per_kelvin: of the temperature, relative to the level, per K; None where it is not logged. day_sd:
+    of the day effect. detectable: the least step in mid-series that these recordings would show. q: false
     discovery rate at which the series is more than noise. by_day: means of the days at the mean temperature,
     with the recordings' own intervals. to_limit_s: POSIX s at which `limit` is reached.
     told_days: days with an estimate. reason: of a series that is untold.
@@ -134,8 +134,10 @@ class Outlier:
 class FleetTrends:
     """All that is known of a fleet's course.
 
-    trends: by joint and parameter, in the order of the history. sizes: of causes by joint and `cause.parameter`,
-    from the recordings that name them. namings: which recordings name a cause or a fault. false_discovery: rate that the findings keep, over `tests` tests.
+    trends: by joint and parameter, in the order of the history. sizes: of causes by joint and
+    `cause.parameter`, from the recordings that name them. namings: which recordings name a cause or a fault.
+    false_discovery: rate that the findings keep, over `tests` tests. per_kelvin: mean and sd of each
+    parameter's temperature slope over the joints, relative.
     """
 
     trends: Mapping[tuple[str, str], Trend]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +21,7 @@ _MOST_TERMS = 12
 
 @dataclass(frozen=True)
 class Tested:
-    """A series before anything is looked for: its largest score over all days and kinds of terms, and its p."""
+    """A series before anything is looked for: its largest score over all days and kinds, and its p."""
 
     course: Course
     effect: DayEffect
@@ -62,7 +62,7 @@ def _candidates(course: Course, price: float, settings: TrendSettings) -> Iterat
     yield _completed(course, price, settings)
 
 
-def _terms(places: list[int] | tuple[int, ...], kinds: tuple[Kind, ...]) -> tuple[Term, ...]:
+def _terms(places: Sequence[int], kinds: tuple[Kind, ...]) -> tuple[Term, ...]:
     return tuple(Term(kind, i) for i in places[: _MOST_TERMS // len(kinds)] for kind in kinds)
 
 

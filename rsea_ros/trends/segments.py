@@ -53,7 +53,7 @@ class WeightedPieces(BaseCost):  # type: ignore[misc]
 def breaks(
     t: FloatArray, y: FloatArray, w: FloatArray, piece: Piece, price: float, fewest: int
 ) -> Sequence[int]:
-    """Return the first index of each piece but the first. price: of one more piece, in twice log likelihood."""
+    """Return the first index of each piece but the first. price: of a piece, in twice log likelihood."""
     n = len(t)
     if n < 2 * fewest:
         return []

@@ -72,7 +72,10 @@ def check_columns(table: Table, columns: tuple[str, ...], name: str) -> None:
 
 
 def all_series(history: Table) -> Iterator[Series]:
-    """Yield the series of a history; rows whose time is not known are left out. Raises ParameterError for a history without its columns."""
+    """Yield the series of a history; rows whose time is not known are left out.
+
+    Raises ParameterError for a history without its columns.
+    """
     check_columns(history, HISTORY, "history")
     joint, parameter = np.asarray(history["joint"], str), np.asarray(history["parameter"], str)
     time_s = np.asarray(history["time_s"], float)

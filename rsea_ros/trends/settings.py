@@ -24,8 +24,8 @@ class TrendSettings:
         the effect of a day, faster than wear.
     date_doubt: fall of twice the log likelihood within which a date may lie, 95 % (chi-squared, 1).
     widest: least step that could be seen, as a share of the level, above which a series says nothing.
-    outlier_days: scaled distance of a recording from its neighbours' median above which it is left out. 6: one
-        in 10^9 of normal ones.
+    outlier_days: scaled distance of a recording from its neighbours' median above which it is left out. 6:
+        one in 10^9 of normal ones.
     outlier_joint: robust score above which a joint is unlike its fleet. 4.5: one in 10^5.
     fewest_joints: joints of a parameter below which nobody is an outlier.
     background: share of the days on which a cause or a fault may be named in error.

@@ -26,9 +26,9 @@ def trend_of(series: Series, test: Tested, course: Course, q: float, settings: T
     scale, days = course.days.scale, course.days
     r = course.regression()
     detectable = scale * _detectable(course, test.effect.freedom, settings)
-    known = _known(series, course, r)
+    first, now = (combined(r, _row(course, float(t))).times(scale) for t in (course.t[0], course.t[-1]))
     slope, sure = _slope(course)
-    level = abs(known["now"].value)
+    level = abs(now.value)
     if detectable > settings.widest * level and not course.terms:
         reason = f"only steps above {detectable / level:.0%} would show" if level else "no level"
         return Trend(series, "untold", len(days.t), reason=reason, detectable=detectable)
@@ -38,41 +38,39 @@ def trend_of(series: Series, test: Tested, course: Course, q: float, settings: T
         "trending" if sure else "changed" if changes else "steady",
         len(days.t),
         q,
+        first,
+        now,
         per_year=slope.times(scale * YEAR),
         day_sd=scale * float(np.sqrt(course.day_variance)),
         detectable=detectable,
         changes=changes,
         curve=_curve(course, r),
         by_day=_by_day(course),
-        **known,
+        per_kelvin=_per_kelvin(course, r),
     )
     return _with_limit(trend, course, settings) if sure else trend
 
 
 def combined(r: Regression, row: FloatArray) -> Interval:
     """Return a linear combination of the coefficients with its interval."""
-    value, half = float(row @ r.coefficients), _Z * float(np.sqrt(max(0.0, row @ r.covariance @ row)))
+    variance = float(row @ r.covariance @ row)
+    value, half = float(row @ r.coefficients), _Z * float(np.sqrt(max(0.0, variance)))
     return Interval(value, value - half, value + half)
 
 
-def _known(series: Series, course: Course, r: Regression) -> dict[str, Interval | None]:
-    scale = course.days.scale
-    warm = None
-    if course.days.warmth is not None:
-        row = np.zeros(r.x.shape[1])
-        row[1] = 1.0
-        here = combined(r, row)
-        warm = Interval(*(v + course.warm for v in here))
-    ends = [combined(r, _row(course, t)).times(scale) for t in (course.t[0], course.t[-1])]
-    return {"first": ends[0], "now": ends[1], "per_kelvin": warm}
+def _per_kelvin(course: Course, r: Regression) -> Interval | None:
+    if course.days.warmth is None:
+        return None
+    row = np.zeros(r.x.shape[1])
+    row[1] = 1.0
+    return Interval(*(v + course.warm for v in combined(r, row)))
 
 
 def _row(course: Course, t: float) -> FloatArray:
     """Return the regressors of the course at a time, at the mean temperature."""
     at = np.array([t])
-    parts = [[1.0], [0.0] * (course.at - 1), [t] if course.slope else []]
-    parts += [term(k.kind, at, course.t[k.index]) for k in course.terms]
-    return np.concatenate([np.asarray(p, float) for p in parts])
+    terms = [float(term(k.kind, at, course.t[k.index])[0]) for k in course.terms]
+    return np.array([1.0, *[0.0] * (course.at - 1), *([t] if course.slope else []), *terms])
 
 
 def _slopes(course: Course, after: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Series in weeks, or in longer steps where they are long: what a picture of thousands of recordings shows."""
+"""Series in weeks, or in longer steps where they are long, for pictures of thousands of recordings."""
 
 from __future__ import annotations
 

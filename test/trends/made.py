@@ -18,7 +18,7 @@ def history(
     rng, joints=("a",), parameter="spring.stiffness", level=1500.0, course=None, days=250, each=2, sd=0.004,
     day_sd=0.006, per_kelvin=0.0, temperature=None, told=1.0,
 ):  # fmt: skip
-    """Return a history. course: what joint and day (0 to days) make of the level, relative; sd, day_sd: relative."""
+    """Return a history. course: relative change by joint and day; sd, day_sd: relative."""
     parts = []
     for joint in joints:
         day = np.repeat(np.arange(days), each)

@@ -1,4 +1,4 @@
-"""A cause of a joint over time: its size where it is named, the detection limit where it is not; faults too."""
+"""A cause of a joint over time: its size where it is named, the detection limit where it is not."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def cause_figure(naming: Naming, appearance: Appearance | None, steps: Steps) ->
     )
     return Figure(
         title=_title(naming, appearance),
-        caption="Median of each week's sizes, with the middle half of them. Grey at zero: recordings that do not "
-        "name it; below the detection limit they could not.",
+        caption="Median of each week's sizes, with the middle half of them. Grey at zero: recordings that do "
+        "not name it; below the detection limit they could not.",
         data=[_sizes(naming, steps, factor, unit), _zeros(naming, steps)],
         layout=layout(
             xaxis=date_axis(steps),

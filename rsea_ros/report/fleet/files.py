@@ -30,9 +30,9 @@ def write_fleet_report(
 ) -> Path:
     """Write index.html and a page for each joint, and return the path of index.html.
 
-    history, recordings: as of trends.fleet_trends. store: the folder that the paths in `artefacts` start from,
-    `out` by default. Raises ParameterError for a table without its columns, OutputError for a name that is
-    taken, OSError where something cannot be written.
+    history, recordings: as of trends.fleet_trends. store: the folder that the paths in `artefacts` start
+    from, `out` by default. Raises ParameterError for a table without its columns, OutputError for a name
+    that is taken, OSError where something cannot be written.
     """
     found = fleet_trends(history, recordings, settings)
     alarms = alarms_of(found, recordings)

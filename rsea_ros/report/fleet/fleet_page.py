@@ -54,7 +54,7 @@ def _blocks(
 
 
 def _mapped(found: FleetTrends) -> list[str]:
-    """Return the parameters that have a map, those that moved most first: of sizes of causes the usual ones."""
+    """Return the parameters that have a map, those that moved most first; of causes the usual ones."""
     sized = [p for _, p in found.sizes]
     usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(found.joints)]
     courses = {**found.trends, **found.sizes}
@@ -108,8 +108,8 @@ def _sure(found: FleetTrends) -> list[str]:
     warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in found.per_kelvin.items() if m]
     lines = [
         f"{found.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
-        f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini and "
-        f"Hochberg, over all joints and parameters of this look).",
+        f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
+        f"and Hochberg, over all joints and parameters of this look).",
         "Recordings of one day count as one draw: what a day does to a joint (mounting, grease, zeros) is "
         "estimated from the scatter of the days, by restricted likelihood, and is no change.",
     ]

@@ -80,7 +80,8 @@ def joint_table(
 
 def parameter_rows(trends: Sequence[Trend]) -> str:
     """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
-    head = [("Parameter", False), ("State", False), ("Now, 95 %", True), ("A year", True), ("A day scatters", True),
+    head = [("Parameter", False), ("State", False), ("Now, 95 %", True), ("A year", True),
+            ("A day scatters", True),
             ("Least step seen", True), ("Told", True)]  # fmt: skip
     rows = []
     for t in trends:

@@ -57,9 +57,10 @@ def naming_map(about: str, kind: str, joints: Sequence[str], found: FleetTrends,
     """Return the map of a cause or a fault: the share of each week's recordings that name it."""
     of = {n.joint: n for n in found.namings if (n.about, n.kind) == (about, kind)}
     share = np.array([_share(of.get(joint), steps) for joint in joints]) * 100.0
+    plain = name(about) + ("" if kind == "cause" else " in the data")
     often = [j for j, row in zip(joints, share, strict=True) if np.nanmax(row, initial=0.0) >= _OFTEN]
     return Figure(
-        title=f"{name(about)}{'' if kind == 'cause' else ' in the data'}: {len(often)} of {len(joints)} joints",
+        title=f"{plain}: {len(often)} of {len(joints)} joints",
         caption=f"Share of the recordings of each week that name it, for joints that do at all; "
         f"counted: {_OFTEN:g} % or more in some week.",
         data=[_shares(share, dates(steps.middle), list(joints))],
@@ -143,4 +144,5 @@ def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
     if not moved:
         return f"{plain} is steady in all {len(told)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))
-    return f"{plain} moved in {len(moved)} of {len(told)} joints, most in {most.series.joint}: {percent(most.relative)}"
+    where = f"{len(moved)} of {len(told)} joints, most in {most.series.joint}"
+    return f"{plain} moved in {where}: {percent(most.relative)}"

@@ -1,4 +1,4 @@
-"""The page of a joint: what it has, each parameter over time, causes that appeared, the recordings that show it."""
+"""The page of a joint: what to look at, each parameter over time, causes, the recordings that show it."""
 
 from __future__ import annotations
 
@@ -40,11 +40,12 @@ def joint_page(
 
 
 def _blocks(
-    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray, steps: Steps,
-    links: Links,
+    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray,
+    steps: Steps, links: Links,
 ) -> Iterator[Block]:  # fmt: skip
     trends = [t for (j, _), t in found.trends.items() if j == joint]
-    yield f'<p class="next"><a href="index.html">All joints</a></p>{key_numbers(_keys(trends, recordings, rows))}'
+    yield '<p class="next"><a href="index.html">All joints</a></p>'
+    yield key_numbers(_keys(trends, recordings, rows))
     if alarms:
         yield section("What to look at", alarm_table(alarms, links, with_joint=False))
     yield from _pictures(joint, trends, found, steps)

@@ -14,7 +14,7 @@ _RESULTS = ("report.html", "diagnosis.json", "identification.json")
 
 @dataclass(frozen=True)
 class Links:
-    """out: the folder of the pages. store: the folder that the paths of artefacts start from. pages: by joint."""
+    """out: folder of the pages. store: folder that the paths of artefacts start from. pages: by joint."""
 
     out: Path
     store: Path

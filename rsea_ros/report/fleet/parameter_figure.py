@@ -106,8 +106,9 @@ def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float
     fan = {"type": "scatter", "mode": "lines", "x": x, "y": numbers(np.array(
         [now.high, ends.high, ends.low, now.low]) * factor), "fill": "toself", "line": {"width": 0},
         "fillcolor": faint(BEFORE, 0.15), "hoverinfo": "skip"}  # fmt: skip
-    stroke = points(np.array([last, until]), numbers(np.array([now.value, ends.value]) * factor), "if it goes on",
-                    mode="lines", line={"color": BEFORE, "width": 1.6, "dash": "dash"}, hoverinfo="skip")  # fmt: skip
+    y = numbers(np.array([now.value, ends.value]) * factor)
+    dashed = {"color": BEFORE, "width": 1.6, "dash": "dash"}
+    stroke = points(np.array([last, until]), y, "if it goes on", mode="lines", line=dashed, hoverinfo="skip")
     return [fan, stroke], until
 
 
