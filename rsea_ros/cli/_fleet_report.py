@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import importlib
 from pathlib import Path
 
 from rsea_ros.cli._output import add_force, results_place
@@ -19,8 +18,9 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the pages and say where they are."""
     from rsea_ros.fleet import history, recordings
+    from rsea_ros.report.fleet.files import INDEX, write_fleet_report
 
-    place = results_place(args, Path("out") / f"fleet-{Path(args.store).name}", ("index.html",))
-    write = importlib.import_module("rsea_ros.report.fleet").write_fleet_report
-    print(f"report: {write(history(args.store), recordings(args.store), place.folder)}")
+    place = results_place(args, Path("out") / f"fleet-{Path(args.store).name}", (INDEX,))
+    page = write_fleet_report(history(args.store), recordings(args.store), place, store=args.store)
+    print(f"report: {page}")
     return 0

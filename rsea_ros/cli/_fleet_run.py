@@ -7,14 +7,17 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 from rsea_ros.cli._output import FOUND, add_fail_on
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
 from rsea_ros.fleet.executor import Executor, serial
-from rsea_ros.fleet.joints import Diagnose, Joint, load_joints
+from rsea_ros.fleet.joints import Diagnose, load_joints
 from rsea_ros.fleet.summary import Summary
+
+if TYPE_CHECKING:
+    from rsea_ros.fleet.plan import Held
 
 GIGA = 1e9
 MOST_SHOWN = 10
@@ -47,7 +50,8 @@ def add_work(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Work through what is new, and say what came of it."""
-    summary = worked(args, args.out)
+    check_options(args)
+    summary = worked(args, args.out, bags_in(args))
     print(summary.sentence())
     for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
         print(f"quarantined: {joint}: {bag}: {why}")
@@ -59,16 +63,23 @@ def run(args: argparse.Namespace) -> int:
     return FOUND if set(summary.outcomes).intersection(args.fail_on) else 0
 
 
-def worked(args: argparse.Namespace, out: str) -> Summary:
+def bags_in(args: argparse.Namespace) -> list[Held]:
+    """Return the recordings of the sources with the joints that each holds, diagnosed as the options say."""
+    from rsea_ros.fleet.sources import bags_of
+
+    joints = load_joints(args.map)
+    if args.diagnose:
+        joints = tuple(replace(joint, diagnose=args.diagnose) for joint in joints)
+    return bags_of(args.sources, joints)
+
+
+def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
     """Write the rows of all new recordings, and return what came of it."""
-    _check(args)
     from rsea_ros.fleet.engine import Engine, Limits
     from rsea_ros.fleet.plan import is_anything_new
-    from rsea_ros.fleet.sources import bags_of
     from rsea_ros.fleet.store import locked, open_store
     from rsea_ros.fleet.task import work
 
-    held = bags_of(args.sources, joints_of(args))
     store = open_store(out, create=True)
     with locked(store, None if args.no_wait else _say_waiting):
         store.finish()
@@ -78,12 +89,6 @@ def worked(args: argparse.Namespace, out: str) -> Summary:
         place = executor(args, memory) if is_anything_new(store, held) else serial()
         with place as places, progress("fleet") as tell:
             return Engine(store, places, work, tell, Limits(memory)).run(held)
-
-
-def joints_of(args: argparse.Namespace) -> Sequence[Joint]:
-    """Return the joints of the map, diagnosed as the options say."""
-    joints = load_joints(args.map)
-    return [replace(joint, diagnose=args.diagnose) if args.diagnose else joint for joint in joints]
 
 
 @contextmanager
@@ -106,7 +111,7 @@ def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]
 
 
 
-def _check(args: argparse.Namespace) -> None:
+def check_options(args: argparse.Namespace) -> None:
     """Refuse options that make no sense together, before any work."""
     if args.serial and args.scheduler:
         raise ParameterError("--serial and --scheduler: expected one of them")

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql
+from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql, _fleet_watch
 from rsea_ros.fleet.extra import need_extra
 
 HELP = "many bags of many joints become one store (run), a report on trends (report), answers (sql)"
@@ -24,6 +24,7 @@ class Action(NamedTuple):
 ACTIONS: Mapping[str, Action] = {
     "run": Action("work through new recordings, on Dask", _fleet_run.add_run, _fleet_run.run),
     "report": Action("pages of the fleet and of each joint", _fleet_report.add_report, _fleet_report.run),
+    "watch": Action("run again and again, and tell of changes", _fleet_watch.add_watch, _fleet_watch.run),
     "sql": Action("ask the store a question", _fleet_sql.add_sql, _fleet_sql.run),
 }
 
