@@ -1,4 +1,4 @@
-"""What a fleet's run survives: lost workers, clients and schedulers, a full disk, poison, two runs at once."""
+"""What a run survives: lost workers, clients and schedulers, a full disk, poison, another run beside it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import fleet_stub as stub
 from rsea_ros.errors import RseaError
 from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
 from rsea_ros.fleet.executor import serial
-from rsea_ros.fleet.store import locked, open_store
+from rsea_ros.fleet.store import Store, locked, open_store
 
 KILLS = 20
 MEMORY = 1_000_000_000
@@ -32,11 +32,11 @@ def place(count: int) -> Iterator[tuple[Path, Path]]:
         yield stub.make_bags(Path(folder) / "bags", count), Path(folder) / "store"
 
 
-def verdict(name: str, asked: str, store: Path, count: int, more: str = "") -> bool:
+def verdict(name: str, store: Path, count: int, more: str) -> bool:
     """Print what is in a store beside what should be; return whether every recording is there once."""
     held, apart = stub.rows(open_store(store))
     good = held == apart == count
-    print(f"{name:<28} {count - apart} lost, {held - apart} double of {count}; {more or asked}"
+    print(f"{name:<28} {count - apart} lost, {held - apart} double of {count}; {more}"
           f"{'' if good else '  WRONG'}", flush=True)  # fmt: skip
     return good
 
@@ -60,7 +60,7 @@ def workers_killed(count: int = 60) -> bool:
         summary = stub.played(store, bags, workers)
         over.set()
         killer.join()
-        return verdict("worker killed", "", path, count, f"{len(killed)} kills, {summary.sentence()}")
+        return verdict("worker killed", path, count, f"{len(killed)} kills, {summary.sentence()}")
 
 
 def client(folder: str, path: str) -> None:
@@ -82,13 +82,11 @@ def client_killed(count: int = 40, kills: int = 4) -> bool:
         store = open_store(path, create=True)
         for kill in range(kills):
             running = _client(bags, path)
-            least = stub.written(store) + 3 + kill
-            stub.wait_for(lambda least=least: stub.written(store) >= least or running.poll() is not None, 60.0)
-            running.kill()
+            _kill_after(running, store, stub.written(store) + 3 + kill)
             running.wait()
         done = stub.written(store)
         _client(bags, path).wait(timeout=120.0)
-        return verdict("client and scheduler killed", "", path, count, f"{kills} kills, {done} files before the last run")
+        return verdict("client and scheduler killed", path, count, f"{kills} kills, {done} rows at the last")
 
 
 def scheduler_killed(count: int = 30) -> bool:
@@ -105,11 +103,11 @@ def scheduler_killed(count: int = 30) -> bool:
                         stub.played(store, bags, there)
                 except RseaError as error:
                     said = str(error).split(":")[0]
-        return verdict("scheduler killed", "", path, count, f"first run: {said}")
+        return verdict("scheduler killed", path, count, f"first run: {said}")
 
 
-def _kill_after(process: subprocess.Popen[bytes], store: object, least: int) -> None:
-    stub.wait_for(lambda: stub.written(store) >= least, 60.0)
+def _kill_after(process: subprocess.Popen[bytes], store: Store, least: int) -> None:
+    stub.wait_for(lambda: stub.written(store) >= least or process.poll() is not None, 120.0)
     process.kill()
 
 
@@ -121,11 +119,12 @@ def _cluster() -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         paths = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[1])])
         env = {**os.environ, "PYTHONPATH": paths}
+        common = ["--no-dashboard", "--scheduler-file", str(file)]
         dask = [sys.executable, "-m", "dask"]
-        scheduler = subprocess.Popen([*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-                                      "--scheduler-file", str(file)], env=env, **quiet)  # fmt: skip
-        worker = subprocess.Popen([*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1",
-                                   "--no-dashboard", "--no-nanny"], env=env, **quiet)  # fmt: skip
+        host = ["--host", "127.0.0.1", "--port", "0"]
+        scheduler = subprocess.Popen([*dask, "scheduler", *host, *common], env=env, **quiet)
+        alone = ["--nthreads", "1", "--no-nanny"]
+        worker = subprocess.Popen([*dask, "worker", *alone, *common], env=env, **quiet)
         try:
             import json
 
@@ -142,8 +141,9 @@ def disk_full(count: int = 200) -> bool:
     """Let the store's file system run full (a small tmpfs, needs root), give it room, and go on."""
     with place(count) as (bags, path):
         path.mkdir()
-        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(path)], check=False).returncode:
-            print("disk full                    not measured: needs root to mount a small file system")
+        small = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(path)]
+        if subprocess.run(small, check=False).returncode:
+            print("disk full                    not measured: needs root, who can mount a small file system")
             return True
         try:
             store, said, os.environ[stub.TAKES] = open_store(path, create=True), "never full", "0"
@@ -157,7 +157,7 @@ def disk_full(count: int = 200) -> bool:
             with locked(store, None), serial() as here:
                 store.finish()
                 stub.played(store, bags, here)
-            return verdict("disk full", "", path, count, f"{said} after {before} rows, which stayed")
+            return verdict("disk full", path, count, f"{said} after {before} rows, which stayed")
         finally:
             subprocess.run(["umount", str(path)], check=False)
 
@@ -168,7 +168,7 @@ def four_gigabytes(count: int = 8) -> bool:
         summary = stub.played(open_store(path, create=True), bags, workers, stub.greedy)
         good = summary.outcomes == {"done": count - 1, "quarantined": 1}
         why = summary.quarantined[0][2] if summary.quarantined else "no quarantine"
-        return verdict("4 GB on 1 GB", "", path, count, f"{summary.sentence()}: {why}") and good
+        return verdict("4 GB on 1 GB", path, count, f"{summary.sentence()}: {why}") and good
 
 
 def two_at_once(count: int = 40) -> bool:
@@ -177,11 +177,11 @@ def two_at_once(count: int = 40) -> bool:
         open_store(path, create=True)
         runs = [_client(bags, path, "0.1") for _ in range(2)]
         states = [run.wait(timeout=200.0) for run in runs]
-        return verdict("two runs at once", "", path, count, f"exit status {states}")
+        return verdict("two runs at once", path, count, f"exit status {states}")
 
 
 def truncated() -> bool:
-    """Truncate a real recording while it is read: no row; the next run says what is wrong with what is left."""
+    """Truncate a real recording while it is read: no row; the next run says what is left of it."""
     from fleet_real import make_fleet, run_real
 
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
@@ -190,7 +190,8 @@ def truncated() -> bool:
         first = run_real(store, held, cut="002")
         shutil.copy(Path(folder) / "bags" / "knee-001.mcap", Path(folder) / "bags" / "whole.mcap")
         second = run_real(store, held)
-        return verdict("truncated while read", "", store.path, 3, f"first {first.sentence()}; then {second.sentence()}")
+        said = f"first {first.sentence()}; then {second.sentence()}"
+        return verdict("truncated while read", store.path, 3, said)
 
 
 ALL = (workers_killed, client_killed, scheduler_killed, disk_full, four_gigabytes, two_at_once, truncated)

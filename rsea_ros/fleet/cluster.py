@@ -31,7 +31,7 @@ SETTINGS: Mapping[str, Any] = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.work-stealing": False,
 }
-"""No task waits on a worker, so a worker that ends takes exactly the task that it ran along."""
+"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more."""
 PER_WORKER = 3
 """Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""
 CONNECT = "30s"
@@ -94,7 +94,9 @@ class OnDask:
 def on_scheduler(address: str) -> Iterator[OnDask]:
     """Give an executor on a cluster that runs already. Raises FleetError where nobody answers."""
     try:
-        client = distributed.Client(address, timeout=CONNECT, set_as_default=False)
+        client = distributed.Client(  # type: ignore[no-untyped-call]
+            address, timeout=CONNECT, set_as_default=False
+        )
     except (OSError, ValueError, TimeoutError) as error:
         expected = "expected the address of a Dask scheduler that runs"
         raise FleetError(f"--scheduler {address}: {error}, {expected}") from None
@@ -109,7 +111,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
     memory: bytes that each worker may have. dashboard: host and port, port 0 for any.
     """
     with dask.config.set(SETTINGS):
-        cluster = distributed.LocalCluster(
+        cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
@@ -118,7 +120,8 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
             dashboard_address=dashboard,
             silence_logs=logging.CRITICAL,
         )
-        with cluster, distributed.Client(cluster, set_as_default=False) as client:
+        client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
+        with cluster, client:
             yield OnDask(client), cluster.dashboard_link
 
 
