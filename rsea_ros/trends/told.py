@@ -18,7 +18,7 @@ from rsea_ros.trends.significance import scan_threshold
 _Z = 1.959964
 _POINTS = 200
 _SURE_SLOPE = 3.0
-"""|z| of the last piece's slope from which it is a trend: one in 370, of a series that is more than noise."""
+"""|z| of a slope from which it is a trend: one in 370, of a series that is more than noise."""
 
 
 def trend_of(series: Series, test: Tested, course: Course, q: float, settings: TrendSettings) -> Trend:
@@ -89,7 +89,7 @@ def _slope(course: Course) -> tuple[Interval, bool]:
     r, row = course.regression(), _slopes(course, course.t[-1])
     if np.any(row):
         slope = combined(r, row)
-        return slope, abs(slope.value) > _SURE_SLOPE / _Z * (slope.value - slope.low)
+        return slope, _is_sure(slope)
     start = max([k.index for k in course.terms], default=0)
     if len(course.t) - start < 3 or course.t[-1] <= course.t[start]:
         return Interval(0.0, -np.inf, np.inf), False
@@ -97,6 +97,10 @@ def _slope(course: Course) -> tuple[Interval, bool]:
     row = np.zeros(r.x.shape[1] + 1)
     row[-1] = 1.0
     return combined(longer.regression(), row), False
+
+
+def _is_sure(slope: Interval) -> bool:
+    return abs(slope.value) > _SURE_SLOPE / _Z * (slope.value - slope.low)
 
 
 def _detectable(course: Course, freedom: int, settings: TrendSettings) -> float:
@@ -121,8 +125,7 @@ def _changes(series: Series, course: Course, r: Regression, settings: TrendSetti
             size = combined(r, row).times(course.days.scale)
             changes.append(_change(series, course, "step", k.index, where, size))
             continue
-        slope = combined(r, _slopes(course, t[k.index]))
-        if slope.low > 0.0 or slope.high < 0.0:
+        if _is_sure(combined(r, _slopes(course, t[k.index]))):
             changes.append(_ramp(series, course, r, k.index, where, False))
     return changes
 
