@@ -33,24 +33,28 @@ def test_a_step_of_three_day_effects_is_found_at_its_date_with_its_size(seed):
 
 def test_the_intervals_of_a_steps_date_and_size_hold_the_truth_as_often_as_they_say():
     inside = []
-    for seed in range(60):
+    for seed in range(40):
         found = trend(seed, days=120, each=1, course=lambda joint, d: 0.03 * (d >= 50))
         change = found.changes[0]
         inside.append((
             day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0, change.size.low < 45.0 < change.size.high
         ))  # fmt: skip
-    assert np.all(np.mean(inside, axis=0) > 0.87)  # 95 % of 60, less three standard deviations
+    assert np.all(np.mean(inside, axis=0) > 0.84)  # 95 % of 40, less three standard deviations
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit(seed):
-    found = trend(seed, course=lambda joint, d: -0.1 * np.clip((d - 100) / 150, 0, 1))
-    (change,) = found.changes
-    assert found.state == "trending"
-    assert day(change.earliest_s) - 4.0 <= 100.0 <= day(change.latest_s) + 4.0
-    assert found.per_year.low < -0.1 / 150 * 365.25 * 1500.0 < found.per_year.high
-    low, high = (day(t) for t in found.to_limit_s[1:])
-    assert low - 5.0 <= 475.0 <= high + 5.0  # 25 % at 1 % in 15 days from day 100 on
+def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit():
+    inside = []
+    for seed in range(25):
+        found = trend(seed, days=200, each=1, course=lambda joint, d: -1e-3 * np.clip(d - 100, 0, None))
+        (change,) = found.changes
+        assert (found.state, change.kind) == ("trending", "ramp")
+        slope, limit = found.per_year, [day(t) for t in found.to_limit_s[1:]]
+        inside.append((
+            day(change.earliest_s) <= 100.0 <= day(change.latest_s),
+            slope.low < -1e-3 * 365.25 * 1500.0 < slope.high,
+            limit[0] < 100.0 + 250.0 < limit[1],  # 25 % at 0.1 % a day
+        ))  # fmt: skip
+    assert np.all(np.mean(inside, axis=0) > 0.82)  # 95 % of 25, less three standard deviations
 
 
 def test_wear_that_a_new_part_ends_is_two_changes():
