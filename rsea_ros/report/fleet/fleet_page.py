@@ -85,9 +85,14 @@ def _keys(found: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table)
         (f"{len(groups)} of {len(found.joints)}", "joints need a look"),
         (str(kinds.count("trend")), "trends that go on"),
         (str(kinds.count("cause")), "causes that appeared"),
-        (f"{done:,}".replace(",", " "), f"recordings used, of {len(recordings['joint'])}"),
+        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
         (str(untold), f"of {len(found.trends)} courses cannot be told"),
     ]
+
+
+def _grouped(number: int) -> str:
+    """Return a number with its thousands apart."""
+    return f"{number:,}".replace(",", " ")
 
 
 def _naming(found: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:

@@ -110,8 +110,10 @@ def doubt_of_date(alarm: Alarm) -> str:
     """Return between which dates it began, empty where that is not known."""
     if not math.isfinite(alarm.since_s):
         return ""
-    first, last = short_day(alarm.earliest_s), short_day(alarm.latest_s)
-    return first if first == last else f"{first} to {last}"
+    first, last = short_day(alarm.earliest_s).split(), short_day(alarm.latest_s).split()
+    while first and first[-1] == last[len(first) - 1]:
+        first.pop()
+    return f"{' '.join(first)} to {' '.join(last)}" if first else " ".join(last)
 
 
 def finding(trend: Trend) -> str:

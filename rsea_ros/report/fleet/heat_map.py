@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.report.figure import Figure, Json, axis, layout, numbers
 from rsea_ros.report.fleet.fleet_words import dates, name, percent
 from rsea_ros.report.fleet.marks import date_axis
-from rsea_ros.report.palette import AFTER, BEFORE, GRID, NOISE, QUIET, faint
+from rsea_ros.report.palette import AFTER, BEFORE, MEASURED, NOISE, QUIET, faint
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.weeks import Steps, binned
@@ -82,7 +82,7 @@ def _share(naming: Naming | None, steps: Steps) -> np.ndarray:
 
 
 def _shares(share: np.ndarray, x: list[str], names: list[str]) -> Json:
-    scale = [[0.0, faint(GRID, 0.5)], [1.0, BEFORE]]
+    scale = [[0.0, faint(MEASURED, 0.1)], [1.0, BEFORE]]
     map_ = _changes(share, x, names, 100.0)
     hover = "%{y}, week of %{x}: named in %{z:.0f} %<extra></extra>"
     return {**map_, "zmin": 0.0, "colorscale": scale, "hovertemplate": hover}
@@ -108,7 +108,7 @@ def _changes(change: np.ndarray, x: list[str], names: list[str], full: float) ->
         "z": [numbers(row) for row in change],
         "zmin": -full,
         "zmax": full,
-        "colorscale": [[0.0, AFTER], [0.5, faint(GRID, 0.5)], [1.0, BEFORE]],
+        "colorscale": [[0.0, AFTER], [0.5, faint(MEASURED, 0.1)], [1.0, BEFORE]],
         "xgap": 1,
         "ygap": 2,
         "hoverongaps": False,
