@@ -45,6 +45,7 @@ setup(
     package_data={
         "": ["py.typed"],
         "rsea_ros.report": ["*.css", "*.js"],
+        "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
     },
     data_files=[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made import DAY, START, cause, history, recordings
+from fleet_histories import DAY, START, cause, history, recordings
 
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.ranking import by_joint

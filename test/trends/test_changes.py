@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made import DAY, START, history, recordings
+from fleet_histories import DAY, START, history, recordings
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
@@ -36,9 +36,8 @@ def test_the_intervals_of_a_steps_date_and_size_hold_the_truth_as_often_as_they_
     for seed in range(40):
         found = trend(seed, days=120, each=1, course=lambda joint, d: 0.03 * (d >= 50))
         change = found.changes[0]
-        inside.append((
-            day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0, change.size.low < 45.0 < change.size.high
-        ))  # fmt: skip
+        in_dates = day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0
+        inside.append((in_dates, change.size.low < 45.0 < change.size.high))
     assert np.all(np.mean(inside, axis=0) > 0.84)  # 95 % of 40, less three standard deviations
 
 
