@@ -15,6 +15,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -113,13 +114,12 @@ def recorded(plan: Plan) -> tuple[Bench, Record]:
 
 
 def identified(plan: Plan) -> dict[str, Any]:
-    """Return what identify, which trusts the rig's structure, says of a plan's parameters."""
+    """Return what identify, which trusts the rig's structure, says of a plan; nothing if it refuses."""
     start = time.perf_counter()
-    try:
+    parameters = {}
+    with suppress(RseaError):
         fit = identify(recorded(plan)[1], RIG)
         parameters = {n: [p.value, *p.ci95, p.told_by_data] for n, p in fit.parameters.items() if n in TRUE}
-    except RseaError as error:
-        parameters = {"refused": str(error)}
     return {"name": plan.name, "identified": parameters, "seconds": round(time.perf_counter() - start, 1)}
 
 

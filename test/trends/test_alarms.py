@@ -50,6 +50,11 @@ def test_a_name_given_in_error_now_and_then_is_no_alarm():
     assert alarms(QUIET, names) == ()
 
 
+def test_two_days_that_name_it_are_not_enough():
+    names = recordings(JOINTS, 9, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "c" and d >= 7 else [])
+    assert alarms(QUIET, names) == ()
+
+
 def test_a_rival_that_is_not_likely_does_not_count():
     names = recordings(
         JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3, status="one_of", probability=0.3)]

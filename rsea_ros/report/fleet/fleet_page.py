@@ -104,7 +104,8 @@ def _untold(found: FleetTrends, links: Links) -> str:
     untold = untold_trends(found)
     if not untold:
         return section("Nothing was left untold", paragraph("Every joint's recordings tell every parameter."))
-    title = f"{len(untold)} courses cannot be told: not enough excitation"
+    number = "One course" if len(untold) == 1 else f"{len(untold)} courses"
+    title = f"{number} cannot be told: not enough excitation"
     return section(title, untold_table(untold, links))
 
 
