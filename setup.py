@@ -44,7 +44,7 @@ setup(
     zip_safe=False,
     package_data={
         "": ["py.typed"],
-        "rsea_ros.report": ["*.css", "*.js"],
+        "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
     },
     data_files=[
