@@ -1,7 +1,7 @@
 """Size of every kind of page, and what a browser says of it: python bench/pages.py [--chromium PROGRAM].
 
-The records are of the paper's length, 160 s at 280 Hz. Status 1 when a page without 3-D is larger than 1.5 MB, or
-a browser logs an error. About a minute and a half.
+The records are of the paper's length, 160 s at 280 Hz. Status 1 when a page without 3-D is larger than
+1.5 MB, or a browser logs an error of a page. Some minutes.
 """
 
 from __future__ import annotations
