@@ -71,7 +71,7 @@ class Desk:
             if not isinstance(words, dict) or words.get("do") not in self._acts:
                 raise ParameterError(f"message, expected do: one of {', '.join(self._acts)}")
             self._acts[words["do"]](page, words)
-        except (RseaError, ValueError, TypeError, OSError) as error:
+        except (RseaError, ValueError, OSError) as error:
             page.send(json.dumps({"error": " ".join(str(error).split())}))
 
     def state(self, more: Mapping[str, Any]) -> str:
@@ -96,13 +96,20 @@ class Desk:
             raise ParameterError("this page may only look; rsea watch --command lets it command")
         if reason := self.why_not():
             raise ParameterError(reason)
-        wish = Wish(_text(words, "kind"), float(words["amplitude"]), float(words["frequency"]))
+        wish = Wish(_text(words, "kind"), _number(words, "amplitude"), _number(words, "frequency"))
         if not self._commander.hold(page, wish, time.monotonic()):
             raise ParameterError("another page holds the command")
 
     def _release(self, page: Page) -> None:
         if self._commander is not None:
             self._commander.release(page)
+
+
+def _number(words: Mapping[str, Any], name: str) -> float:
+    value = words.get(name)
+    if not isinstance(value, int | float):
+        raise ParameterError(f"{name} = {value!r}, expected a number")
+    return float(value)
 
 
 def _text(words: Mapping[str, Any], name: str) -> str:

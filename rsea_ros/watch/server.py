@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,6 @@ from typing import Any
 
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop, PeriodicCallback
-from tornado.netutil import bind_sockets
 from tornado.web import Application
 
 from rsea_ros.errors import RseaError
@@ -43,11 +43,8 @@ class Server:
     ) -> None:
         self._source, self._runs = source, runs
         self.desk = Desk(commander, runs)
-        try:
-            self._sockets = bind_sockets(port, host)
-        except OSError as error:
-            raise RseaError(f"page on {host}, port {port}: {error.strerror or error}") from None
-        self.port: int = self._sockets[0].getsockname()[1]
+        self._socket = _listening(host, port)
+        self.port: int = self._socket.getsockname()[1]
         self.access = Access(f"rsea_watch_{self.port}")  # a cookie belongs to a host, not to a port
         self.addresses: Sequence[str] = addresses(host, self.port, self.access.token)
         self.error: Exception | None = None
@@ -66,8 +63,7 @@ class Server:
         if self._loop is not None and self.thread.is_alive():
             self._loop.add_callback(self._loop.stop)
             self.thread.join()
-        for each in self._sockets:
-            each.close()
+        self._socket.close()
         self._runs.close()
 
     def running(self) -> bool:
@@ -82,7 +78,7 @@ class Server:
             self._loop = IOLoop.current()
             web = Application(routes(self.access, self.desk, self._runs), **_SETTINGS)
             http = HTTPServer(web, max_body_size=_LARGEST, max_header_size=_LARGEST)
-            http.add_sockets(self._sockets)
+            http.add_socket(self._socket)
             PeriodicCallback(self._tick, 1e3 * FRAME).start()
             self._loop.add_callback(self._ready.set)
             self._loop.start()
@@ -101,3 +97,14 @@ class Server:
         if now >= self._state_due:
             self._state_due, state = now + STATE, self.desk.state(self._source.state())
         self.desk.send(frame(self._source.take(), self._source.flag), state)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens. Raises RseaError where it cannot."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        made = socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise RseaError(f"page on {host}, port {port}: {error.strerror or error}") from None
+    made.setblocking(False)
+    return made

@@ -80,8 +80,8 @@ class Browser:
         return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
 
     def until(self, expression, seconds=WAIT):
-        """Wait until an expression is true in the page, and return it."""
-        return _awaited(lambda: self.value(expression), seconds, expression)
+        """Wait until an expression is true in the page."""
+        return _awaited(lambda: self.value(f"Boolean({expression})"), seconds, expression)
 
     def picture(self, path, dark=False):
         """Write the whole page as PNG."""
