@@ -49,8 +49,8 @@ class Watch:
             self._server.desk.why_not = lambda: self._command.why_not if self._command is not None else ""
         self._health = Health(node, self._report, values["rig"])
         self._server.start()
-        for address in self._server.addresses:
-            node.get_logger().info(f"open {address}")
+        for address in self._server.addresses:  # not to the log: it has the token
+            sys.stderr.write(f"open {address}\n")
 
     def finished(self) -> bool:
         """Run until stopped."""
