@@ -23,7 +23,7 @@ TABLE = (
     Code("RSEA_DELAY", "commands take effect later, or sooner, than they did", "change, s"),
     Code("RSEA_FT_GAIN", "calibration of the F/T sensor changed", "change of the gain, 1"),
     Code("RSEA_FT_BIAS", "zero of the F/T sensor moved", "change, N m"),
-    Code("RSEA_TORQUE_CONSTANT", "the motor makes more or less torque for its current", "change of the gain, 1"),
+    Code("RSEA_TORQUE_CONSTANT", "the motor makes another torque of its current", "change of the gain, 1"),
     Code("RSEA_UNEXPLAINED", "the joint changed, and no single cause of this table explains it", ""),
     Code("RSEA_SENSOR_FROZEN", "a sensor repeats one value while something else moves", ""),
     Code("RSEA_SENSOR_MISSING", "a sensor that the rig lists has sent nothing for a second", ""),

@@ -2,8 +2,8 @@
 
     F <- D F D + A / phi,   r <- D r + c / phi,   change = (F + F_0)^-1 r
 
-F_0 is a weak prior, so what looks alike to the data gets a wide interval. D forgets a parameter only by as much
-as the look tells of it: what is not excited keeps what was known, and the look is said to hold it.
+F_0 is a weak prior, so what looks alike to the data gets a wide interval. D forgets a parameter only by as
+much as the look tells of it: what is not excited keeps what was known, and the look is said to hold it.
 Source: Cao, Schwartz, Automatica 36, 2000 (directional forgetting).
 """
 
@@ -20,7 +20,7 @@ from rsea_ros.signals import FloatArray
 MEMORY = 60.0
 """Looks that an estimate remembers."""
 WEAK = 3.0
-"""Standard deviations of the prior of a change, in the largest change that the sensitivities are meant for."""
+"""Standard deviation of the prior of a change, in steps of the sensitivities or smallest changes to alarm."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,8 @@ class Estimates:
         covariance = np.linalg.inv(self._information + self._prior)
         change, half = covariance @ self._score, SURE * np.sqrt(np.diag(covariance))
         return [
-            Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), bool(held))
-            for h, c, d, held in zip(self._hypotheses, change.tolist(), half.tolist(), self._held, strict=True)
+            Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
+            for h, c, d, held in zip(
+                self._hypotheses, change.tolist(), half.tolist(), self._held.tolist(), strict=True
+            )
         ]

@@ -10,8 +10,8 @@ from rsea_ros.health.sensors import Sensors
 
 @dataclass(frozen=True)
 class Finding:
-    """code: of codes.TABLE. name: parameter or channel. size, ci95: change against the model, in `unit`; nan where
-    the code has no size. since: s, by the joint's stamps. confidence: probability, 0 to 1.
+    """code: of codes.TABLE. name: parameter or channel. size, ci95: change against the model, in `unit`; nan
+    where the code has no size. since: s, by the joint's stamps. confidence: probability, 0 to 1.
     """
 
     code: str
@@ -23,11 +23,19 @@ class Finding:
     confidence: float
 
 
+UNEXPLAINED = "RSEA_UNEXPLAINED"
+
+
+def unexplained(since: float, share: float) -> Finding:
+    """Return the finding of a change without a name. share: of it that the best cause does not explain."""
+    return Finding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
+
+
 def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[Finding]:
     """Return what is wrong with the sensors themselves. jumps: of the stamps. late: samples left out."""
     found = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
     found += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
-    counts = {"values that are no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}
+    counts = {"no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}
     told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
     return [*found, _plain("RSEA_BAD_DATA", told, math.nan)] if told else found
 

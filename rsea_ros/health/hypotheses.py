@@ -1,4 +1,4 @@
-"""What may change in a joint: for each parameter the model with another value of it, and what counts as changed."""
+"""What may change in a joint: for each parameter the model with another value, and what counts as changed."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ EFFECT_DOUBT = 0.1
 class Hypothesis:
     """One parameter of the joint. All numbers in its unit.
 
-    value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an alarm.
-    step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference below which
-    the data cannot show it, as a delay within a sample.
+    value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
+    alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
+    below which the data cannot show it, as a delay within a sample.
     """
 
     code: str
@@ -87,7 +87,9 @@ def _doubt(rig: Rig, name: str) -> float:
     return 0.0 if name in rig.known else 0.5 * quantity.spread * quantity.value
 
 
-def _effect(rig: Rig, name: str, parameter: str, code: str, part: float, least: float, step: float) -> Hypothesis:
+def _effect(
+    rig: Rig, name: str, parameter: str, code: str, part: float, least: float, step: float
+) -> Hypothesis:
     """Return the hypothesis of an effect's parameter. part: of the model's value that is worth an alarm."""
     effect = effect_named(name)
     (which,) = (p for p in effect.parameters if p.name == parameter)

@@ -17,8 +17,8 @@ FEWEST = 20
 
 
 class Look(NamedTuple):
-    """Events by stamp: t (s, shape (n,)), kind (of observer/log.py), values (n, 2): position and motor torque, or
-    ft, or command. judged: where the innovations count, shape (n,).
+    """Events by stamp: t (s, shape (n,)), kind (of observer/log.py), values (n, 2): position and motor torque,
+    or ft, or command. judged: where the innovations count, shape (n,).
     """
 
     t: FloatArray
@@ -51,7 +51,9 @@ class Cutter:
         self._values = np.empty((0, 2))
         self._begin = -np.inf
 
-    def take(self, t: FloatArray, kind: IntArray, values: FloatArray, *, closer: bool = False) -> Iterator[Look]:
+    def take(
+        self, t: FloatArray, kind: IntArray, values: FloatArray, *, closer: bool = False
+    ) -> Iterator[Look]:
         """Take in events, sorted and later than those before; yield the looks that are complete.
 
         closer: one look follows the other without a pause.

@@ -48,9 +48,14 @@ class Sensors:
     _now: float = -math.inf
 
     def __post_init__(self) -> None:
-        self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
         self._noise = {n: max(s.noise, s.quantum, 1e-12) for n, s in self.rig.sensors.items()}
         self._noise["command"] = self._noise.get("motor_torque", self._noise.get("ft", 1e-3))
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was measured."""
+        self._begin, self._now, self._spans = math.inf, -math.inf, {}
+        self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
         """Take in events, sorted."""
@@ -111,7 +116,7 @@ class Sensors:
         return False
 
     def _needed(self, name: str, other: str) -> float:
-        """Return by how much another signal must move so that this one had to move too, in the other's unit."""
+        """Return by how much another signal must move so that this one had to, in the other's unit."""
         beside = MOVED * self._noise.get(other, 0.0)
         if name == "motor_torque" or other == "position":
             return beside

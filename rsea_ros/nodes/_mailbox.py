@@ -44,7 +44,7 @@ class Mailbox:
     ) -> None:  # fmt: skip
         """fields: name and index of each number; one that a message does not have is nan.
 
-        joint: name that a message with names must have; empty: any. keep: gets arrival (ns) and bytes of each.
+        joint: name that a message with names must have; empty: any. keep: gets arrival (ns) and bytes of all.
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
         self._keep = keep

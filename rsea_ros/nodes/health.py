@@ -1,4 +1,4 @@
-"""health: watches a joint while it works, says what changed, keeps the last minutes as a bag. It only listens."""
+"""health: watches a joint at work, says what changed, keeps the last minutes as a bag. It only listens."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 from rclpy.node import Node
 
 from rsea_ros.health.finding import Finding
-from rsea_ros.health.monitor import Monitor, Settings
+from rsea_ros.health.monitor import Monitor
+from rsea_ros.health.settings import Settings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
@@ -118,7 +119,8 @@ class HealthNode:
         for e in monitor.estimates():
             values[e.name] = f"{e.value:.5g} {e.unit}, 95 %: {e.ci95[0]:.5g} to {e.ci95[1]:.5g}"
             values[f"{e.name}.held"] = str(e.held).lower()
-        values |= {"looks": monitor.looks, "still_looks": monitor.still, "learning": str(monitor.learning).lower()}
+        values |= {"looks": monitor.looks, "still_looks": monitor.still}
+        values["learning"] = str(monitor.learning).lower()
         values |= {"refused_messages": inputs.refused, "unstamped": inputs.unstamped, **inputs.counts}
         if self._keeper.last is not None:
             values |= {"bag": self._keeper.last, "diagnose": self._command(self._keeper.last)}

@@ -1,7 +1,7 @@
-"""The same filter over a block of events at once: its whitened innovations, for whoever judges the model by them.
+"""The same filter over a block of events at once: its whitened innovations, to judge the model by.
 
-The events are in order, so there is no log of checkpoints as `Observer` keeps one (log.py), and nothing is said
-of the torques' doubt: a sample takes a quarter of the time.
+The events are in order, so there is no log of checkpoints as `Observer` keeps one (log.py), and nothing is
+said of the torques' doubt.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ from rsea_ros.signals import FloatArray, IntArray
 MEASURED, TORQUE = range(2)
 """Columns of innovations: position or ft, whichever the event brings; motor torque."""
 
+ALIKE = 1e-6
+"""s. Steps this near to each other are one, whose transition is known: a clock of double seconds makes them."""
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
@@ -38,7 +41,9 @@ def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
         out[k, 0] = out[k, 1] = np.nan
         if state.clock[STARTED] == 0.0:
             state.clock[STARTED], state.clock[NOW] = 1.0, t[k]
-        predict(model, state, t[k])
+        step = t[k] - state.clock[NOW]
+        near = abs(step - model.held[1]) < ALIKE
+        predict(model, state, state.clock[NOW] + model.held[1] if near else t[k])
         if kind[k] == COMMAND:
             state.clock[FORCED], state.clock[SINCE] = values[k, 0], t[k]
             continue
@@ -57,8 +62,8 @@ def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
 class BatchObserver:
     """An observer that is given blocks, each for itself. hold: how long a command stays in force, s.
 
-    duration: over which drifts of the rig come to their full size, s. Not to be confused with `Observer`, which
-    takes single samples in any order and gives torques.
+    duration: over which drifts of the rig come to their full size, s. Not to be confused with `Observer`,
+    which takes single samples in any order and gives torques.
     """
 
     def __init__(self, rig: Rig, noise: Noise, *, hold: float = math.inf, duration: float = 60.0) -> None:
@@ -67,10 +72,10 @@ class BatchObserver:
         self._start = self._state.whole.copy()
 
     def innovations(self, t: FloatArray, kind: IntArray, values: FloatArray) -> FloatArray:
-        """Return the innovations over their standard deviations at each event, shape (n, 2); nan for a command.
+        """Return the innovations over their standard deviations, shape (n, 2); nan at a command.
 
-        t: s, rising, shape (n,). kind: of log.py. values: as there, shape (n, 2). The filter begins with nothing
-        known, so the innovations of the first tenths of a second are those of its settling.
+        t: s, rising, shape (n,). kind: of log.py. values: as there, shape (n, 2). The filter begins with
+        nothing known, so the innovations of the first tenths of a second are those of its settling.
         """
         t = t + np.where(kind == COMMAND, self._delay, 0.0)
         order = np.lexsort((kind, t))
