@@ -10,7 +10,9 @@ from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay", "watch")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME

@@ -23,7 +23,9 @@ from rsea_ros.nodes._parameters import declare
 from rsea_ros.nodes._run import NAMESPACE
 from rsea_ros.nodes.record import TOPICS
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay", "watch")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "driver": {"autostart": True},
     "record": {"out": "bag"},
