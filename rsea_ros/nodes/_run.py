@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -50,10 +50,12 @@ def run_node(
     *,
     kind: type[Node] = Node,
     endless: bool = True,
+    more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
 ) -> int:
     """Run one node in this process and return the exit status.
 
     endless: to be stopped is the regular end; else it is an interruption (status 128 and the signal).
+    more: parameters besides those of the table, by what was given.
     Whatever the user can put right is one line in the log and status 2.
     """
     arguments = remove_ros_args(sys.argv)[1:]
@@ -66,7 +68,7 @@ def run_node(
         if effects := os.environ.get("RSEA_EFFECTS"):
             get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         node = _make(kind, name)
-        done = _work(node, make(node, declare(node, table)), stop)
+        done = _work(node, make(node, declare(node, table, more)), stop)
         return SUCCESS if done or endless else stop.status
     except Stopped as stopped:
         return stopped.status

@@ -63,6 +63,8 @@ class Process:
 def _text(value):
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
     return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
 
 
