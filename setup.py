@@ -46,6 +46,7 @@ setup(
         "": ["py.typed"],
         "rsea_ros.report": ["*.css", "*.js"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
+        "rsea_ros.nodes": ["*.xml"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable
@@ -60,6 +61,13 @@ class Guarded:
     def cycle(self, wanted: float, age: float | None) -> State | None:
         """Do a cycle of this device alone, see `together.cycle`."""
         return cycle([self], [(wanted, age)])[0]
+
+    def measures_deflection(self) -> bool:
+        """Tell whether a reading has the spring's deflection; False also where the device does not answer."""
+        try:
+            return math.isfinite(self.device.read().deflection)
+        except DeviceError:
+            return False
 
     def taken(self, kept: ExitStack) -> bool:
         """Take the device until `kept` ends, for a cycle of several; False where somebody else has it."""

@@ -51,7 +51,7 @@ class Bench:
 
     def __init__(
         self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False,
-        part: str = "",
+        part: str = "", deflects: bool = False,
     ) -> None:  # fmt: skip
         """names: values of NAMES, and of SPRING_FRAME where it may be.
 
@@ -60,6 +60,8 @@ class Bench:
         every_record: ft gets all that came since the last reading, not one.
 
         part: name of a bench beside others of the same node; its topics are under it.
+
+        deflects: whether readings have the spring's deflection, which is a topic then.
         """
         within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
@@ -84,8 +86,7 @@ class Bench:
             serialize_message(deflection_message(0, 0.0, joint, frames[True])),
             TYPES["deflection"], "position",
         )  # fmt: skip
-        self._deflection_topic = f"{within}deflection"
-        self._deflections: Any = None
+        self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
         self._wanted = Mailbox(
             node, JOINT_STATE, f"{within}torque_command", COMMAND, self.commands.refuse, ("effort", 0),
             joint=joint,
@@ -116,11 +117,6 @@ class Bench:
         if self._deflections is not None and math.isfinite(state.deflection):
             raw = self._deflection_writer.write(state.stamp + shift, (state.deflection,))
             self._deflections.publish(raw)
-
-    def follow(self, state: State) -> None:
-        """Offer `deflection` from the first reading on that has one; not in the cycle: it takes ms."""
-        if self._deflections is None and math.isfinite(state.deflection):
-            self._deflections = _publisher(self._node, JointState, self._deflection_topic)
 
     def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
         """Return the health of a bench that runs in a cycle; warnings are of what is new since the last.

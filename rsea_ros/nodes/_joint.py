@@ -53,7 +53,10 @@ class Joint:
         self.guarded.open(unprotected=values["allow_no_dead_host_protection"])
         self._ended = ""
         self._health.hardware = _hardware(values, self.guarded.device.health())
-        self.bench = Bench(self._node, values, strict=True, every_record=values["ft_all"], part=self.part)
+        self.bench = Bench(
+            self._node, values, strict=True, every_record=values["ft_all"], part=self.part,
+            deflects=self.guarded.measures_deflection(),
+        )  # fmt: skip
         self.drive = Drive(self.guarded, self.bench, anchor, values["rate"])
 
     def runs_in(self, cycle: Cycle) -> None:
@@ -78,7 +81,7 @@ class Joint:
         self.bench.publish(state, self.drive.anchor.shift)
 
     def follow(self) -> None:
-        """Log and publish what has changed: a fault, commands that were cut down, a second encoder."""
+        """Log and publish what has changed: a fault, commands that were cut down."""
         fault, limited = now = self.guarded.fault, self.guarded.guard.limited
         before, self._told = self._told, now
         if fault is not None and fault != before[0]:
@@ -89,8 +92,6 @@ class Joint:
             limits = self.guarded.guard.limits
             text = f"{limited} commands limited to {limits.torque:g} N m and {limits.slew:g} N m/s so far"
             self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
-        if self.bench is not None and self.guarded.state is not None:
-            self.bench.follow(self.guarded.state)
 
     def fail(self, error: Exception) -> None:
         """Log and keep what has ended it."""

@@ -25,7 +25,7 @@ from rsea_ros.nodes.record import TOPICS
 
 NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
-    "driver": {"autostart": True},
+    "driver": {"autostart": True, "rig": "sea_two_encoders"},
     "record": {"out": "bag"},
     "replay": {"bag": "every topic"},
 }

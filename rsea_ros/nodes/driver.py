@@ -218,8 +218,9 @@ class Driver(ManagedEntity):
 def main() -> int:
     """Run the node."""
     return run_node(
-        "driver", TABLE, Driver, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given)
-    )
+        "driver", TABLE, Driver, kind=LifecycleNode, more=lambda given: joint_table(TABLE, given),
+        waits_for_nobody=True,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -40,6 +40,11 @@ class Process:
         """What it has written so far, as lines."""
         return self._log.read_text().splitlines()
 
+    @property
+    def pid(self):
+        """Its number."""
+        return self._process.pid
+
     def running(self):
         """Whether it has not ended."""
         return self._process.poll() is None

@@ -48,8 +48,7 @@ def test_its_deflection_is_published_and_as_ft_which_says_so(drive, listener):
 
     def pushed():
         commands.publish(torque_command_message(0, 10.0))
-        program.finished()
-        return deflections and wrenches and wrenches[-1].wrench.torque.y < -15.0
+        return wrenches and wrenches[-1].wrench.torque.y < -15.0 and deflections[-1].position[0] > 0.0099
 
     listener.until(pushed)
     assert (deflections[-1].name, list(deflections[-1].position)) == (["joint"], [0.01])
