@@ -48,6 +48,7 @@ setup(
         "": ["py.typed"],
         "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
+        "rsea_ros.nodes": ["*.xml"],
         "rsea_ros.watch": ["page/*"],
     },
     data_files=[

@@ -27,7 +27,7 @@ NODES = (
     "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
 )  # fmt: skip
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
-    "driver": {"autostart": True},
+    "driver": {"autostart": True, "rig": "sea_two_encoders"},
     "record": {"out": "bag"},
     "replay": {"bag": "every topic"},
     "watch": {"port": 0},
