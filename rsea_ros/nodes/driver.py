@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, ManagedEntity, TransitionCallbackReturn
@@ -88,7 +89,8 @@ class Driver(ManagedEntity):
                 joint.open(anchor)
             except (RseaError, OSError) as error:
                 joint.fail(error)
-                self._let_go()
+                self._close_devices()
+                self._take_topics_away()
                 return TransitionCallbackReturn.FAILURE
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False, anchor=anchor)
         for joint in self.joints:
@@ -154,18 +156,27 @@ class Driver(ManagedEntity):
             usual_priority()
         if self._cycle is not None:
             self._node.get_logger().info("torque zero, device closed")
-        self._let_go()
+        self._take_topics_away()
 
-    def _let_go(self) -> None:
-        """Close what is open and take the topics away."""
-        self._close_devices()
+    def _take_topics_away(self) -> None:
         for joint in self.joints:
             joint.close()
         self._cycle = None
 
     def _close_devices(self) -> None:
+        """Close every device, whatever one raises; all are zero before one is closed, which takes long."""
+        with ExitStack() as kept:
+            for joint in self.joints:
+                kept.callback(joint.guarded.device.close)
+            if self._cycle is not None and len(self.joints) > 1:
+                self._zero()
+
+    def _zero(self) -> None:
         for joint in self.joints:
-            joint.guarded.device.close()
+            with suppress(DeviceError):
+                joint.guarded.device.write(0.0)
+        for bus in self._buses:
+            bus.send()
 
     def _disable(self, joints: Sequence[Joint]) -> None:
         """Zero torque, switched off, whatever one of them answers."""

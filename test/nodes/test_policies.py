@@ -54,13 +54,17 @@ SOCKETS = "FASTDDS_BUILTIN_TRANSPORTS"
     [
         (
             {_sockets.RANGE: "LOCALHOST"}, "rmw_fastrtps_cpp",
-            {_sockets.RANGE: "SYSTEM_DEFAULT", _sockets.PROFILES[0]: str(_sockets.FILE), SOCKETS: None},
+            {_sockets.RANGE: "SYSTEM_DEFAULT", _sockets.PROFILE: str(_sockets.FILE), SOCKETS: None},
         ),
         ({_sockets.RANGE: "SUBNET"}, "rmw_fastrtps_cpp", {_sockets.RANGE: "SUBNET", SOCKETS: "UDPv4"}),
         ({_sockets.RANGE: "LOCALHOST"}, "rmw_cyclonedds_cpp", {_sockets.RANGE: "LOCALHOST", SOCKETS: None}),
         (
-            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILES[0]: "mine.xml"}, "rmw_fastrtps_cpp",
-            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILES[0]: "mine.xml", _sockets.PROFILES[1]: None},
+            {_sockets.RANGE: "LOCALHOST", _sockets.USERS[1]: "mine.xml"}, "rmw_fastrtps_cpp",
+            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
+        ),
+        (
+            {_sockets.RANGE: "LOCALHOST", "ROS_DISTRO": "iron"}, "rmw_fastrtps_cpp",
+            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
         ),
     ],
 )  # fmt: skip
@@ -68,7 +72,7 @@ def test_a_node_with_torque_in_hand_publishes_by_sockets_and_stays_on_this_machi
     monkeypatch, given, middleware, expected
 ):
     """The range as the profile says it is this machine's, and only Fast DDS reads the profile."""
-    for name in (_sockets.RANGE, SOCKETS, *_sockets.PROFILES):
+    for name in (_sockets.RANGE, SOCKETS, "ROS_DISTRO", *_sockets.USERS):
         monkeypatch.setenv(name, given.get(name, ""))
         if name not in given:
             monkeypatch.delenv(name)
