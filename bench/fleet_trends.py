@@ -207,7 +207,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         "--values", choices=("parameters", "identified"), default="parameters",
-        help="the rig's values beside the causes of a diagnosis, or those of a fit without causes (%(default)s)",
+        help="the rig's values beside a diagnosis's causes, or those of a fit without causes (%(default)s)",
     )  # fmt: skip
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
@@ -218,7 +218,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             done[seed] = outcome(seed, args.values)
             with args.log.open("a") as file:
                 file.write(json.dumps(done[seed]) + "\n")
-    print(f"simulated: {args.values} and causes drawn from a played sample; {len(done)} of {args.seeds} fleets")
+    drawn = f"{args.values} and causes drawn from a played sample"
+    print(f"simulated: {drawn}; {len(done)} of {args.seeds} fleets")
     print("\n".join(table([done[s] for s in sorted(done)])))
     return 0
 

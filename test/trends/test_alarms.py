@@ -51,7 +51,8 @@ def test_a_name_given_in_error_now_and_then_is_no_alarm():
 
 
 def test_two_days_that_name_it_are_not_enough():
-    names = recordings(JOINTS, 9, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "c" and d >= 7 else [])
+    found = [cause("backlash", 2e-3)]
+    names = recordings(JOINTS, 9, causes=lambda j, d: found if j == "c" and d >= 7 else [])
     assert alarms(QUIET, names) == ()
 
 
