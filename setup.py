@@ -10,7 +10,9 @@ from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME
@@ -44,8 +46,11 @@ setup(
     zip_safe=False,
     package_data={
         "": ["py.typed"],
-        "rsea_ros.report": ["*.css", "*.js"],
+        "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
+        "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
+        "rsea_ros.nodes": ["*.xml"],
+        "rsea_ros.watch": ["page/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

@@ -77,7 +77,7 @@ def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
 
 
 def _always(named: FloatArray, usual: float) -> float:
-    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 where neither is clear."""
+    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 if not clear."""
     share = float(np.mean(named))
     if share < _MOSTLY or usual > _RARELY:
         return 0.0

@@ -1,4 +1,4 @@
-"""Levels and slopes of a course with their intervals, the doubt of its dates included; relative units, days."""
+"""Levels and slopes of a course, the doubt of its dates in their intervals; relative units, days."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Quantity = Callable[[Course], Interval]
 
 @dataclass(frozen=True)
 class Dated:
-    """A course, the days on which each of its terms may begin, and it with each term at both ends of these."""
+    """A course, the days on which its terms may begin, and it with each term at both ends of these."""
 
     course: Course
     ranges: tuple[tuple[int, int], ...]
@@ -78,7 +78,7 @@ def slope_row(course: Course, last: int) -> FloatArray:
 
 
 def slope_after(last: int) -> Quantity:
-    """Return the quantity that is the slope, per day, after the ramps up to a term's place; -1: before all."""
+    """Return the quantity that is the slope, per day, after the ramps up to a place; -1: before all."""
     return lambda course: combined(course.regression(), slope_row(course, last))
 
 
@@ -94,7 +94,7 @@ def step_size(i: int) -> Quantity:
 
 
 def ramp_size(last: int) -> Quantity:
-    """Return the quantity that is what a ramp adds up to until the next one, or the end; -1: the first slope."""
+    """Return the quantity that is what a ramp adds until the next one, or the end; -1: the first slope."""
 
     def size(course: Course) -> Interval:
         begin = course.t[course.terms[last].index] if last >= 0 else 0.0

@@ -53,7 +53,7 @@ def described(test: Tested, settings: TrendSettings) -> Course:
 
 
 def _at_level(course: Course) -> Days:
-    """Return the days with their warmth in proportion to the level: a kelvin makes a share of what is there."""
+    """Return the days with their warmth in proportion to the level: a kelvin makes a share of that."""
     days = course.days
     if days.warmth is None:
         return days

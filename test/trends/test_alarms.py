@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made import DAY, START, cause, history, recordings
+from fleet_histories import DAY, START, cause, history, recordings
 
 from rsea_ros.trends import alarms, fleet_trends
 from rsea_ros.trends.ranking import by_joint
@@ -47,6 +47,12 @@ def test_a_cause_of_one_joint_from_the_first_recording_on_is_one():
 def test_a_name_given_in_error_now_and_then_is_no_alarm():
     wrong = draws(2, 0.03)
     names = recordings(JOINTS, 250, causes=lambda j, d: [cause("backlash", 2e-3)] if wrong(j, d) else [])
+    assert alarms(QUIET, names) == ()
+
+
+def test_two_days_that_name_it_are_not_enough():
+    found = [cause("backlash", 2e-3)]
+    names = recordings(JOINTS, 9, causes=lambda j, d: found if j == "c" and d >= 7 else [])
     assert alarms(QUIET, names) == ()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from made import DAY, START, history, recordings
+from fleet_histories import DAY, START, history, recordings
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.trends import alarms, fleet_trends
@@ -36,15 +36,14 @@ def test_the_intervals_of_a_steps_date_and_size_hold_the_truth_as_often_as_they_
     for seed in range(40):
         found = trend(seed, days=120, each=1, course=lambda joint, d: 0.03 * (d >= 50))
         change = found.changes[0]
-        inside.append((
-            day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0, change.size.low < 45.0 < change.size.high
-        ))  # fmt: skip
+        in_dates = day(change.earliest_s) <= 50.0 <= day(change.latest_s) + 1.0
+        inside.append((in_dates, change.size.low < 45.0 < change.size.high))
     assert np.all(np.mean(inside, axis=0) > 0.84)  # 95 % of 40, less three standard deviations
 
 
 def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit():
     inside = []
-    for seed in range(25):
+    for seed in range(18):
         found = trend(seed, days=200, each=1, course=lambda joint, d: -1e-3 * np.clip(d - 100, 0, None))
         (change,) = found.changes
         assert (found.state, change.kind) == ("trending", "ramp")
@@ -54,7 +53,7 @@ def test_wear_is_a_trend_with_its_onset_its_slope_and_the_time_to_its_limit():
             slope.low < -1e-3 * 365.25 * 1500.0 < slope.high,
             limit[0] < 100.0 + 250.0 < limit[1],  # 25 % at 0.1 % a day
         ))  # fmt: skip
-    assert np.all(np.mean(inside, axis=0) > 0.82)  # 95 % of 25, less three standard deviations
+    assert np.all(np.mean(inside, axis=0) > 0.79)  # 95 % of 18, less three standard deviations
 
 
 def test_wear_that_a_new_part_ends_is_two_changes():
