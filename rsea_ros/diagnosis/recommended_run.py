@@ -82,7 +82,7 @@ def allowed_run(
 
 
 def _bounds(rig: Rig, like: Case, limits: RunLimits) -> Mapping[str, float]:
-    """Return the limits by what a simulation shows; where positions command a rig, its loop has the torque."""
+    """Return the limits by what a simulation shows; a rig that positions command bounds its own torque."""
     present: dict[str, float] = {
         n: float(np.nanmax(np.abs(y))) for n, y in like.measured.items() if n in ("position", "velocity")
     }
