@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import io
+import re
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rsea_ros.cli.main import main as rsea
 
 LARGEST = 1_500_000
+SOFTWARE_3D = re.compile(r"WebGL|Canvas2D")
+"""Warnings of a browser without a graphics processor."""
 RIG = "paper_high_impedance"
 FRICTION = "coulomb_friction:torque=3"
 CALLS = {
@@ -65,7 +68,9 @@ def opened(page: Path, browser: str) -> tuple[int, int, int]:
     """Return a page's bytes, the figures that a browser drew of it, and the lines of its console."""
     words = [browser, *FLAGS, f"--user-data-dir={page.parent / 'profile'}", page.as_uri()]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
-    return page.stat().st_size, done.stdout.count('data-drawn="yes"'), done.stderr.count("CONSOLE")
+    lines = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    console = [line for line in lines if not SOFTWARE_3D.search(line)]
+    return page.stat().st_size, done.stdout.count('data-drawn="yes"'), len(console)
 
 
 if __name__ == "__main__":
