@@ -119,7 +119,9 @@ FOREIGN = {
     "library": {"numpy", "plotly", "rich"},
     "stamps": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
-    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval", "pyarrow"} | MESSAGES,
+    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
+    | {"pyarrow"}
+    | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},
     "nodes": {"numpy", "rclpy", "rich", "yaml"},
     "cli": {"numpy", "rich", "rclpy", "yaml"},

@@ -18,7 +18,9 @@ import rclpy.qos
 from msg_adapters.ros import JointState
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay", "watch")
+EXECUTABLES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -71,7 +71,7 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     cause = accepted.problem.added[-1]
     if not isinstance(case.drive, Drive):
         return Experiment(
-            f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {}
+            f"{cause} and {names} do as well on these data; a run at another amplitude would show more", {}
         )
     present = float(np.max(np.abs(case.drive.command)))
     rig, most = _model(accepted), 0.0
@@ -88,7 +88,7 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     return Experiment(
         f"{cause} and {names} make the same motion under every excitation tried within the limits of rig and "
         f"driver (at most {most:.2f} times the noise apart): "
-        "only a value measured apart tells them, such as the spring stiffness by a known weight",
+        "only a separate measurement distinguishes them, such as the spring stiffness by a known weight",
         {},
     )
 

@@ -54,7 +54,7 @@ def experiment_section(experiment: Experiment) -> str:
     """Return what the next run would tell, its settings, and the command that plays it."""
     settings = words.sentence(say.excitation(experiment.excitation))
     run = paragraph(f"{settings}.") if settings else ""
-    title = "The run that would tell" if experiment.excitation else "What would tell"
+    title = "The run that would decide" if experiment.excitation else "What would decide"
     return section(title, paragraph(say.prose(experiment.why)), run, _command(experiment))
 
 
