@@ -218,6 +218,17 @@ def _json() -> list[bytes]:
     return [json.dumps(columns).encode(), json.dumps(records).encode()]
 
 
+def _structs() -> list[bytes]:
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    savemat(buffer, {"log": {**_columns(), "notes": "a bench"}, "spare": np.zeros(3)})
+    return [buffer.getvalue()]
+
+
+STRUCTS = """time: {column: log.t, unit: s}
+channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
+"""
 _CSV_AS = {
     "run.csv": CSV.encode(),
     "run.tsv": CSV.replace(",", "\t").encode(),
@@ -334,6 +345,7 @@ FORMATS = (
         damaged_yaml,
         _play_import("run.csv", True),
     ),
+    Format("structs.mat", _structs, damaged, _play_import("run.mat", False, STRUCTS)),
     Format("npz", _npz, damaged_npz, _play_import("run.npz", False, LISTED)),
     Format("parquet", _parquet, damaged_parquet, _play_import("run.parquet", False, LISTED)),
     Format("json.table", _json, damaged_json, _play_import("run.json", False, LISTED)),
