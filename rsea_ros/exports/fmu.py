@@ -27,6 +27,8 @@ def export_fmu(rig: Rig) -> Export:
         ) from None
     said = [Said("bench", "our own compiled step, co-simulation; the Python that plays it needs rsea_ros")]
     said += [Said(one.name, "in the step; its sizes are parameters") for one in rig.effects]
+    if rig.linear:
+        said.append(Said("linear rig", "m and N stand in the place of rad and N m"))
     unsaid = [Unsaid("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
     with tempfile.TemporaryDirectory() as folder:
         files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(said, unsaid))}

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.design.mjcf import model_element, text
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports.chain import check_rotary
 from rsea_ros.exports.coverage import CannotSay, Export, Said, Unsaid, coverage_lines
 from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
@@ -19,6 +20,7 @@ from rsea_ros.model.structure import structured
 
 def export_mjcf(rig: Rig) -> Export:
     """Return the model of a rig. Raises RigError for what no MJCF can be made of (see design/mjcf.py)."""
+    check_rotary(rig)
     root = model_element(structured(rig), play_of(rig))
     said: list[Said] = []
     unsaid: list[Unsaid] = []
