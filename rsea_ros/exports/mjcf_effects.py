@@ -171,7 +171,7 @@ def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:
         element = beside(root, f"hysteresis_{k}", "spring")
         element.set("stiffness", repr(float(slope * p["torque"] / p["angle"])))
         element.set("springyield", repr(float(edge * p["angle"])))
-    return f"{ELEMENTS} elasto-plastic springs in parallel (springyield): its large loops, small ones nearly"
+    return f"{ELEMENTS} elasto-plastic springs in parallel (springyield): its large loops; small ones are too stiff"
 
 
 def _torque_ripple(root: xml.Element, rig: Rig, p: Parameters) -> str:
