@@ -77,6 +77,19 @@ def test_several_effects_at_once_beside_free_ends():
 
 
 @MUJOCO
+@pytest.mark.parametrize("other", ["torque_constant_error", "current_loop_lag", "torque_saturation"])
+def test_what_cannot_stand_beside_another_is_left_out_whole(other):
+    """The actuator had become a dcmotor already when its gain was refused."""
+    both = load_rig("paper_high_impedance").with_effect("voltage_sag", limit=5.0).with_effect(other)
+    made = export_mjcf(both)
+    left = {one.name for one in made.unsaid} & {"voltage_sag", other}
+    said = both.with_effects(*(one for one in both.effects if one.name not in left))
+    given = command(0.25)
+    theirs = play_mujoco(made.content, both, given)
+    assert max(one.times_noise for one in differences(said, ours(said, given, RATE), theirs)) < 1.0
+
+
+@MUJOCO
 def test_a_model_that_runs_away_is_told_and_leaves_no_log(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     stiff = "lugre_friction:coulomb_torque=50,bristle_stiffness=1e8,bristle_damping=0"
