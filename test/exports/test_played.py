@@ -11,6 +11,7 @@ import pytest
 from rsea_ros.cli.main import main
 from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
+from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.mujoco_play import play_mujoco
 from rsea_ros.model.rig import EffectSetting
@@ -133,6 +134,15 @@ def test_a_missing_builder_of_fmus_is_one_line(tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("target", ["fmu", "mjcf"])
+def test_an_effect_that_the_rig_cannot_have_is_one_line(target, tmp_path, capsys):
+    arguments = ["--effect", "base_compliance", "--out", str(tmp_path / "a")]
+    assert main(["export", f"--{target}", "so101_joint", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert "effect base_compliance: rig so101_joint: spring_end is free, expected clamped" in error
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
     from fmpy import simulate_fmu
     from fmpy.validation import validate_fmu
@@ -156,6 +166,13 @@ def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
         theirs = {name: result[name] for name in ("ft", "position", "velocity")}
         found = differences(expected, ours(expected, given, RATE), theirs)
         assert max(one.times_noise for one in found) < 0.5
+
+
+def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
+    rig, given = load_rig("paper_high_impedance").with_effect("ft_drift", drift=3.0), command(0.25)
+    theirs = play_fmu(export_fmu(rig).content, rig, given)
+    (ft,) = (one for one in differences(rig, ours(rig, given, RATE), theirs) if one.channel == "ft")
+    assert ft.times_noise < 1.0
 
 
 @pytest.mark.parametrize("arguments", [[], ["--mjcf", "prototype_knee", "--urdf", "prototype_knee"]])
