@@ -1,4 +1,4 @@
-"""Stub recordings and the stub work on them, for measurements of the engine alone. Workers import this file."""
+"""Stub recordings and the stub work on them, to measure the engine alone; workers import it."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ def greedy(task: Task) -> Outcome:
     return stub_row(task)
 
 
-def played(store: Store, folder: Path, executor: Executor, work=slow, limits: Limits | None = None) -> Summary:
+def played(
+    store: Store, folder: Path, executor: Executor, work=slow, limits: Limits | None = None
+) -> Summary:
     """Run the engine over a folder."""
     held = bags_of([str(folder)], [KNEE])
     return Engine(store, executor, work, lambda step, share: None, limits).run(held)

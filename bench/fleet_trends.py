@@ -46,10 +46,10 @@ def look(made: Fleet, day: float) -> tuple[Alarm, ...]:
     return alarms(*parts)
 
 
-def outcome(seed: int) -> dict[str, Any]:
+def outcome(seed: int, values: str) -> dict[str, Any]:
     """Return what came of the fleet of a seed."""
     begun = time.perf_counter()
-    made = fleet(seed)
+    made = fleet(seed, values=values)
     first: dict[str, tuple[float, Alarm]] = {}
     last: tuple[Alarm, ...] = ()
     days = [*range(FIRST, 365, WEEK), 365]
@@ -205,16 +205,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--seconds", type=float, default=200.0, help="begin no fleet after so long (%(default)s)"
     )
+    parser.add_argument(
+        "--values", choices=("parameters", "identified"), default="parameters",
+        help="the rig's values beside a diagnosis's causes, or those of a fit without causes (%(default)s)",
+    )  # fmt: skip
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
     lines = args.log.read_text().splitlines() if args.log.exists() else []
     done = {o["seed"]: o for o in map(json.loads, lines)}
     for seed in range(args.seeds):
         if seed not in done and time.perf_counter() < end:
-            done[seed] = outcome(seed)
+            done[seed] = outcome(seed, args.values)
             with args.log.open("a") as file:
                 file.write(json.dumps(done[seed]) + "\n")
-    print(f"simulated: estimates and names drawn from a played sample; {len(done)} of {args.seeds} fleets")
+    drawn = f"{args.values} and causes drawn from a played sample"
+    print(f"simulated: {drawn}; {len(done)} of {args.seeds} fleets")
     print("\n".join(table([done[s] for s in sorted(done)])))
     return 0
 

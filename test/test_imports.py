@@ -69,7 +69,7 @@ OWN = {
 
 DIAGNOSIS = (
     {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
-    {"result", "score", "short_pieces", "initial_guess"},
+    {"result", "score", "short_pieces", "initial_guess", "recommended_run"},
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
     {"selection", "step_fits", "signature"},
     {"forward_step", "backward_elimination", "evaluation", "flexible"},

@@ -6,7 +6,8 @@
     both free                    world -housing_end- housing -gear- chassis -spring- distal
 
 The rotor is a link in the housing whose joint mimics the gear's with the multiplier n of train.py, so n is -N
-for a harmonic drive with its circular spline held. Where the spring is rigid, chassis and distal are one.
+for a harmonic drive with its circular spline held. Where the spring is rigid, chassis and distal are one. The
+axis is x, level: gravity is along -z.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass, field
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.structure import structured
 
 GRAVITY = 9.80665
 WORLD = "world"
@@ -24,7 +26,7 @@ WORLD = "world"
 
 @dataclass(frozen=True)
 class Link:
-    """A body about the axis. weight: m g l, N m, hanging along -y at angle `turned`, rad."""
+    """A body about the axis, x. weight: m g l, N m, hanging along -z but for the angle `turned`, rad."""
 
     name: str
     inertia: float
@@ -38,20 +40,20 @@ class Link:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Return where the mass is, m, x and y."""
+        """Return where the mass is, m, y and z."""
         arm = self.weight / (self.mass * GRAVITY) if self.weight else 0.0
-        return arm * math.sin(self.turned), -arm * math.cos(self.turned)
+        return arm * math.sin(self.turned), 0.0 - arm * math.cos(self.turned)
 
     @property
     def about_centre(self) -> float:
         """Return the inertia about the centre of mass, kg m^2."""
-        x, y = self.centre
-        return self.inertia - self.mass * (x * x + y * y)
+        y, z = self.centre
+        return self.inertia - self.mass * (y * y + z * z)
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint about z, or -z where it is turned round. mimics: another joint, `multiplier` times."""
+    """A joint about x, or -x where it is turned round. mimics: another joint, `multiplier` times."""
 
     name: str
     parent: str
@@ -73,9 +75,13 @@ class Chain:
 
 
 def chain_of(rig: Rig) -> Chain:
-    """Return the chain of a rig. Raises RigError for a lumped train, which no mechanism is."""
+    """Return the chain of a rig. Raises RigError for a lumped train, which no mechanism is.
+
+    Of the rig's effects it has the weight of gravity_error.
+    """
     if rig.train == "lumped":
         raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
+    rig = structured(rig.with_effects(*(one for one in rig.effects if one.name == "gravity_error")))
     spring = (0.0, 0.0) if rig.rigid_spring else (rig["spring.damping"], rig["spring.stiffness"])
     b_m = rig["rotor.reflected_damping"]
     moves = rig.end_is_free("housing_end"), rig.end_is_free("spring_end")

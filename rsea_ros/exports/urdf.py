@@ -72,6 +72,7 @@ _EFFECTS = {
     "coulomb_friction": "dynamics friction of the gear",
     "torque_saturation": "limit effort of the gear",
     "hard_stop": "limits of the spring's joint",
+    "gravity_error": "mass of the free end",
 }
 
 
@@ -96,8 +97,8 @@ def _parameters(rig: Rig, name: str) -> dict[str, float]:
 def _urdf_link(link: Link) -> xml.Element:
     element = xml.Element("link", name=link.name)
     inertial = xml.SubElement(element, "inertial")
-    x, y = link.centre
-    xml.SubElement(inertial, "origin", xyz=f"{x!r} {y!r} 0")
+    y, z = link.centre
+    xml.SubElement(inertial, "origin", xyz=f"0 {y!r} {z!r}")
     xml.SubElement(inertial, "mass", value=repr(link.mass))
     xml.SubElement(inertial, "inertia", _inertia(link))
     return element
@@ -113,7 +114,7 @@ def _urdf_joint(joint: Joint, rig: Rig) -> xml.Element:
     element = xml.Element("joint", name=joint.name, type="revolute" if stop else "continuous")
     xml.SubElement(element, "parent", link=joint.parent)
     xml.SubElement(element, "child", link=joint.child)
-    xml.SubElement(element, "axis", xyz="0 0 -1" if joint.is_turned else "0 0 1")
+    xml.SubElement(element, "axis", xyz="-1 0 0" if joint.is_turned else "1 0 0")
     xml.SubElement(element, "dynamics", damping=repr(joint.damping), friction=repr(_friction(joint, rig)))
     limits = {"lower": repr(-stop["angle"]), "upper": repr(stop["angle"])} if stop else {}
     effort = _effort(joint, rig)
@@ -136,8 +137,8 @@ def _effort(joint: Joint, rig: Rig) -> float:
 def _sdf_link(link: Link) -> xml.Element:
     element = xml.Element("link", name=link.name)
     inertial = xml.SubElement(element, "inertial")
-    x, y = link.centre
-    xml.SubElement(inertial, "pose").text = f"{x!r} {y!r} 0 0 0 0"
+    y, z = link.centre
+    xml.SubElement(inertial, "pose").text = f"0 {y!r} {z!r} 0 0 0"
     xml.SubElement(inertial, "mass").text = repr(link.mass)
     inertia = xml.SubElement(inertial, "inertia")
     for name, value in _inertia(link).items():
@@ -150,7 +151,7 @@ def _sdf_joint(joint: Joint, rig: Rig) -> xml.Element:
     xml.SubElement(element, "parent").text = joint.parent
     xml.SubElement(element, "child").text = joint.child
     axis = xml.SubElement(element, "axis")
-    xml.SubElement(axis, "xyz").text = "0 0 -1" if joint.is_turned else "0 0 1"
+    xml.SubElement(axis, "xyz").text = "-1 0 0" if joint.is_turned else "1 0 0"
     dynamics = {"damping": joint.damping, "friction": _friction(joint, rig)}
     if joint.stiffness:
         dynamics |= {"spring_reference": 0.0, "spring_stiffness": joint.stiffness}

@@ -18,6 +18,8 @@ ENDLESS = frozenset({"stiffness", "limit", "angle", "frequency"})
 """Parameters that grow without an end where the cause vanishes: no zero stands for its absence."""
 _LIKELY = 0.5
 """Probability from which a name counts that has rivals."""
+_BEST = 0.1
+"""Quantile of the recordings, by how small a size they show."""
 _LEAST_GAIN = 0.1
 """Gain below which a diagnosis names no cause (diagnosis/settings.py, acceptance.fall)."""
 
@@ -114,14 +116,16 @@ def _size(cause: Mapping[str, Any], parameter: str) -> tuple[float, float, float
 def _limit(size: FloatArray, gain: FloatArray) -> float:
     """Return the detection limit: the size that would have had the least gain that is named.
 
-    A cause of size s leaves a residual of sqrt(noise² + (k s)²) where it is not modelled; k from its gain.
+    A cause of size s leaves a residual of sqrt(noise² + (k s)²) where it is not modelled; k from its gain, in
+    the recordings that show it best: beside other causes a gain says less. No larger than what was named.
     """
     usable = np.isfinite(size) & (gain > _LEAST_GAIN) & (gain < 1.0)
     if not np.any(usable):
         return float("nan")
     of_noise = np.sqrt(1.0 / (1.0 - gain[usable]) ** 2 - 1.0)
     least = np.sqrt(1.0 / (1.0 - _LEAST_GAIN) ** 2 - 1.0)
-    return float(np.median(size[usable] / of_noise) * least)
+    smallest = np.quantile(size[usable] / of_noise, _BEST) * least
+    return float(min(smallest, np.quantile(size[usable], _BEST)))
 
 
 def temperatures(history: Table, recordings: Table) -> FloatArray:

@@ -6,12 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.series import Series
+from rsea_ros.trends.settings import DAY
 
 State = Literal["steady", "changed", "trending", "untold"]
 """untold: the recordings do not excite the parameter enough to say anything of its course."""
+
+
+_MANY, _LONG = 10, 28 * DAY
+"""Recordings, and s, that make silence."""
 
 
 class Interval(NamedTuple):
@@ -82,6 +89,15 @@ class Trend:
     limit: float = float("nan")
     to_limit_s: Interval | None = None
     reason: str = ""
+
+    @property
+    def silent_since_s(self) -> float:
+        """Return since when many recordings could not tell the parameter, POSIX s; NaN where they can."""
+        told = self.series.time_s[self.series.told]
+        last = float(told[-1]) if len(told) else -np.inf
+        later = self.series.time_s[self.series.time_s > last]
+        long = len(later) >= _MANY and float(later[-1]) - last > _LONG
+        return last if long and np.isfinite(last) else float("nan")
 
     @property
     def relative(self) -> float:

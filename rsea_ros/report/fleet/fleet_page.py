@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.report.fleet.fleet_tables import alarm_table, joint_table, untold_table
+from rsea_ros.report.fleet.fleet_tables import alarm_table, joint_table, untold_table, untold_trends
 from rsea_ros.report.fleet.fleet_words import about, day, name, percent
-from rsea_ros.report.fleet.heat_map import heat_map, naming_map
+from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.page import Block, bullets, folded, key_numbers, page, paragraph, section
@@ -40,14 +41,14 @@ def _blocks(
     ranked = [a for group in groups.values() for a in group]
     joints = worst_first(found.joints, alarms)
     yield key_numbers(_keys(found, groups, recordings))
-    figure = timeline(ranked, steps)
-    if figure is not None:
-        yield figure
+    yield f"<style>{(Path(__file__).parent / 'fleet.css').read_text(encoding='utf-8')}{shades()}</style>"
+    yield timeline(ranked, steps, links)
+    if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
     for parameter in _mapped(found):
-        yield heat_map(parameter, joints[:_ROWS], found, steps)
+        yield heat_map(parameter, joints[:_ROWS], found, steps, links)
     for kind, what in dict.fromkeys((a.kind, a.about) for a in found.appearances):
-        yield naming_map(what, kind, _naming(found, kind, what, joints)[:_ROWS], found, steps)
+        yield naming_map(what, kind, _naming(found, kind, what, joints)[:_ROWS], found, steps, links)
     yield section("All joints", joint_table(joints, found, groups, recordings, links))
     yield _untold(found, links)
     yield folded("How sure this is", bullets(_sure(found)))
@@ -79,15 +80,19 @@ def _headline(found: FleetTrends, alarms: Sequence[Alarm]) -> str:
 
 def _keys(found: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
     kinds = [a.kind for group in groups.values() for a in group]
-    untold = sum(t.state == "untold" for t in found.trends.values())
     done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
     return [
         (f"{len(groups)} of {len(found.joints)}", "joints need a look"),
-        (str(kinds.count("trend")), "trends that go on"),
+        (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
         (str(kinds.count("cause")), "causes that appeared"),
-        (f"{done:,}".replace(",", " "), f"recordings used, of {len(recordings['joint'])}"),
-        (str(untold), f"of {len(found.trends)} courses cannot be told"),
+        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (str(len(untold_trends(found))), f"of {len(found.trends)} courses cannot be told, or no more"),
     ]
+
+
+def _grouped(number: int) -> str:
+    """Return a number with its thousands apart."""
+    return f"{number:,}".replace(",", " ")
 
 
 def _naming(found: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:
@@ -96,11 +101,12 @@ def _naming(found: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> 
 
 
 def _untold(found: FleetTrends, links: Links) -> str:
-    untold = [t for t in found.trends.values() if t.state == "untold"]
+    untold = untold_trends(found)
     if not untold:
         return section("Nothing was left untold", paragraph("Every joint's recordings tell every parameter."))
-    title = f"{len(untold)} courses cannot be told: not enough excitation"
-    return section(title, untold_table(found, links))
+    number = "One course" if len(untold) == 1 else f"{len(untold)} courses"
+    title = f"{number} cannot be told: not enough excitation"
+    return section(title, untold_table(untold, links))
 
 
 def _sure(found: FleetTrends) -> list[str]:

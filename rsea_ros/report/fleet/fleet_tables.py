@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 
 from rsea_ros.report import words
-from rsea_ros.report.fleet.fleet_words import doubt_of_date, name, percent, sentence, value
+from rsea_ros.report.fleet.fleet_words import day, doubt_of_date, name, percent, sentence, value
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Trend
@@ -103,15 +104,22 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
     return rows_of(head, rows)
 
 
-def untold_table(found: FleetTrends, links: Links) -> str:
+def untold_trends(found: FleetTrends) -> list[Trend]:
+    """Return the courses of which nothing can be told, or nothing any more."""
+    return [t for t in found.trends.values() if t.state == "untold" or math.isfinite(t.silent_since_s)]
+
+
+def untold_table(untold: Sequence[Trend], links: Links) -> str:
     """Return what could not be told, and why."""
-    untold = [t for t in found.trends.values() if t.state == "untold"]
     head = [("Joint", False), ("Parameter", False), ("Why", False)]
-    rows = [
-        (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(words.sentence(t.reason)))
-        for t in untold
-    ]
+    rows = [(links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in untold]
     return rows_of(head, rows)
+
+
+def _why(trend: Trend) -> str:
+    if trend.state != "untold":
+        return f"Told until {day(trend.silent_since_s)}, by none of the recordings since"
+    return words.sentence(trend.reason)
 
 
 def _sure(confidence: float) -> str:

@@ -117,7 +117,7 @@ function recordings(list) {
         const act = acts.appendChild(element("button", job?.state === "running" ? `${verb} …` : verb, { type: "button", disabled: busy }));
         act.addEventListener("click", () => send({ do: "evaluate", recording: r.name, verb }));
       }
-      if (job?.words) item.append(element("p", job.words, { className: job.state === "failed" ? "" : "quiet" }));
+      if (job?.words) item.append(element("p", job.words.split("; next:")[0], { className: job.state === "failed" ? "" : "quiet" }));
     }
     return item;
   }));
