@@ -9,9 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.one_thread import one_thread_for_blas
-
-one_thread_for_blas()
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
 from independent.bench import Bench, record_command
