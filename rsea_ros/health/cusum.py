@@ -21,8 +21,8 @@ import numpy as np
 from rsea_ros.signals import FloatArray
 
 HOUR = 3600.0
-SHARE = 1.0 / 3.0
-"""Of the threshold that one look can add."""
+SHARE = 0.34
+"""Of the threshold that one look can add: three looks must agree."""
 SUSPECT = 0.25
 """Of the threshold, from which a sum is a suspicion."""
 
