@@ -63,6 +63,14 @@ def joint_state_message(
     return message
 
 
+def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
+    """Return an angle of the spring, rad, as `deflection` carries it."""
+    message = JointState(name=[joint], position=[float(angle)])
+    message.header.stamp = time_of(stamp_ns)
+    message.header.frame_id = frame
+    return message
+
+
 def wrench_message(
     stamp_ns: int, values: float | Sequence[float], axis: str = "torque.z", frame: str = "ft_sensor"
 ) -> WrenchStamped:
