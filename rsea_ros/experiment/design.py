@@ -1,0 +1,303 @@
+"""Design of a run: the shape and length that decide most for each second, within limits that are held in doubt.
+
+Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
+objective: gear friction and stops make none. Judged by simulation with the compiled step: separation.py says
+by what. The final amplitude is the largest at which margins.py holds all limits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
+from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.experiment.margins import Peaks, drawn, peaks, share_used
+from rsea_ros.experiment.separation import decided, separations, sharpened
+from rsea_ros.experiment.shape import Kind, Shape, command_of
+from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.solver import Map, serial
+from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
+from rsea_ros.signals import BoolArray, FloatArray
+
+TRIED: tuple[Shape, ...] = (
+    Shape("multisine", 1.0, low=0.5, high=8.0),
+    Shape("multisine", 1.0, low=0.5, high=40.0, tilt=0.5),
+    Shape("multisine", 1.0, low=2.0, high=25.0),
+    Shape("multisine", 1.0, low=10.0, high=100.0),
+    Shape("multisine", 0.5, bias=0.5, low=0.5, high=25.0),
+    Shape("multisine", 0.3, low=0.5, high=40.0, tilt=0.5),
+    Shape("chirp", 1.0, low=0.3, high=30.0),
+    Shape("chirp", 1.0, low=2.0, high=100.0),
+    Shape("steps", 1.0, hold=0.1),
+    Shape("steps", 1.0, hold=0.3),
+    Shape("holds", 1.0, hold=0.15),
+    Shape("steps", 0.3, bias=0.5, hold=0.2),
+)
+"""Where the search begins; amplitude and bias as shares of what the limits allow."""
+_PER_RUN = 1.0
+"""s that a run costs beside its excitation, in what it must decide."""
+_HOPE = 1.0
+"""S of a pair, over all shapes tried and in the longest run, below which no run is designed for it."""
+_INSIDE = 0.9
+"""Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
+_AT_LAST = 0.98
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a design may do. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
+
+    limits: Limits
+    rate: float = 280.0
+    shortest: float = 1.5
+    longest: float = 10.0
+    probe: float = 3.0
+    refine: int = 24
+    kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.shortest <= self.longest:
+            raise ParameterError(
+                f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
+            )
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A run to be played, and what is expected of it.
+
+    command: N m, at `rate` Hz, shape (n,). names, table: S_ij with i true and j its rival. hopeless: pairs that
+    no shape tried separates. decided: expected share that it decides; sharpened: nats by which it narrows the
+    parameters where one cause is left. expected, at_level: peaks of every quantity.
+    """
+
+    shape: Shape
+    duration: float
+    rate: float
+    command: FloatArray
+    names: tuple[str, ...]
+    table: FloatArray
+    hopeless: tuple[tuple[str, str], ...]
+    decided: float
+    sharpened: float
+    peaks: Peaks
+    tried: int = 0
+    energy: float = field(default=0.0)
+
+    @property
+    def worst(self) -> tuple[str, str, float] | None:
+        """The pair that it separates least of those that can be, with its S; None for a single cause."""
+        table = self.table.copy()
+        for pair in self.hopeless:
+            i, j = (self.names.index(n) for n in pair)
+            table[i, j] = table[j, i] = np.inf
+        if not np.isfinite(table).any():
+            return None
+        i, j = np.unravel_index(int(np.argmin(table)), table.shape)
+        return self.names[i], self.names[j], float(table[i, j])
+
+
+def check_commanded_by_torque(rig: Rig) -> None:
+    """Raise ParameterError for a rig that no torque commands."""
+    if rig.loop is not None:
+        raise ParameterError(
+            f"rig {rig.name}: positions command it, expected a rig that torques command: "
+            "limits of the torque do not bound a position loop"
+        )
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """Judges shapes for hypotheses. noise: by channel."""
+
+    hypotheses: Sequence[Hypothesis]
+    asked: Asked
+    noise: Mapping[str, float]
+    run: Map
+
+    def within(self, shape: Shape, duration: float) -> FloatArray:
+        """Return the command of a shape in shares, as large as the limits allow at the likeliest values."""
+        limits, rate = self.asked.limits, self.asked.rate
+        whole = abs(shape.bias) + shape.amplitude
+        size = limits.torque * min(1.0, 1.0 / whole) * _INSIDE
+        scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
+        command = command_of(scaled, duration, rate, limits.slew)
+        for _ in range(3):
+            share = max(self.share(h, command) for h in self.hypotheses)
+            if share <= _INSIDE * 1.05:
+                break
+            command = command * (_INSIDE / share if math.isfinite(share) else 0.5)
+        return command
+
+    def share(self, hypothesis: Hypothesis, command: FloatArray) -> float:
+        """Return the share of the limits that a command uses at the likeliest values."""
+        rate = self.asked.rate
+        rig = hypothesis.rig_at(hypothesis.if_there())
+        found = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
+        return used(found, self.asked.limits)
+
+    def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
+        """Return what each hypothesis predicts of a command."""
+        case = run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
+        return [response(h, case, self.run) for h in self.hypotheses]
+
+    @property
+    def probability(self) -> FloatArray:
+        """Of each hypothesis, shape (k,)."""
+        return np.array([h.probability for h in self.hypotheses])
+
+
+def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
+    """Return the noise of every channel that the bench measures."""
+    rig = hypotheses[0].problem.rig
+    listed = [n for n in CHANNELS if n in (measured or rig.sensors) and rig.measures(n)]
+    return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}
+
+
+def propose(
+    hypotheses: Sequence[Hypothesis],
+    asked: Asked,
+    measured: Mapping[str, float] | None = None,
+    run: Map = serial,
+    tell: Progress | None = None,
+) -> Proposal:
+    """Return the run that tells hypotheses apart best, or where one is left narrows its parameters most.
+
+    measured: noise by channel as records show it. Raises ParameterError where the rig has no torque command.
+    """
+    say = tell or (lambda step, share: None)
+    check_commanded_by_torque(hypotheses[0].problem.rig)
+    judge = _Judge(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
+    if len(hypotheses) == 1:
+        return _sharpest(judge, say)
+    shapes = [s for s in TRIED if s.kind in asked.kinds]
+    tables = []
+    for k, shape in enumerate(shapes):
+        say(f"trying {shape.kind}", 0.6 * k / len(shapes))
+        tables.append(separations(hypotheses, judge.responses(judge.within(shape, asked.probe))))
+    apart = _hopeless(tables, asked)
+    values = [max(_per_second(judge, t, apart, asked)) for t in tables]
+    best = int(np.argmax(values))
+    length = max(_per_second(judge, tables[best], apart, asked))[1]
+
+    def value(shape: Shape) -> float:
+        table = separations(hypotheses, judge.responses(judge.within(shape, length)))
+        return decided(table, judge.probability, apart)
+
+    shape, count = refined(shapes[best], value, asked, say)
+    return _final(judge, shape, length, apart, len(shapes) + count)
+
+
+def _hopeless(tables: Sequence[FloatArray], asked: Asked) -> BoolArray:
+    """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
+    best = np.max(tables, axis=0) * asked.longest / asked.probe
+    symmetric = np.maximum(best, best.T)
+    return np.asarray(symmetric < _HOPE) | np.eye(len(best), dtype=bool)
+
+
+def _per_second(judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
+    """Return what a shape decides a second, and the length, for several lengths of the run."""
+    lengths = np.geomspace(asked.shortest, asked.longest, 6)
+    scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
+    return [(share / (_PER_RUN + s), s) for share, s in scaled]
+
+
+def refined(
+    start: Shape, value: Callable[[Shape], float], asked: Asked, say: Progress
+) -> tuple[Shape, int]:
+    """Return the shape near `start` of the largest value, and how many were judged."""
+    names = {
+        "multisine": ("bias", "amplitude", "low", "high", "tilt"),
+        "chirp": ("bias", "amplitude", "low", "high"),
+        "steps": ("bias", "amplitude", "hold"),
+        "holds": ("bias", "amplitude", "hold"),
+    }[start.kind]
+    first = np.array([_inner(n, getattr(start, n)) for n in names])
+    seen: list[tuple[float, Shape]] = []
+
+    def loss(x: FloatArray) -> float:
+        shape = replace(start, **{n: _outer(n, float(v), asked) for n, v in zip(names, x, strict=True)})
+        shape = replace(shape, high=max(shape.high, 1.5 * shape.low))
+        seen.append((value(shape), shape))
+        say("refining", 0.6 + 0.35 * min(1.0, len(seen) / max(asked.refine, 1)))
+        return -seen[-1][0]
+
+    if asked.refine:
+        simplex = np.vstack([first, *(first + 0.25 * np.eye(len(first)))])
+        options = {"maxfev": asked.refine, "initial_simplex": simplex, "xatol": 0.02, "fatol": 2e-3}
+        minimize(loss, first, method="Nelder-Mead", options=options)
+    return (max(seen, key=lambda item: item[0])[1] if seen else start), len(seen)
+
+
+_LOGARITHMIC = ("low", "high", "hold")
+
+
+def _inner(name: str, value: float) -> float:
+    return math.log(value) if name in _LOGARITHMIC else value
+
+
+def _outer(name: str, x: float, asked: Asked) -> float:
+    """Return the value of a shape's number inside what makes sense for it."""
+    value = math.exp(min(x, 50.0)) if name in _LOGARITHMIC else x
+    low, high = {
+        "bias": (-0.8, 0.8),
+        "amplitude": (0.1, 1.0),
+        "low": (0.05, 0.2 * asked.rate),
+        "high": (1.0, 0.475 * asked.rate),
+        "tilt": (-0.5, 1.5),
+        "hold": (0.02, 2.0),
+    }[name]
+    return min(max(value, low), high)
+
+
+def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
+    """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
+    asked, hypotheses = judge.asked, judge.hypotheses
+    rigs = drawn(hypotheses)
+    command = judge.within(shape, length) / _INSIDE
+    found = peaks(command, asked.rate, rigs)
+    for _ in range(6):
+        share = share_used(found, asked.limits)
+        if share <= 1.0:
+            break
+        command = command * (_AT_LAST / share if math.isfinite(share) else 0.5)
+        found = peaks(command, asked.rate, rigs)
+    if share_used(found, asked.limits) > 1.0:
+        raise ParameterError(
+            f"no run of a {shape.kind} keeps the limits for all that the bench may be, expected wider limits: "
+            + ", ".join(f"{n} {v:.4g} of {asked.limits.stated()[n]:.4g}" for n, v in found.at_level.items()
+                        if n in asked.limits.stated())
+        )  # fmt: skip
+    responses = judge.responses(command, is_quick=False)
+    table = separations(hypotheses, responses)
+    names = tuple(h.name for h in hypotheses)
+    k = len(names)
+    pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
+    narrow = sharpened(hypotheses[0], responses[0])
+    energy = float(np.sum(command**2) / asked.rate)
+    share = decided(table, judge.probability, apart) if k > 1 else 1.0
+    return Proposal(
+        shape, len(command) / asked.rate, asked.rate, command, names, table, pairs, share, narrow, found, tried,
+        energy,
+    )  # fmt: skip
+
+
+def _sharpest(judge: _Judge, say: Progress) -> Proposal:
+    """Return the run that narrows the parameters of a single cause most (D-optimality)."""
+    asked = judge.asked
+    shapes = [s for s in TRIED if s.kind in asked.kinds]
+
+    def value(shape: Shape) -> float:
+        command = judge.within(shape, asked.probe)
+        return sharpened(judge.hypotheses[0], judge.responses(command)[0])
+
+    values = [value(shape) for shape in shapes]
+    shape, count = refined(shapes[int(np.argmax(values))], value, asked, say)
+    return _final(judge, shape, asked.longest, np.eye(1, dtype=bool), len(shapes) + count)

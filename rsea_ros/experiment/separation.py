@@ -1,0 +1,64 @@
+"""How far a run would drive two hypotheses apart after the wrong one has been fitted to it.
+
+    S_ij = min_d ||y_j + J_j d - y_i||^2 + d' L_j d
+
+y: predictions over the noise; J_j: derivatives of the rival's; L_j: its information so far. S_ij / 2 is the
+expected gain of the logarithm of the odds of i over j where i is true: T-optimality (Atkinson, Fedorov,
+Biometrika 62, 1975), averaged over which is true (Ponce de Leon, Atkinson, Biometrika 78, 1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rsea_ros.experiment.hypothesis import Hypothesis, Response
+from rsea_ros.signals import FloatArray
+
+ENOUGH = 12.0
+"""S that decides between two: odds of 400 to one, so that noise hardly ever turns them below 20."""
+
+
+def separation(true: Response, rival: Response, information: FloatArray) -> float:
+    """Return S of a rival, with what is known of its numbers."""
+    left = rival.predicted - true.if_there
+    if not np.isfinite(left).all():
+        return 0.0
+    slope = rival.slope.T @ left
+    reached = np.linalg.solve(rival.slope.T @ rival.slope + information, slope)
+    return max(float(left @ left - slope @ reached), 0.0)
+
+
+def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response]) -> FloatArray:
+    """Return S_ij where i is true and j its rival, shape (k, k); infinite on the diagonal."""
+    k = len(hypotheses)
+    table = np.full((k, k), np.inf)
+    for i in range(k):
+        for j in range(k):
+            if i != j:
+                table[i, j] = separation(responses[i], responses[j], hypotheses[j].information)
+    return table
+
+
+def nearest(table: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return for each hypothesis the S of its worst rival, shape (k,). apart: pairs that no run separates."""
+    return np.where(apart, np.inf, table).min(axis=1)
+
+
+def decided(table: FloatArray, probability: FloatArray, apart: FloatArray) -> float:
+    """Return the expected share that a run decides: over what may be true, 1 - exp(-S / ENOUGH) at the worst."""
+    worst = nearest(table, apart)
+    share = np.where(np.isfinite(worst), -np.expm1(-np.minimum(worst, 1e6) / ENOUGH), 0.0)
+    return float(probability @ share / max(probability.sum(), 1e-300))
+
+
+def sharpened(hypothesis: Hypothesis, seen: Response) -> float:
+    """Return the nats by which a run narrows a cause's own parameters, all others free (D-optimality).
+
+    Half the logarithm of the ratio of the determinants of their information after and before.
+    """
+    own = hypothesis.own or list(range(len(hypothesis.theta)))
+    before = np.linalg.inv(hypothesis.information)[np.ix_(own, own)]
+    after = np.linalg.inv(hypothesis.information + seen.slope.T @ seen.slope)[np.ix_(own, own)]
+    return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1])
