@@ -50,13 +50,22 @@ def advise(
     measured: noise by channel. Raises ParameterError as propose does.
     """
     proposal = propose(hypotheses, asked, measured, run, tell)
-    named = {h.name: h for h in hypotheses}
-    pairs = [(named[a], named[b]) for a, b in proposal.hopeless]
-    noise = noise_by_channel(hypotheses, measured or {})
-    proofs = [_proved(a, b, asked, noise, run) for a, b in pairs]
+    proofs = proofs_of(hypotheses, proposal.hopeless, asked, measured or {}, run)
     is_worth = len(hypotheses) == 1 or proposal.decided > _WORTH
-    kept = tuple(p for p in proofs if p is not None)
-    return Advice(tuple(hypotheses), asked, proposal if is_worth else None, kept)
+    return Advice(tuple(hypotheses), asked, proposal if is_worth else None, proofs)
+
+
+def proofs_of(
+    hypotheses: Sequence[Hypothesis],
+    pairs: Sequence[tuple[str, str]],
+    asked: Asked,
+    measured: Mapping[str, float],
+    run: Map = serial,
+) -> tuple[Proof, ...]:
+    """Return the proofs for pairs that no run seems to separate; without those where one yet may."""
+    named, noise = {h.name: h for h in hypotheses}, noise_by_channel(hypotheses, measured)
+    proofs = [_proved(named[a], named[b], asked, noise, run) for a, b in pairs]
+    return tuple(p for p in proofs if p is not None)
 
 
 def _proved(

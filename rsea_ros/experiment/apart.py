@@ -9,11 +9,12 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.signal_table import Port
-from rsea_ros.experiment.bound import Bound
+from rsea_ros.experiment.bound import HOPELESS, Bound
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 
 ACCURACY = 0.01
 """Relative, one sigma: what a value measured apart with care is worth."""
+MOST = 2
 _OF_VALUES: Mapping[str, str] = {
     "spring.stiffness": "the stiffness of the spring, by a known weight on a lever and the encoder",
     "rotor.reflected_inertia": "the inertia of the rotor, from its drawing or by a pendulum",
@@ -39,10 +40,10 @@ class Apart:
 
 
 def measurements_apart(proved: Bound, true: Hypothesis, rival: Hypothesis) -> list[Apart]:
-    """Return what to measure apart, what separates most first.
+    """Return what to measure apart: the sensors that show the causes themselves, then at most MOST values.
 
-    Values of the rig: by how far the rival has them from the true ones to do what those do, over ACCURACY; then
-    the sensors that show the causes themselves.
+    A value of the rig separates by how far the rival must have it from the true one to do what that does, over
+    ACCURACY; of those that separate, the easiest to measure come first.
     """
     ours = {u.name: u.outer(float(v)) for u, v in zip(true.problem.unknowns, true.if_there(), strict=True)}
     values = []
@@ -50,7 +51,9 @@ def measurements_apart(proved: Bound, true: Hypothesis, rival: Hypothesis) -> li
         if name in true.problem.rig.quantities and ours[name] > 0.0 and theirs > 0.0:
             away = np.log(theirs / ours[name]) / ACCURACY
             values.append(Apart(_OF_VALUES.get(name, f"{name}, by itself"), float(away**2)))
-    values = sorted((v for v in values if (v.separation or 0.0) > 2.0 * 6.0), key=lambda a: -(a.separation or 0.0))
+    easy = [*_OF_VALUES.values()]
+    values = [v for v in values if (v.separation or 0.0) > HOPELESS]
+    values.sort(key=lambda v: easy.index(v.what) if v.what in easy else len(easy))
     effects = [effect_named(h.name) for h in (true, rival) if h.name != NOTHING]
     sensors = dict.fromkeys(_OF_PORTS[e.port] for e in effects)
-    return [*values, *(Apart(what) for what in sensors)]
+    return [*(Apart(what) for what in sensors), *values[:MOST]]

@@ -18,9 +18,10 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used
 from rsea_ros.experiment.margins import Peaks, drawn, peaks, share_used
-from rsea_ros.experiment.separation import decided, separations, sharpened
+from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
 from rsea_ros.experiment.shape import Kind, Shape, command_of
 from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -43,11 +44,13 @@ TRIED: tuple[Shape, ...] = (
 """Where the search begins; amplitude and bias as shares of what the limits allow."""
 _PER_RUN = 1.0
 """s that a run costs beside its excitation, in what it must decide."""
-_HOPE = 1.0
-"""S of a pair, over all shapes tried and in the longest run, below which no run is designed for it."""
+_HOPE = 2.0
+"""S that a pair gets from the data of the longest run, whichever shape, below which none is designed for it."""
+_FAR = 1e4
+"""S of one linear step, above which a full fit of the rival would not bring it near nothing."""
 _INSIDE = 0.9
 """Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
-_AT_LAST = 0.98
+_SMALLEST, _BISECTIONS = 0.01, 8
 
 
 @dataclass(frozen=True)
@@ -145,8 +148,12 @@ class _Judge:
 
     def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
         """Return what each hypothesis predicts of a command."""
-        case = run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
+        case = self.case(command, is_quick=is_quick)
         return [response(h, case, self.run) for h in self.hypotheses]
+
+    def case(self, command: FloatArray, *, is_quick: bool) -> Case:
+        """Return a run of a command, not yet made."""
+        return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
 
     @property
     def probability(self) -> FloatArray:
@@ -182,7 +189,8 @@ def propose(
     for k, shape in enumerate(shapes):
         say(f"trying {shape.kind}", 0.6 * k / len(shapes))
         tables.append(separations(hypotheses, judge.responses(judge.within(shape, asked.probe))))
-    apart = _hopeless(tables, asked)
+    say("fitting rivals", 0.6)
+    apart = _hopeless(judge, shapes, tables)
     values = [max(_per_second(judge, t, apart, asked)) for t in tables]
     best = int(np.argmax(values))
     length = max(_per_second(judge, tables[best], apart, asked))[1]
@@ -195,11 +203,18 @@ def propose(
     return _final(judge, shape, length, apart, len(shapes) + count)
 
 
-def _hopeless(tables: Sequence[FloatArray], asked: Asked) -> BoolArray:
+def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
     """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
-    best = np.max(tables, axis=0) * asked.longest / asked.probe
-    symmetric = np.maximum(best, best.T)
-    return np.asarray(symmetric < _HOPE) | np.eye(len(best), dtype=bool)
+    stack, asked = np.array(tables), judge.asked
+    apart = np.eye(len(judge.hypotheses), dtype=bool)
+    for i, j in zip(*np.triu_indices(len(apart), 1), strict=True):
+        i, j = (i, j) if stack[:, i, j].max() > stack[:, j, i].max() else (j, i)
+        best = int(np.argmax(stack[:, i, j]))
+        if stack[best, i, j] < _FAR:
+            case = judge.case(judge.within(shapes[best], asked.probe), is_quick=True)
+            data = refitted(judge.hypotheses[i], judge.hypotheses[j], case, judge.run).data
+            apart[i, j] = apart[j, i] = data * asked.longest / asked.probe < _HOPE
+    return apart
 
 
 def _per_second(judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
@@ -260,23 +275,9 @@ def _outer(name: str, x: float, asked: Asked) -> float:
 def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = judge.asked, judge.hypotheses
-    rigs = drawn(hypotheses)
-    command = judge.within(shape, length) / _INSIDE
-    found = peaks(command, asked.rate, rigs)
-    for _ in range(6):
-        share = share_used(found, asked.limits)
-        if share <= 1.0:
-            break
-        command = command * (_AT_LAST / share if math.isfinite(share) else 0.5)
-        found = peaks(command, asked.rate, rigs)
-    if share_used(found, asked.limits) > 1.0:
-        raise ParameterError(
-            f"no run of a {shape.kind} keeps the limits for all that the bench may be, expected wider limits: "
-            + ", ".join(f"{n} {v:.4g} of {asked.limits.stated()[n]:.4g}" for n, v in found.at_level.items()
-                        if n in asked.limits.stated())
-        )  # fmt: skip
+    command, found = held(judge.within(shape, length) / _INSIDE, asked, drawn(hypotheses))
     responses = judge.responses(command, is_quick=False)
-    table = separations(hypotheses, responses)
+    table = _with_refits(judge, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)
     k = len(names)
     pairs = tuple((names[i], names[j]) for i in range(k) for j in range(i + 1, k) if apart[i, j])
@@ -287,6 +288,42 @@ def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: 
         shape, len(command) / asked.rate, asked.rate, command, names, table, pairs, share, narrow, found, tried,
         energy,
     )  # fmt: skip
+
+
+def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tuple[FloatArray, Peaks]:
+    """Return a command as large as the limits allow for all that the bench may be, and its peaks.
+
+    By bisection, for what a bench may do at its worst is no straight line of the command. Raises ParameterError
+    where not even a SMALLEST share of it keeps the limits.
+    """
+    low, high, best = math.log(_SMALLEST), 0.0, None
+    scale = high
+    for _ in range(_BISECTIONS):
+        found = peaks(math.exp(scale) * command, asked.rate, rigs)
+        if share_used(found, asked.limits) <= 1.0:
+            low, best = scale, (math.exp(scale) * command, found)
+        else:
+            high = scale
+        if best is not None and high - low < 0.05:
+            break
+        scale = 0.5 * (low + high)
+    if best is None:
+        raise ParameterError(
+            "no run keeps the limits for all that the bench may be, expected wider limits: at a share of "
+            f"{_SMALLEST:g} still "
+            + ", ".join(f"{n} {found.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.stated().items())
+        )
+    return best
+
+
+def _with_refits(judge: _Judge, command: FloatArray, table: FloatArray) -> FloatArray:
+    """Return S with a full fit of each hypothesis's nearest rival, where one linear step does not settle it."""
+    case, table = judge.case(command, is_quick=False), table.copy()
+    for i, row in enumerate(table):
+        j = int(np.argmin(row))
+        if row[j] < _FAR:
+            table[i, j] = refitted(judge.hypotheses[i], judge.hypotheses[j], case, judge.run).total
+    return table
 
 
 def _sharpest(judge: _Judge, say: Progress) -> Proposal:

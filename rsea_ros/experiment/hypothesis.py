@@ -72,10 +72,11 @@ class Hypothesis:
             return self.theta
         side = -1.0 if away < 0.0 else 1.0
         moved = self.theta + spread[:, main] / sd * side
-        result: FloatArray = np.clip(moved, *self._bounds())
+        result: FloatArray = np.clip(moved, *self.bounds())
         return result
 
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and highest coordinates, shape (n,) each."""
         unknowns = self.problem.unknowns
         low = [u.inner(max(u.low, 1e-300) if u.logarithmic else u.low) for u in unknowns]
         return np.array(low), np.array([u.inner(u.high) for u in unknowns])

@@ -17,7 +17,7 @@ from rsea_ros.identification.unknowns import Unknown, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.signals import FloatArray
 
-_SIZES = 1.5
+_SIZES = 1.0
 """One sigma of the size of a cause around none at all, in what its catalogue calls typical."""
 _SPAN = 0.25
 """One sigma of another parameter of a cause around its typical value, of the width of its bounds."""

@@ -10,10 +10,13 @@ Biometrika 62, 1975), averaged over which is true (Ponce de Leon, Atkinson, Biom
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, Response
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.solver import Map, jacobian, power, serial
 from rsea_ros.signals import FloatArray
 
 ENOUGH = 12.0
@@ -39,6 +42,49 @@ def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response])
             if i != j:
                 table[i, j] = separation(responses[i], responses[j], hypotheses[j].information)
     return table
+
+
+@dataclass(frozen=True)
+class Refit:
+    """A rival fitted to what another predicts. total: S; data: what of it the run shows, without what the rival
+    pays for leaving what is known of its numbers: that grows with the run's length, the rest does not.
+    """
+
+    total: float
+    data: float
+
+
+_REFITS = 5
+
+
+def refitted(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial) -> Refit:
+    """Return S of a rival after a full fit: where values have to go far, one linear step leaves too much.
+
+    case: the run, as run_case makes it. Gauss-Newton from the rival's values, steps halved where they fail.
+    """
+    seen = replace(true.problem, cases=(case,)).outputs(true.if_there())[0]
+    problem = replace(rival.problem, cases=(replace(case, measured=seen),))
+    low, high = rival.bounds()
+    theta, start, known = rival.theta, rival.theta, rival.information
+    residual = problem.residual(theta)
+    cost = power(residual)
+    for _ in range(_REFITS):
+        slope = jacobian(problem, theta, residual, run)
+        right = slope.T @ residual + known @ (theta - start)
+        step = -np.linalg.solve(slope.T @ slope + known, right)
+        for _ in range(4):
+            trial = np.clip(theta + step, low, high)
+            there = problem.residual(trial)
+            paid = power(there) + float((trial - start) @ known @ (trial - start))
+            if paid < cost:
+                break
+            step = 0.3 * step
+        else:
+            break
+        fallen, theta, residual, cost = cost - paid, trial, there, paid
+        if fallen < 0.01 * cost:
+            break
+    return Refit(cost, power(residual))
 
 
 def nearest(table: FloatArray, apart: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ possible until a run could have shown it. Every cause is as likely as any other 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ import numpy as np
 
 from rsea_ros.checks.faults import check
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.guess import Guess
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Case, Problem, case_from
@@ -26,6 +28,10 @@ from rsea_ros.identification.solver import Map, Solution, power, serial, solve
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, FloatArray, Record
 
+_SHARE = 0.15
+"""Of a cause's typical size, where fits begin too."""
+_LITTLE, _CLOSE = 4.0, 1.5
+"""A fit whose cost lies between these, above the least and times the least, is begun once more."""
 _GAIN = 1e-4
 _ITERATIONS = 12
 HOPELESS = 1e-6
@@ -118,7 +124,7 @@ def weigh(
     solutions = {NOTHING: nominal}
     for name in (n for n in names if n != NOTHING):
         solutions[name] = _fitted(name, problem_of(name, rig, cases), before, near, run)
-    return _weighed({n: s for n, s in solutions.items() if n in names or n == NOTHING}, cases)
+    return _weighed(_again(solutions, run), cases)
 
 
 def _fitted(
@@ -126,13 +132,41 @@ def _fitted(
 ) -> Solution:
     """Return a cause fitted: from the best of its guesses, and from where it was or from the rig's own fit."""
     guesses = effect_named(name).default_guesses if name != NOTHING else [{}]
-    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in guesses]
+    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in [*guesses, *_smaller(name, guesses)]]
     warm = before.fits[name].solution.theta if before is not None and name in before.fits else None
     rows = [vector_at(problem, {}, guess) for guess in named]
     others = [warm] if warm is not None else [vector_at(problem, near, guess) for guess in named] if near else []
     starts = [_best(problem, group, run) for group in (rows, others) if group]
     fits = [solve(problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run) for theta in starts]
     return min(fits, key=lambda s: s.cost)
+
+
+def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
+    """Return guesses of a cause with a share of its typical size: a minimum may lie nearer to none at all."""
+    if name == NOTHING:
+        return []
+    main = effect_named(name).main
+    if not math.isfinite(main.null) or (main.logarithmic and main.null <= 0.0):
+        return []
+    return [{**g, main.name: main.null + _SHARE * (g[main.name] - main.null)} for g in guesses]
+
+
+def _again(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
+    """Return the fits, those that left a little more than the best once more from the rig's values there.
+
+    A fit that began far from where the rig's own values end may stop in a place that is none.
+    """
+    best = min(fits.values(), key=lambda s: s.cost)
+    rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
+    again = dict(fits)
+    for name, fit in fits.items():
+        if best.cost + _LITTLE < fit.cost < _CLOSE * best.cost and name != NOTHING:
+            theta = np.array(
+                [rig.get(u.name, float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)]
+            )
+            other = solve(fit.problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run)
+            again[name] = min(fit, other, key=lambda s: s.cost)
+    return again
 
 
 def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:
