@@ -14,6 +14,7 @@ from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
 from rsea_ros.experiment.design import Asked, Proposal, propose
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.limits import used
 from rsea_ros.experiment.weighing import Weighing, weigh
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
@@ -48,7 +49,9 @@ class Budget:
 class Rules:
     """When the loop ends. confirmed: probability of a cause. possible: probability from which it is still one
     that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
-    worth: share that the next run must be expected to decide.
+    worth: share that the next run must be expected to decide. most: causes for which a run is designed. larger:
+    than all runs before, by which a run that decides nothing by itself is worth playing, while it uses less than
+    held_back of the limits at the likeliest values.
     """
 
     confirmed: float = 0.95
@@ -56,6 +59,8 @@ class Rules:
     floor: float = 1.3
     worth: float = 0.02
     most: int = 7
+    larger: float = 1.15
+    held_back: float = 0.8
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ class Campaign:
             except ParameterError as error:
                 rounds.append(Round(weighing, None))
                 return Outcome("failed", tuple(rounds), tuple(kept), why=str(error))
-            if proposal.decided < self.rules.worth:
+            if proposal.decided < self.rules.worth and not self._widens(proposal, rounds):
                 rounds.append(Round(weighing, None))
                 proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
                 return Outcome("undecidable", tuple(rounds), tuple(kept), proofs)
@@ -159,6 +164,13 @@ class Campaign:
         if weighing.left > self.rules.floor:
             return "unexplained"
         return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
+
+    def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+        """Tell whether doubt still holds a run back that is larger than all before: it takes of that doubt."""
+        before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
+        now = proposal.peaks
+        is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
+        return is_larger and used(now.expected, self.asked.limits) < self.rules.held_back
 
     def _spent(self, rounds: Sequence[Round]) -> End | None:
         played = [r.proposal for r in rounds if r.proposal is not None]

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used
-from rsea_ros.experiment.margins import Peaks, drawn, peaks, share_used
+from rsea_ros.experiment.margins import Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
 from rsea_ros.experiment.shape import Kind, Shape, command_of
 from rsea_ros.identification.identify import CHANNELS
@@ -275,7 +275,7 @@ def _outer(name: str, x: float, asked: Asked) -> float:
 def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = judge.asked, judge.hypotheses
-    command, found = held(judge.within(shape, length) / _INSIDE, asked, drawn(hypotheses))
+    command, found = held(judge.within(shape, length) / _INSIDE, asked, ends_of(hypotheses))
     responses = judge.responses(command, is_quick=False)
     table = _with_refits(judge, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)

@@ -62,4 +62,4 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
     ]
 
 
-LEVEL_WORDS = f"the upper limit that holds with a probability of {LEVEL:.5f} under every cause still possible"
+LEVEL_WORDS = f"the upper limit that holds with a probability of {LEVEL:.5f}, over the causes still possible and what is known of their numbers"
