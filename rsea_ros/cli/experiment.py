@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])
-    asked = Asked(limits_from(args.limits), args.rate, min(1.5, args.longest), args.longest, refine=args.refine)
+    asked = Asked(limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine)
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
         tell("reading", 0.0)
@@ -105,25 +106,18 @@ def _possible(models: Sequence[Model], args: argparse.Namespace) -> tuple[list[H
 
 def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
+    from rsea_ros.experiment.run_file import run_text
     from rsea_ros.report.experiment_json import advice_json
     from rsea_ros.report.experiment_page import advice_page
     from rsea_ros.report.provenance import provenance_of
     from rsea_ros.report.results import json_text, with_provenance
 
-    import sys
-
     source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])
     with NewFiles(place) as new:
         if advice.proposal is not None:
-            new.write(CSV, run_csv(advice.proposal.command, advice.proposal.rate))
+            new.write(CSV, run_text(advice.proposal.command, advice.proposal.rate))
         new.write(JSON, json_text(with_provenance(advice_json(advice), source)))
         return new.write(REPORT, advice_page(advice, source))
-
-
-def run_csv(command: Sequence[float], rate: float) -> str:
-    """Return a run as the excite node plays it: t in s, command in N m."""
-    rows = (f"{k / rate:.9g},{value:.9g}" for k, value in enumerate(command))
-    return "\n".join(["t,command", *rows, ""])
 
 
 def _print(advice: Advice, report: Path) -> None:

@@ -115,13 +115,14 @@ class Campaign:
     choose: Callable[..., Proposal] = propose
     """How the next run is chosen; a bench puts other policies here."""
 
-    def go(self, records: Sequence[Record]) -> Outcome:
-        """Go round from the records that there are until the loop ends."""
+    def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
+        """Go round from the records that there are until the loop ends. first: what they say, if it is known."""
         kept, rounds = list(records), []
         weighing: Weighing | None = None
         while True:
             try:
-                weighing = weigh(kept, self.rig, self.causes, weighing, self.run)
+                weighing = first or weigh(kept, self.rig, self.causes, weighing, self.run)
+                first = None
             except IdentificationError as error:
                 if not rounds:
                     raise

@@ -42,7 +42,7 @@ TRIED: tuple[Shape, ...] = (
     Shape("steps", 0.3, bias=0.5, hold=0.2),
 )
 """Where the search begins; amplitude and bias as shares of what the limits allow."""
-_PER_RUN = 1.0
+_PER_RUN = 0.5
 """s that a run costs beside its excitation, in what it must decide."""
 _HOPE = 2.0
 """S that a pair gets from the data of the longest run, whichever shape, below which none is designed for it."""
@@ -59,9 +59,9 @@ class Asked:
 
     limits: Limits
     rate: float = 280.0
-    shortest: float = 1.5
+    shortest: float = 0.5
     longest: float = 10.0
-    probe: float = 3.0
+    probe: float = 2.0
     refine: int = 24
     kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
 
@@ -76,7 +76,7 @@ class Asked:
 class Proposal:
     """A run to be played, and what is expected of it.
 
-    command: N m, at `rate` Hz, shape (n,). names, table: S_ij with i true and j its rival. hopeless: pairs that
+    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names, table: S_ij with i true and j its rival. hopeless: pairs that
     no shape tried separates. decided: expected share that it decides; sharpened: nats by which it narrows the
     parameters where one cause is left. expected, at_level: peaks of every quantity.
     """
@@ -219,7 +219,7 @@ def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArra
 
 def _per_second(judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
     """Return what a shape decides a second, and the length, for several lengths of the run."""
-    lengths = np.geomspace(asked.shortest, asked.longest, 6)
+    lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
@@ -285,7 +285,7 @@ def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: 
     energy = float(np.sum(command**2) / asked.rate)
     share = decided(table, judge.probability, apart) if k > 1 else 1.0
     return Proposal(
-        shape, len(command) / asked.rate, asked.rate, command, names, table, pairs, share, narrow, found, tried,
+        shape, length, asked.rate, command, names, table, pairs, share, narrow, found, tried,
         energy,
     )  # fmt: skip
 

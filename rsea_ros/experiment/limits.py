@@ -79,12 +79,12 @@ def limits_from(text: str) -> Limits:
 
 
 def of_command(command: FloatArray, rate: float) -> dict[str, float]:
-    """Return what a command asks by itself: its size, its slew from and to zero, its RMS. rate: Hz."""
+    """Return what a command asks by itself: its size, its slew, its RMS while it is not at rest. rate: Hz."""
     around = np.concatenate([[0.0], command, [0.0]])
     return {
         "torque": float(np.max(np.abs(command))),
         "slew": float(np.max(np.abs(np.diff(around)))) * rate,
-        "heat": float(np.sqrt(np.mean(command**2))),
+        "heat": float(np.sqrt(np.mean(np.trim_zeros(command) ** 2))) if command.any() else 0.0,
     }
 
 

@@ -20,7 +20,9 @@ from rsea_ros.signals import FloatArray
 
 Kind = Literal["multisine", "chirp", "steps", "holds"]
 RAMP = 0.25
-"""s, of the soft start and stop."""
+"""s, of the soft start and stop; of a short run a quarter of it."""
+LEAD, TAIL = 0.35, 0.25
+"""s at rest before and after: the bench settles, and what it still does is recorded."""
 _CLIPPINGS, _CLIP = 15, 0.85
 _STEPS = np.array([1.0, -0.4, 0.7, -1.0, 0.3, -0.7, 0.4, 0.0])
 _HOLDS = np.array([0.35, 0.7, 1.0, 0.7, 0.35, 0.0, -0.35, -0.7, -1.0, -0.7, -0.35, 0.0])
@@ -46,17 +48,24 @@ class Shape:
 
 
 def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf) -> FloatArray:
-    """Return the command of a shape, N m, shape (n,). duration: s, with ramps and rest. slew: N m/s.
+    """Return the command of a shape, N m, shape (n,), at rest for LEAD before it and TAIL after it.
 
-    Where its change from sample to sample would be faster than `slew`, a multisine or chirp gets smaller and a
-    step becomes a ramp.
+    duration: s, of what moves, its ramps and rest included. slew: N m/s. Where its change from sample to sample
+    would be faster, a multisine or chirp gets smaller and a step becomes a ramp.
     """
     n = round(duration * rate)
     moving = n - round(shape.rest * n)
     part = KINDS[shape.kind](shape, moving, rate)
-    whole = np.zeros(n)
-    whole[:moving] = ramped(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 2))
-    return whole if np.isinf(slew) else slowed(whole, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
+    run = ramped(shape.bias + shape.amplitude * part, min(round(RAMP * rate), moving // 4))
+    if np.isfinite(slew):
+        run = slowed(run, slew / rate, is_stepped=shape.kind in ("steps", "holds"))
+    return at_rest_around(np.concatenate([run, np.zeros(n - moving)]), rate)
+
+
+def at_rest_around(run: FloatArray, rate: float) -> FloatArray:
+    """Return a run with its rest before and after."""
+    whole: FloatArray = np.pad(run, (round(LEAD * rate), round(TAIL * rate)))
+    return whole
 
 
 def slowed(command: FloatArray, most: float, *, is_stepped: bool) -> FloatArray:

@@ -16,7 +16,7 @@ def plain_name(name: str) -> str:
 
 
 def shape_words(p: Proposal) -> str:
-    """Return what a run looks like: `multisine 0.5 to 42 Hz, 1.5 s, up to 18 N·m`."""
+    """Return what a run looks like: `multisine 0.5 to 42 Hz, 0.5 s, up to 18 N·m`."""
     s = p.shape
     band = f" {s.low:.2g} to {s.high:.3g} Hz" if s.kind in ("multisine", "chirp") else f" of {s.hold:.2g} s"
     bias = f" around {p.command.mean():.2g} N·m" if abs(s.bias) > 0.02 else ""
