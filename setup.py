@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = ("controller", "driver", "excite", "experiment", "identify", "model", "plant", "record", "replay")
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME

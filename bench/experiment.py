@@ -4,10 +4,10 @@
     summary LOG                the figures of those lines
     limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
 
-Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work at
-0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the run:
-designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of the
-designed run's power in 0.5 to 100 Hz. The search is restricted to the twelve effects in CAUSES.
+Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
+at 0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the
+run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of
+the designed run's power in 0.5 to 100 Hz. The search is restricted to the twelve effects in CAUSES.
 """
 
 from __future__ import annotations
@@ -176,7 +176,11 @@ def causes(log, first=0, count=60):
             line = one(k, pools)
             with log.open("a") as file:
                 file.write(json.dumps(line) + "\n")
-            short = {p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 1)) for p in ("designed", "chirp", "random") if p in line}
+            short = {
+                p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 1))
+                for p in ("designed", "chirp", "random")
+                if p in line
+            }
             print(k, line["cause"], line["severity"], short, f"{line['cpu']:.0f} s", flush=True)
 
 
@@ -189,7 +193,9 @@ def summary(log):
     proved = [x for x in alike if x["designed"]["end"] == "undecidable" and x["designed"]["cause"] in ALIKE]
     wrong = [x for x in lines if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] != x["cause"]]
     print(f"benches {len(lines)}, of which a run within the limits can tell {len(apart)}")
-    print(f"right unique cause {len(right)} of {len(apart)}; wrong name confirmed {len(wrong)} of {len(lines)}")
+    print(
+        f"right unique cause {len(right)} of {len(apart)}; wrong name confirmed {len(wrong)} of {len(lines)}"
+    )
     print(f"torque constant or F/T gain: {len(proved)} of {len(alike)} said to be undecidable, with proof")
     for x in apart:
         if x not in right:
@@ -221,7 +227,7 @@ def limits(runs):
     with worker_pools() as pools:
         designs = []
         for k in range(8):
-            _, bench, name, _, _ = hidden(k * 7)
+            _, bench, *_ = hidden(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
             possible = weigh([first], rig, CAUSES, run=pools.run).hypotheses(0.005)[:7]
             designs.append((possible, propose(possible, Asked(tight, RATE, refine=4), run=pools.run)))

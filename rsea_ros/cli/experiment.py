@@ -38,7 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--bag", nargs="+", action="extend", default=[], help="runs so far, by which the causes are weighed")
     add("--rate", type=positive, default=280.0, help="commands a second, Hz (default %(default)g)")
     add("--longest", type=positive, default=10.0, help="s of the run (default %(default)g)")
-    add("--refine", type=int, default=24, metavar="N", help="shapes judged beside the first (default %(default)s)")
+    add(
+        "--refine",
+        type=int,
+        default=24,
+        metavar="N",
+        help="shapes judged beside the first (default %(default)s)",
+    )
     add("--out", help=f"directory for {', '.join(FILES)} (default out/experiment, -2, …)")
     add_force(parser)
     add("--json", action="store_true", help="print experiment.json to stdout and nothing else")
@@ -54,7 +60,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])
-    asked = Asked(limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine)
+    asked = Asked(
+        limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine
+    )
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
         tell("reading", 0.0)

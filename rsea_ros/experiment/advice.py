@@ -1,4 +1,4 @@
-"""The answer to an offline question: the run to play, or the proof that none helps and what to measure instead."""
+"""The answer offline: the run to play, or the proof that none helps and what to measure instead."""
 
 from __future__ import annotations
 
@@ -68,11 +68,11 @@ def proofs_of(
     return tuple(p for p in proofs if p is not None)
 
 
-def _proved(
-    a: Hypothesis, b: Hypothesis, asked: Asked, noise: Mapping[str, float], run: Map
-) -> Proof | None:
+def _proved(a: Hypothesis, b: Hypothesis, asked: Asked, noise: Mapping[str, float], run: Map) -> Proof | None:
     """Return the proof that no run separates two, None where the bound leaves room for one."""
-    both = [(i, j, bound(i, j, asked.limits, LONGEST_OF_ALL, noise, asked.rate, run)) for i, j in ((a, b), (b, a))]
+    both = [
+        (i, j, bound(i, j, asked.limits, LONGEST_OF_ALL, noise, asked.rate, run)) for i, j in ((a, b), (b, a))
+    ]
     true, rival, larger = max(both, key=lambda item: item[2].most)
     if not larger.is_hopeless:
         return None

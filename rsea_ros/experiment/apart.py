@@ -33,7 +33,7 @@ _OF_PORTS: Mapping[Port, str] = {
 
 @dataclass(frozen=True)
 class Apart:
-    """A measurement apart. separation: S that it brings, where it was computed; None for one of another kind."""
+    """A measurement apart. separation: S that it brings, None where that was not computed."""
 
     what: str
     separation: float | None = None
@@ -42,8 +42,8 @@ class Apart:
 def measurements_apart(proved: Bound, true: Hypothesis, rival: Hypothesis) -> list[Apart]:
     """Return what to measure apart: the sensors that show the causes themselves, then at most MOST values.
 
-    A value of the rig separates by how far the rival must have it from the true one to do what that does, over
-    ACCURACY; of those that separate, the easiest to measure come first.
+    A value of the rig separates by how far the rival must have it from the true one to do what that does,
+    over ACCURACY; of those that separate, the easiest to measure come first.
     """
     ours = {u.name: u.outer(float(v)) for u, v in zip(true.problem.unknowns, true.if_there(), strict=True)}
     values = []

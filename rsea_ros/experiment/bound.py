@@ -1,10 +1,10 @@
 """The most that any run could separate two hypotheses: a proof where it is next to nothing.
 
-A run is a mixture in time of sines of the band, at several amplitudes and biases within the limits. If one set
-of the rival's values leaves, of every sine, at most a power p over the noise, no mixture of length T separates
-by more than S = p T, whatever its spectrum: the refit can only do better than these values. The values are
-sought to make the largest p smallest (Lawson's weights: each sine weighted by what was left of it). For linear
-rigs every spectrum is such a mixture; for others the bound speaks of the sines tried.
+A run is a mixture in time of sines of the band, at several amplitudes and biases within the limits. If one
+set of the rival's values leaves, of every sine, at most a power p over the noise, no mixture of length T
+separates by more than S = p T, whatever its spectrum: the refit can only do better than these values. The
+values are sought to make the largest p smallest (Lawson's weights: each sine weighted by what was left of
+it). For linear rigs every spectrum is such a mixture; for others the bound speaks of the sines tried.
 (Duality of the optimal design: Fedorov, Theory of Optimal Experiments, 1972.)
 """
 
@@ -36,8 +36,8 @@ HOPELESS = 6.0
 class Bound:
     """What no run exceeds. true, rival: names. most: S of a run of `duration` s, of any spectrum in the band.
 
-    frequency: Hz, rate: S a second at the worst level, shape (k,). values: the rival's, by name, SI, with which
-    it does what the true one does.
+    frequency: Hz, rate: S a second at the worst level, shape (k,). values: the rival's, by name, SI, with
+    which it does what the true one does.
     """
 
     true: str
@@ -83,7 +83,9 @@ def _sine(
     length = max(_LENGTH, 1.0 / frequency)
     t = np.arange(round(length * rate)) / rate
     amplitude, bias = level
-    command = limits.torque * ramped(bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate))
+    command = limits.torque * ramped(
+        bias + amplitude * np.sin(2.0 * np.pi * frequency * t), round(0.2 * rate)
+    )
     rig = true.rig_at(true.if_there())
     for _ in range(3):
         found = of_command(command, rate) | of_response(command, motion(rig, command, rate))
@@ -97,7 +99,7 @@ def _sine(
 def _imitated(
     problem: Problem, theta: FloatArray, duration: float, run: Map
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the values that imitate best, and the S a second that they leave of each case, shape (cases,)."""
+    """Return the values that imitate best, and the S a second that they leave, shape (cases,)."""
     weights = np.full(len(problem.cases), 1.0)
     best, least = theta, _powers(problem, theta)
     for _ in range(_LAWSON):

@@ -1,7 +1,7 @@
 """The loop: weigh, propose, play, weigh what all runs say together, until it is known or cannot be.
 
-Nothing here knows how a run is played: `play` gets a proposal and returns its record, None where a person said
-no. It raises DeviceError for a run that broke; nothing is learnt from such a run and the loop ends.
+Nothing here knows how a run is played: `play` gets a proposal and returns its record, None where a person
+said no. It raises DeviceError for a run that broke; nothing is learnt from such a run and the loop ends.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
 
-End = Literal["confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"]
-"""confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show. undecidable:
-no run tells more apart. spent: the budget is. declined: a person said no. broken: a run broke off. failed: the
-runs could not be weighed, or no run was possible within the limits.
+End = Literal[
+    "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"
+]
+"""confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show.
+undecidable: no run tells more apart. spent: the budget is. declined: a person said no. broken: a run broke
+off. failed: the runs could not be weighed, or no run was possible within the limits.
 """
 Play = Callable[[Proposal], Record | None]
 
@@ -49,9 +51,10 @@ class Budget:
 class Rules:
     """When the loop ends. confirmed: probability of a cause. possible: probability from which it is still one
     that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
-    worth: share that the next run must be expected to decide. most: causes for which a run is designed. larger:
-    than all runs before, by which a run that decides nothing by itself is worth playing, while it uses less than
-    held_back of the limits at the likeliest values.
+    by_data: S by which the data alone must prefer the best to every other of no more parameters, so that no
+    name rests on what is usual. worth: share that the next run must be expected to decide. most: causes for
+    which a run is designed. larger: than all runs before, by which a run that decides nothing by itself is
+    worth playing, while it uses less than held_back of the limits at the likeliest values.
     """
 
     confirmed: float = 0.95
@@ -59,6 +62,7 @@ class Rules:
     floor: float = 1.3
     worth: float = 0.02
     most: int = 7
+    by_data: float = 6.0
     larger: float = 1.15
     held_back: float = 0.8
 
@@ -116,7 +120,7 @@ class Campaign:
     """How the next run is chosen; a bench puts other policies here."""
 
     def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
-        """Go round from the records that there are until the loop ends. first: what they say, if it is known."""
+        """Go round from some records until the loop ends. first: what they say, where it is known."""
         kept, rounds = list(records), []
         weighing: Weighing | None = None
         while True:
@@ -162,12 +166,14 @@ class Campaign:
         """Return how the loop ends by what is known, None where it goes on."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None
+        if weighing.best_by_data < self.rules.by_data:
+            return None
         if weighing.left > self.rules.floor:
             return "unexplained"
         return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
 
     def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
-        """Tell whether doubt still holds a run back that is larger than all before: it takes of that doubt."""
+        """Tell whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
         before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
         now = proposal.peaks
         is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)

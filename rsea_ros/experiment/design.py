@@ -1,4 +1,5 @@
-"""Design of a run: the shape and length that decide most for each second, within limits that are held in doubt.
+"""Design of a run: the shape and length that decide most for each second, within limits that are held in
+doubt.
 
 Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops make none. Judged by simulation with the compiled step: separation.py says
@@ -45,7 +46,7 @@ TRIED: tuple[Shape, ...] = (
 _PER_RUN = 0.5
 """s that a run costs beside its excitation, in what it must decide."""
 _HOPE = 2.0
-"""S that a pair gets from the data of the longest run, whichever shape, below which none is designed for it."""
+"""S that the longest run's data give a pair at best, below which no run is designed for it."""
 _FAR = 1e4
 """S of one linear step, above which a full fit of the rival would not bring it near nothing."""
 _INSIDE = 0.9
@@ -76,9 +77,10 @@ class Asked:
 class Proposal:
     """A run to be played, and what is expected of it.
 
-    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names, table: S_ij with i true and j its rival. hopeless: pairs that
-    no shape tried separates. decided: expected share that it decides; sharpened: nats by which it narrows the
-    parameters where one cause is left. expected, at_level: peaks of every quantity.
+    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
+    table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
+    share that it decides; sharpened: nats by which it narrows the parameters where one cause is left.
+    expected, at_level: peaks of every quantity.
     """
 
     shape: Shape
@@ -191,7 +193,7 @@ def propose(
         tables.append(separations(hypotheses, judge.responses(judge.within(shape, asked.probe))))
     say("fitting rivals", 0.6)
     apart = _hopeless(judge, shapes, tables)
-    values = [max(_per_second(judge, t, apart, asked)) for t in tables]
+    values = [max(_per_second(judge, t, apart, asked))[0] for t in tables]
     best = int(np.argmax(values))
     length = max(_per_second(judge, tables[best], apart, asked))[1]
 
@@ -217,16 +219,16 @@ def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArra
     return apart
 
 
-def _per_second(judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
+def _per_second(
+    judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked
+) -> list[tuple[float, float]]:
     """Return what a shape decides a second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
 
-def refined(
-    start: Shape, value: Callable[[Shape], float], asked: Asked, say: Progress
-) -> tuple[Shape, int]:
+def refined(start: Shape, value: Callable[[Shape], float], asked: Asked, say: Progress) -> tuple[Shape, int]:
     """Return the shape near `start` of the largest value, and how many were judged."""
     names = {
         "multisine": ("bias", "amplitude", "low", "high", "tilt"),
@@ -293,8 +295,8 @@ def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: 
 def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tuple[FloatArray, Peaks]:
     """Return a command as large as the limits allow for all that the bench may be, and its peaks.
 
-    By bisection, for what a bench may do at its worst is no straight line of the command. Raises ParameterError
-    where not even a SMALLEST share of it keeps the limits.
+    By bisection, for what a bench may do at its worst is no straight line of the command. Raises
+    ParameterError where not even a SMALLEST share of it keeps the limits.
     """
     low, high, best = math.log(_SMALLEST), 0.0, None
     scale = high
@@ -317,7 +319,7 @@ def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tu
 
 
 def _with_refits(judge: _Judge, command: FloatArray, table: FloatArray) -> FloatArray:
-    """Return S with a full fit of each hypothesis's nearest rival, where one linear step does not settle it."""
+    """Return S with a full fit of each nearest rival, where one linear step does not settle it."""
     case, table = judge.case(command, is_quick=False), table.copy()
     for i, row in enumerate(table):
         j = int(np.argmin(row))

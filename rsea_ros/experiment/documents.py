@@ -14,13 +14,17 @@ from rsea_ros.model.rig import EffectSetting, Rig
 
 
 def models_of(document: Mapping[str, Any], extended: Rig) -> list[Model]:
-    """Return the cause of a diagnosis that is most in doubt and its alternatives, each beside all other causes.
+    """Return the cause of a diagnosis that is most in doubt and its alternatives, each beside all other
+    causes.
 
     extended: the diagnosis's model.yaml. Without a cause, the rig alone. Raises FieldError naming the field.
     """
     causes = [_cause(c, f"causes[{i}]", extended) for i, c in enumerate(_list(document, "causes"))]
     others = [
-        (text(a.get("instead_of", ""), f"alternatives[{i}].instead_of"), _cause(a, f"alternatives[{i}]", extended))
+        (
+            text(a.get("instead_of", ""), f"alternatives[{i}].instead_of"),
+            _cause(a, f"alternatives[{i}]", extended),
+        )
         for i, a in enumerate(_list(document, "alternatives"))
     ]
     if not causes:

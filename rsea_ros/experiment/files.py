@@ -21,7 +21,7 @@ _Z95 = 1.959964
 
 @dataclass(frozen=True)
 class Model:
-    """A cause in a rig. intervals: 95 %, of the cause's parameters by name, SI. probability: None if unsaid."""
+    """A cause in a rig. intervals: 95 %, of its parameters by name, SI. probability: None if unsaid."""
 
     name: str
     rig: Rig
@@ -76,7 +76,7 @@ def _clocks(problem: Problem, rig: Rig) -> tuple[Unknown, ...]:
 
 
 def _sd(unknown: Unknown, coordinate: float, rig: Rig, model: Model) -> float:
-    """Return one sigma of an unknown in the fit's coordinates: of its interval, else what is stated or SPREAD."""
+    """Return one sigma of an unknown in the fit's coordinates: of its interval, else as stated or SPREAD."""
     quantity = rig.quantities.get(unknown.name, Quantity(0.0))
     pair = quantity.ci95 or model.intervals.get(unknown.name)
     if pair is not None:

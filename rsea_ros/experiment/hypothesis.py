@@ -26,9 +26,9 @@ SEEN = ("ft", "deflection", "position", "velocity")
 class Hypothesis:
     """A cause that is still possible. See the module docstring.
 
-    problem: the rig with the cause, and what may move; its cases do not matter. theta: the most likely values in
-    the fit's coordinates, shape (n,). information: of prior and data so far, the inverse of the covariance,
-    shape (n, n). probability: beside the other hypotheses.
+    problem: the rig with the cause, and what may move; its cases do not matter. theta: the most likely
+    values in the fit's coordinates, shape (n,). information: of prior and data so far, the inverse of the
+    covariance, shape (n, n). probability: beside the other hypotheses.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Response:
 
 
 def noise_of(rig: Rig, channel: str, measured: Mapping[str, float] | None = None) -> float:
-    """Return the noise of a channel: as measured, else the rig's statement, with its quantum's q / sqrt(12)."""
+    """Return the noise of a channel: as measured, else as the rig states it with q / sqrt(12)."""
     if measured and channel in measured:
         return measured[channel]
     sensor = rig.sensors.get(channel, Sensor())

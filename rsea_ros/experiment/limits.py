@@ -31,11 +31,11 @@ OF_COMMAND = ("torque", "slew", "heat")
 class Limits:
     """The largest size of each quantity either way; infinite where nothing limits it.
 
-    torque: of the command. slew: its change from one command to the next, over their period. heat: its RMS over
-    the run, which the heat in a motor's winding follows (no rig states a thermal model, so this stands for its
-    temperature). deflection: of the spring. velocity, travel: of the gear output against the housing. power:
-    mechanical, command times velocity. ft: torque at the F/T sensor.
-    Raises ParameterError for a limit that is not above zero, and without one of the torque.
+    torque: of the command. slew: its change from one command to the next, over their period. heat: its RMS
+    over the run, which the heat in a motor's winding follows (no rig states a thermal model, so this stands
+    for its temperature). deflection: of the spring. velocity, travel: of the gear output against the
+    housing. power: mechanical, command times velocity. ft: torque at the F/T sensor. Raises ParameterError
+    for a limit that is not above zero, and without one of the torque.
     """
 
     torque: float
@@ -53,7 +53,9 @@ class Limits:
             if not value > 0.0:
                 raise ParameterError(f"limit {name} = {value:g} {unit}, expected > 0 {unit}")
         if math.isinf(self.torque):
-            raise ParameterError("limit torque = inf N m, expected a finite torque: nothing else bounds a run")
+            raise ParameterError(
+                "limit torque = inf N m, expected a finite torque: nothing else bounds a run"
+            )
 
     def stated(self) -> dict[str, float]:
         """Return the finite limits by name."""
@@ -99,6 +101,6 @@ def of_response(command: FloatArray, outputs: Mapping[str, FloatArray]) -> dict[
 
 
 def used(peaks: Mapping[str, float], limits: Limits) -> float:
-    """Return the largest share of a limit that is used; above 1 one is broken, infinite where one runs away."""
+    """Return the largest share of a limit that is used; above 1 one is broken."""
     shares = [peaks[n] / limit for n, limit in limits.stated().items() if n in peaks]
     return max((s if math.isfinite(s) else math.inf for s in shares), default=0.0)

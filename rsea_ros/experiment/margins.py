@@ -1,10 +1,10 @@
 """Limits held although the bench is not known: a chance constraint over its values.
 
 For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
-and at both ends of every principal axis of what is known of them, z standard deviations away. The increases add
-up as squares: for a peak that goes straight with the values that is the quantile of z, for one that bends the
-simulated ends count. z is such that all causes together, each by its probability, break a limit with less than
-1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
+and at both ends of every principal axis of what is known of them, z standard deviations away. The increases
+add up as squares: for a peak that goes straight with the values that is the quantile of z, for one that
+bends the simulated ends count. z is such that all causes together, each by its probability, break a limit
+with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def ends_of(hypotheses: Sequence[Hypothesis]) -> list[list[Rig]]:
 
 
 def quantile_of(probability: float, count: int) -> float:
-    """Return z of one of `count` causes, by its probability: a less likely one may break a limit more often."""
+    """Return z of one of `count` causes: a less likely one may break a limit more often."""
     allowed = (1.0 - LEVEL) / (count * max(probability, 1e-9))
     return float(norm.isf(min(max(allowed, 1.0 - LEVEL), _LIKELIEST)))
 

@@ -38,7 +38,7 @@ def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
 
 
 def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
-    """Return an unknown of a cause with a prior: its size around null, anything else around what is typical."""
+    """Return an unknown of a cause with a prior: its size around null, the rest around typical values."""
     typical, null = unknown.inner(parameter.typical), unknown.start
     if is_size and (parameter.null > 0.0 or not parameter.logarithmic) and math.isfinite(parameter.null):
         null = unknown.inner(parameter.null)
@@ -47,9 +47,9 @@ def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:
 
 
 def _width(unknown: Unknown, parameter: Parameter) -> float:
-    """Return how far the parameter can reach, in the fit's coordinate; a factor of 16 where it has no bound."""
+    """Return how far the parameter can reach in the fit's coordinate; 16 times where it has no bound."""
     ends = (parameter.low, parameter.high)
-    if unknown.logarithmic and parameter.low <= 0.0 or not all(map(math.isfinite, ends)):
+    if (unknown.logarithmic and parameter.low <= 0.0) or not all(map(math.isfinite, ends)):
         return math.log(16.0) if unknown.logarithmic else 16.0 * abs(parameter.typical or 1.0)
     width = unknown.inner(parameter.high) - unknown.inner(parameter.low)
     return min(width, 16.0 * unknown.scale)
@@ -59,7 +59,9 @@ def vector_at(problem: Problem, near: Mapping[str, float], start: Mapping[str, f
     """Return coordinates of a problem: `start` where it says, else `near` (coordinates), else its prior."""
     return np.array(
         [
-            u.inner(min(max(start[u.name], u.low), u.high)) if u.name in start else near.get(u.name, u.inner(u.start))
+            u.inner(min(max(start[u.name], u.low), u.high))
+            if u.name in start
+            else near.get(u.name, u.inner(u.start))
             for u in problem.unknowns
         ]
     )

@@ -27,7 +27,9 @@ def read_run(path: str | Path) -> tuple[FloatArray, float]:
     """
     lines = Path(path).read_text(encoding="utf-8").splitlines()
     if not lines or lines[0].strip() != HEAD:
-        raise ParameterError(f"{path}: begins with {lines[0][:40] if lines else 'nothing'!r}, expected {HEAD}")
+        raise ParameterError(
+            f"{path}: begins with {lines[0][:40] if lines else 'nothing'!r}, expected {HEAD}"
+        )
     try:
         rows = np.array([[float(v) for v in line.split(",")] for line in lines[1:] if line.strip()])
     except ValueError as error:
@@ -36,5 +38,7 @@ def read_run(path: str | Path) -> tuple[FloatArray, float]:
         raise ParameterError(f"{path}: expected {FEWEST_SAMPLES} lines or more of two finite numbers")
     periods = np.diff(rows[:, 0])
     if not periods.min() > 0.0 or np.ptp(periods) > _UNEVEN * periods.mean():
-        raise ParameterError(f"{path}: t rises by {periods.min():g} to {periods.max():g} s, expected an even rate")
+        raise ParameterError(
+            f"{path}: t rises by {periods.min():g} to {periods.max():g} s, expected an even rate"
+        )
     return rows[:, 1], float(1.0 / periods.mean())

@@ -46,8 +46,8 @@ def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response])
 
 @dataclass(frozen=True)
 class Refit:
-    """A rival fitted to what another predicts. total: S; data: what of it the run shows, without what the rival
-    pays for leaving what is known of its numbers: that grows with the run's length, the rest does not.
+    """A rival fitted to what another predicts. total: S; data: what of it the run shows, without what the
+    rival pays for leaving what is known of its numbers: that grows with the run's length, the rest does not.
     """
 
     total: float
@@ -93,7 +93,7 @@ def nearest(table: FloatArray, apart: FloatArray) -> FloatArray:
 
 
 def decided(table: FloatArray, probability: FloatArray, apart: FloatArray) -> float:
-    """Return the expected share that a run decides: over what may be true, 1 - exp(-S / ENOUGH) at the worst."""
+    """Return the share that a run is expected to decide: the mean of 1 - exp(-S / ENOUGH), S the worst."""
     worst = nearest(table, apart)
     share = np.where(np.isfinite(worst), -np.expm1(-np.minimum(worst, 1e6) / ENOUGH), 0.0)
     return float(probability @ share / max(probability.sum(), 1e-300))

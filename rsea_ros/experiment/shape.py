@@ -1,8 +1,8 @@
 """The shape of a run: a few numbers from which the command of a given length is made, N m.
 
-Every run begins and ends at zero torque under a raised cosine. Multisines have phases of low crest: Schroeder's,
-then made flatter by clipping (Schroeder, IEEE Trans. Inf. Theory 16, 1970; van der Ouderaa, Schoukens,
-Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
+Every run begins and ends at zero torque under a raised cosine. Multisines have phases of low crest:
+Schroeder's, then made flatter by clipping (Schroeder, IEEE Trans. Inf. Theory 16, 1970; van der Ouderaa,
+Schoukens, Renneboog, IEEE Trans. Instrum. Meas. 37, 1988).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Shape:
 
     amplitude: N m, peak of the moving part. bias: N m, held beside it. low, high: band, Hz, of multisine and
     chirp. tilt: an amplitude goes with frequency to the power of -tilt, 1. hold: s, of one level of steps (up
-    and down at random) and holds (a staircase up and down). rest: share of the run, at its end, at zero torque.
+    and down at random) and holds (a staircase up and down). rest: share of the run, at its end, at zero.
     """
 
     kind: Kind
@@ -50,8 +50,8 @@ class Shape:
 def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf) -> FloatArray:
     """Return the command of a shape, N m, shape (n,), at rest for LEAD before it and TAIL after it.
 
-    duration: s, of what moves, its ramps and rest included. slew: N m/s. Where its change from sample to sample
-    would be faster, a multisine or chirp gets smaller and a step becomes a ramp.
+    duration: s, of what moves, its ramps and rest included. slew: N m/s. Where its change from sample to
+    sample would be faster, a multisine or chirp gets smaller and a step becomes a ramp.
     """
     n = round(duration * rate)
     moving = n - round(shape.rest * n)

@@ -1,13 +1,14 @@
-"""Causes weighed against each other by all records together: each fitted to all of them, their evidence compared.
+"""Causes weighed against each other by all records together: each fitted to all of them, their evidence
+compared.
 
 The logarithm of the evidence is Laplace's, with priors on the rig's values and on the cause's size:
 
     ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
 
 C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
-units of the noise, not below 1. A cause of which the data show nothing weighs as much as nothing does: it stays
-possible until a run could have shown it. Every cause is as likely as any other beforehand.
-(MacKay, Neural Computation 4, 1992.)
+units of the noise, not below 1. A cause of which the data show nothing weighs as much as nothing does: it
+stays possible until a run could have shown it. Every cause is as likely as any other beforehand. (MacKay,
+Neural Computation 4, 1992.)
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ HOPELESS = 1e-6
 
 @dataclass(frozen=True)
 class Weighed:
-    """A cause fitted to all records. log_evidence: see the module; left: RMS over the noise of all samples."""
+    """A cause fitted to all records. log_evidence: see the module; left: RMS over the noise."""
 
     name: str
     solution: Solution
@@ -66,6 +67,15 @@ class Weighing:
     def left(self) -> float:
         """RMS over the noise that the best cause leaves."""
         return self.fits[self.best].left
+
+    @property
+    def best_by_data(self) -> float:
+        """How much worse than the best, in S, the data alone fit to any other cause of no more parameters."""
+        best = self.fits[self.best]
+        size = len(best.solution.theta)
+        others = (f for n, f in self.fits.items() if n != self.best and len(f.solution.theta) <= size)
+        worse = (power(f.solution.residual) - power(best.solution.residual) for f in others)
+        return min(worse, default=math.inf) / self.scale
 
     def hypotheses(self, least: float = 0.0) -> list[Hypothesis]:
         """Return the causes with a probability of at least `least`, the likeliest first."""
@@ -112,8 +122,8 @@ def weigh(
 ) -> Weighing:
     """Weigh causes, and that there is none, by all records of a bench.
 
-    before: what the earlier ones of the records said; fits go on from there, and what was HOPELESS is left out.
-    Raises IdentificationError for records from which nothing can be fitted.
+    before: what the earlier ones of the records said; fits go on from there, and what was HOPELESS is left
+    out. Raises IdentificationError for records from which nothing can be fitted.
     """
     cases = cases_of(records, rig)
     names = [NOTHING, *causes]
@@ -130,12 +140,14 @@ def weigh(
 def _fitted(
     name: str, problem: Problem, before: Weighing | None, near: Mapping[str, float], run: Map
 ) -> Solution:
-    """Return a cause fitted: from the best of its guesses, and from where it was or from the rig's own fit."""
+    """Return a cause fitted from the best of its guesses, and from where it was or the rig's own fit."""
     guesses = effect_named(name).default_guesses if name != NOTHING else [{}]
     named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in [*guesses, *_smaller(name, guesses)]]
     warm = before.fits[name].solution.theta if before is not None and name in before.fits else None
     rows = [vector_at(problem, {}, guess) for guess in named]
-    others = [warm] if warm is not None else [vector_at(problem, near, guess) for guess in named] if near else []
+    others = (
+        [warm] if warm is not None else [vector_at(problem, near, guess) for guess in named] if near else []
+    )
     starts = [_best(problem, group, run) for group in (rows, others) if group]
     fits = [solve(problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run) for theta in starts]
     return min(fits, key=lambda s: s.cost)

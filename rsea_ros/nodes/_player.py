@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from msg_adapters.ros import JointState, stamp_of, torque_command_message
 from rsea_ros.nodes._cycle import SECOND, Cycle
@@ -24,18 +25,27 @@ SOFT = 0.1
 class Player:
     """Publishes one command (N m, at `rate` Hz), each value `lead` s before it takes effect.
 
-    wanted: subscriptions of torque_command to wait for. next: values that are out. left_out: that came too late.
+    wanted: subscriptions of torque_command to wait for. publisher: of a node that plays more than once.
+    next: values that are out. left_out: values that came too late.
     """
 
     def __init__(
-        self, node: Node, command: FloatArray, rate: float, *, lead: float, wanted: int, joint: str
+        self,
+        node: Node,
+        command: FloatArray,
+        rate: float,
+        *,
+        lead: float,
+        wanted: int,
+        joint: str,
+        publisher: Publisher[JointState] | None = None,
     ) -> None:
         self.command, self.rate = command, rate
         self.next, self.left_out, self.started = 0, 0, False
         self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
         self._stamp, self._last = 0, 0.0
         self._stopped_at = -1
-        self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
+        self._publisher = publisher or node.create_publisher(JointState, "torque_command", COMMAND)
         self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
         self.cycle = Cycle(rate, self._step, catch_up=True)
 
@@ -61,21 +71,16 @@ class Player:
         soft = self._stopped_at + round(SOFT * self.rate) if self.stopped else len(self.command)
         return self.next >= min(soft, len(self.command)) or (self.stopped and not self.started)
 
-    def close(self) -> int:
-        """Command zero torque after the last command, wait until that has arrived; return its stamp, ns."""
+    def close(self) -> None:
+        """Command zero torque after the last command, and wait until that has arrived."""
+        if not self.started:
+            self._node.destroy_subscription(self._measurements)
         self.cycle.stop()
         last = max(self._stamp, time.time_ns())
         for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
             stamp = last + round(k * SECOND / self.rate)
             self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
         await_arrival(self._publisher)
-        return last
-
-    def destroy(self) -> None:
-        """Take publisher and subscription away, after close, where the node lives on."""
-        if not self.started:
-            self._node.destroy_subscription(self._measurements)
-        self._node.destroy_publisher(self._publisher)
 
     def _begin(self, message: JointState) -> None:
         """Start at a whole number of periods after a measurement, once everybody listens."""

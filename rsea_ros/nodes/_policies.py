@@ -23,7 +23,7 @@ from rsea_ros.nodes._parameters import declare
 from rsea_ros.nodes._run import NAMESPACE
 from rsea_ros.nodes.record import TOPICS
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = ("controller", "driver", "excite", "experiment", "identify", "model", "plant", "record", "replay")
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "driver": {"autostart": True},
     "record": {"out": "bag"},

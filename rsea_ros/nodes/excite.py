@@ -90,7 +90,8 @@ def planned(values: dict[str, Any]) -> tuple[FloatArray, float]:
     if values["file"]:
         return read_run(values["file"])
     names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
-    return excitation(values["kind"], Settings(**{n: values[n] for n in names}), values["ramp"]), values["rate"]
+    command = excitation(values["kind"], Settings(**{n: values[n] for n in names}), values["ramp"])
+    return command, values["rate"]
 
 
 def main() -> int:

@@ -25,7 +25,7 @@ def advice_json(advice: Advice) -> dict[str, Any]:
         "limits": advice.asked.limits.stated(),
         "limits_hold_with_probability": LEVEL,
         "run": None if p is None else proposal_json(p),
-        "no_run_separates": [_proof(x) for x in advice.proofs],
+        "no_run_separates": [proof_json(x) for x in advice.proofs],
     }
     contents: dict[str, Any] = strict(body)
     return contents
@@ -52,7 +52,8 @@ def proposal_json(p: Proposal) -> Mapping[str, Any]:
     }
 
 
-def _proof(proof: Proof) -> dict[str, Any]:
+def proof_json(proof: Proof) -> dict[str, Any]:
+    """Return a pair that no run separates."""
     b = proof.bound
     return {
         "causes": [b.true, b.rival],

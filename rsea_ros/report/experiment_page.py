@@ -29,19 +29,32 @@ def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:
     blocks: list[Block] = [_causes(advice)]
     p = advice.proposal
     if p is not None:
-        blocks = [key_numbers(_keys(p)), *blocks, _separations(p), command_figure(p), spectrum_figure([("run", p)])]
+        blocks = [
+            key_numbers(_keys(p)),
+            *blocks,
+            _separations(p),
+            command_figure(p),
+            spectrum_figure([("run", p)]),
+        ]
         blocks += [limits_section(p, advice.asked.limits.stated())]
     if advice.proofs:
         blocks.append(section("What no run separates", bullets([proof_words(x) for x in advice.proofs])))
     rig = advice.hypotheses[0].problem.rig.name
-    return page(verdict(advice), f"The next experiment · {rig}", blocks, provenance.lines if provenance else ())
+    return page(
+        verdict(advice), f"The next experiment · {rig}", blocks, provenance.lines if provenance else ()
+    )
 
 
 def _keys(p: Proposal) -> list[tuple[str, str]]:
     worst = p.worst
-    keys = [(f"{p.duration:.3g} s", "of excitation"), (f"{p.peaks.at_level['torque']:.3g} N·m", "largest torque")]
+    keys = [
+        (f"{p.duration:.3g} s", "of excitation"),
+        (f"{p.peaks.at_level['torque']:.3g} N·m", "largest torque"),
+    ]
     if worst is not None:
-        keys.append((f"{worst[2]:.3g}", f"S of {plain_name(worst[0])} over {plain_name(worst[1])}, the worst pair"))
+        keys.append(
+            (f"{worst[2]:.3g}", f"S of {plain_name(worst[0])} over {plain_name(worst[1])}, the worst pair")
+        )
     return [*keys, (f"{p.decided:.0%}", "expected to be decided")]
 
 
@@ -56,7 +69,7 @@ def _separations(p: Proposal) -> str:
         for i, a in enumerate(p.names)
     ]
     caption = (
-        "S, row true and column its rival: twice the expected gain of the logarithm of the odds, after the rival "
+        "S, row true, column its rival: twice the expected gain of the logarithm of the odds after the rival "
         "has been fitted to the run. 6 makes odds of twenty to one."
     )
     head = ("true \\ rival", *(plain_name(n) for n in p.names))
@@ -96,7 +109,9 @@ def spectrum_figure(runs: Sequence[tuple[str, Proposal]]) -> Figure:
     for k, (name, p) in enumerate(runs):
         f, density = density_of(p.command, p.rate)
         colour = (AFTER, BEFORE, QUIET)[k % 3]
-        traces.append(line(f, density, name, colour, 1.4, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]}))
+        traces.append(
+            line(f, density, name, colour, 1.4, line={"color": colour, "width": 1.4, "dash": _DASH[k % 4]})
+        )
         at = int(np.argmax(density))
         notes.append(label(name, float(np.log10(f[at])), float(np.log10(density[at])) + 0.12, colour))
         tops.append(density.max())

@@ -30,7 +30,7 @@ def verdict(advice: Advice) -> str:
     if p is None:
         return f"No run within the limits tells {listed(names)} apart"
     if len(names) == 1:
-        times = 2.718281828 ** p.sharpened
+        times = 2.718281828**p.sharpened
         return f"A {shape_words(p)} narrows what is known of {names[0]} {times:.3g} times"
     return f"A {shape_words(p)} is expected to decide between {listed(names)} in {p.decided:.0%} of cases"
 
@@ -62,4 +62,7 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
     ]
 
 
-LEVEL_WORDS = f"the upper limit that holds with a probability of {LEVEL:.5f}, over the causes still possible and what is known of their numbers"
+LEVEL_WORDS = (
+    f"the upper limit that holds with a probability of {LEVEL:.5f}, over the causes still possible and what "
+    "is known of their numbers"
+)

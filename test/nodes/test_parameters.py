@@ -14,7 +14,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = ("controller", "driver", "excite", "experiment", "identify", "model", "plant", "record", "replay")
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
 KIND = Parameter("kind", "a", "which", choices=("a", "b"))
