@@ -2,6 +2,7 @@
 
     causes LOG [FIRST COUNT]   hidden-cause benches, each line of LOG one of them; goes on where it stopped
     summary LOG                the figures of those lines
+    wire OUT                   the real driver on the wire bench, an overload in the middle of a run
     limits RUNS                limit violations in RUNS simulated runs, true values drawn from their intervals
 
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
@@ -26,15 +27,21 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
+from msg_adapters import write_record  # noqa: E402
+from rsea_ros.cli._processes import Processes  # noqa: E402
+from rsea_ros.cli.demo import EXCITED, PATIENT  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
 from rsea_ros.experiment.design import Asked, propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used  # noqa: E402
 from rsea_ros.experiment.shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighing import weigh  # noqa: E402
+from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402
 from rsea_ros.identification.excitation import Settings, chirp, ramped  # noqa: E402
 from rsea_ros.identification.workers import worker_pools  # noqa: E402
-from rsea_ros.model.rig_file import load_rig  # noqa: E402
+from rsea_ros.model.rig_file import load_rig, save_rig  # noqa: E402
+from rsea_ros.model.simulation import synthesize  # noqa: E402
+from rsea_ros.signals import Channel  # noqa: E402
 
 RATE, CHIRP = 280.0, 20.0
 CAUSES = (
@@ -54,7 +61,8 @@ CAUSES = (
 ALIKE = {"torque_constant_error", "ft_gain_error"}
 """No run tells these apart without a value measured apart: proved by experiment/bound.py on each bench."""
 LIMITS = Limits(torque=25.0, velocity=2.0, deflection=0.04)
-SECONDS = 20.0
+SECONDS, SHORTEST = 20.0, 0.1
+"""s of excitation that a policy has, and of its first run at least."""
 
 
 def hidden(k):
@@ -122,13 +130,13 @@ def random_multisine(rms, seed):
 
 def played(policy, first, weighing, bench, rig, rng, pools):
     """Return the outcome of a policy on a bench."""
-    asked = Asked(LIMITS, RATE, refine=10)
+    asked = Asked(LIMITS, RATE, SHORTEST, refine=10)
 
     def play(proposal):
         return record_command(bench, proposal.command, rng)
 
     campaign = Campaign(
-        rig, CAUSES, asked, play, Budget(seconds=SECONDS, runs=8), run=pools.run, choose=policy
+        rig, CAUSES, asked, play, Budget(seconds=SECONDS, runs=10), run=pools.run, choose=policy
     )
     return campaign.go([first], weighing)
 
@@ -146,9 +154,9 @@ def one(k, pools):
     line = {"bench": k, "cause": name, "severity": severity, "parameters": parameters}
     line |= {"shown": is_shown(plain, bench), "designed": said(designed), "rms": rms}
     if runs and designed.end == "confirmed":
-        line["chirp"] = said(played(Fixed(fixed_chirp(), 0.5), first, weighing, bench, rig, rng, pools))
+        line["chirp"] = said(played(Fixed(fixed_chirp(), SHORTEST), first, weighing, bench, rig, rng, pools))
         noise = random_multisine(rms, k)
-        line["random"] = said(played(Fixed(noise, 0.5), first, weighing, bench, rig, rng, pools))
+        line["random"] = said(played(Fixed(noise, SHORTEST), first, weighing, bench, rig, rng, pools))
     return line | {"cpu": time.process_time() - begun}
 
 
@@ -177,7 +185,7 @@ def causes(log, first=0, count=60):
             with log.open("a") as file:
                 file.write(json.dumps(line) + "\n")
             short = {
-                p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 1))
+                p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 2))
                 for p in ("designed", "chirp", "random")
                 if p in line
             }
@@ -205,7 +213,7 @@ def summary(log):
     for policy in ("chirp", "random"):
         # a policy that did not get as far as the right name has used all its seconds and would need more
         other = [x[policy]["seconds"] if good(x, policy) else SECONDS for x in pairs]
-        ratios = [x["designed"]["seconds"] / max(s, 0.5) for x, s in zip(pairs, other, strict=True)]
+        ratios = [x["designed"]["seconds"] / max(s, SHORTEST) for x, s in zip(pairs, other, strict=True)]
         if ratios:
             ours = np.median([x["designed"]["seconds"] for x in pairs])
             failed = sum(not good(x, policy) for x in pairs)
@@ -244,11 +252,42 @@ def limits(runs):
     print(f"{made} runs, {broken} broke a limit; largest share {worst:.3f}; torques {np.round(sizes, 1)}")
 
 
+def wire(out):
+    """Inject an overload into a run on the wire bench; print when the torque was zero and how the loop ended."""
+    rig = load_rig("paper_high_impedance").with_effect("current_loop_lag", time_constant=3e-3)
+    out.mkdir(parents=True)
+    save_rig(rig, out / "bench.yaml")
+    command = slow_work(6.0, 0.6)
+    write_record(synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=1), out / "slow.mcap")
+    values = {"bag": out / "slow.mcap", "out": out / "session", "limits": "torque=15", "ask": False}
+    values |= {"causes": "current_loop_lag,command_delay", "longest": 4.0, "rig": "paper_high_impedance"}
+    with Processes(out / "log", 77) as nodes, RemoteBench(out / "tty", "--rig", out / "bench.yaml") as bench:
+        nodes.start("driver", {**bench.parameters(), **PATIENT, **EXCITED, "autostart": True})
+        nodes.start("experiment", values)
+        deadline = time.monotonic() + 120.0
+        while not (abs(bench.torque()[0]) > 5) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        moved = abs(bench.torque()[0])
+        bench.ask("alert", bits=32)
+        begun = time.monotonic()
+        while bench.torque()[0] != 0 and time.monotonic() - begun < 5.0:
+            time.sleep(0.001)
+        zero = time.monotonic() - begun
+        nodes.wait("experiment", 60.0)
+        last = bench.torque()
+    said = json.loads((out / "session" / "experiment.json").read_text())
+    runs = len(list((out / "session").glob("run-*.mcap")))
+    print(f"overload at {moved} counts: torque zero after {1e3 * zero:.0f} ms (counts, enabled: {last})")
+    print(f"loop ended: {said['end']}: {said['why']}; seconds {said['seconds']}, runs kept {runs}")
+
+
 def main():
     """Run a command."""
     command, *rest = sys.argv[1:]
     if command == "limits":
         limits(int(rest[0]) if rest else 10_000)
+    elif command == "wire":
+        wire(Path(rest[0]))
     elif command == "summary":
         summary(Path(rest[0]))
     else:

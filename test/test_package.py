@@ -18,7 +18,9 @@ import rclpy.qos
 from msg_adapters.ros import JointState
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = ("controller", "driver", "excite", "experiment", "identify", "model", "plant", "record", "replay")
+EXECUTABLES = (
+    "controller", "driver", "excite", "experiment", "identify", "model", "plant", "record", "replay"
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

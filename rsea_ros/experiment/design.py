@@ -49,6 +49,8 @@ _HOPE = 2.0
 """S that the longest run's data give a pair at best, below which no run is designed for it."""
 _FAR = 1e4
 """S of one linear step, above which a full fit of the rival would not bring it near nothing."""
+_KEPT = 0.8
+"""Of what the probe promises of a shorter run, what that must keep; else it is made longer."""
 _INSIDE = 0.9
 """Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
 _SMALLEST, _BISECTIONS = 0.01, 8
@@ -194,15 +196,18 @@ def propose(
     say("fitting rivals", 0.6)
     apart = _hopeless(judge, shapes, tables)
     values = [max(_per_second(judge, t, apart, asked))[0] for t in tables]
-    best = int(np.argmax(values))
-    length = max(_per_second(judge, tables[best], apart, asked))[1]
+    length = max(_per_second(judge, tables[int(np.argmax(values))], apart, asked))[1]
 
     def value(shape: Shape) -> float:
         table = separations(hypotheses, judge.responses(judge.within(shape, length)))
         return decided(table, judge.probability, apart)
 
-    shape, count = refined(shapes[best], value, asked, say)
-    return _final(judge, shape, length, apart, len(shapes) + count)
+    again = [value(shape) for shape in shapes]
+    while max(again) < _KEPT * max(values) * (_PER_RUN + length) and 2.0 * length <= asked.longest:
+        length *= 2.0
+        again = [value(shape) for shape in shapes]
+    shape, count = refined(shapes[int(np.argmax(again))], value, asked, say)
+    return _final(judge, shape, length, apart, 2 * len(shapes) + count)
 
 
 def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
