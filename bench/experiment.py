@@ -253,7 +253,7 @@ def limits(runs):
 
 
 def wire(out):
-    """Inject an overload into a run on the wire bench; print when the torque was zero and how the loop ended."""
+    """Inject an overload into a run on the wire bench; print when the torque was zero and how it ended."""
     rig = load_rig("paper_high_impedance").with_effect("current_loop_lag", time_constant=3e-3)
     out.mkdir(parents=True)
     save_rig(rig, out / "bench.yaml")

@@ -104,6 +104,19 @@ class Outcome:
 
 
 @dataclass
+class _Session:
+    """What there is so far."""
+
+    records: list[Record]
+    weighing: Weighing
+    rounds: list[Round] = field(default_factory=list)
+
+    def ended(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> Outcome:
+        rounds = (*self.rounds, Round(self.weighing, None))
+        return Outcome(end, rounds, tuple(self.records), proofs, why)
+
+
+@dataclass
 class Campaign:
     """A bench, the causes it may have, what runs may do. hear: is given each round as it begins."""
 
@@ -120,53 +133,55 @@ class Campaign:
     """How the next run is chosen; a bench puts other policies here."""
 
     def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
-        """Go round from some records until the loop ends. first: what they say, where it is known."""
-        kept, rounds = list(records), []
-        weighing: Weighing | None = None
-        while True:
+        """Go round from some records until the loop ends. first: what they say, where it is known.
+
+        Raises IdentificationError where nothing can be fitted to them.
+        """
+        session = _Session(list(records), first or weigh(records, self.rig, self.causes, None, self.run))
+        while (outcome := self._round(session)) is None:
             try:
-                weighing = first or weigh(kept, self.rig, self.causes, weighing, self.run)
-                first = None
+                now = weigh(session.records, self.rig, self.causes, session.weighing, self.run)
             except IdentificationError as error:
-                if not rounds:
-                    raise
-                return Outcome("failed", tuple(rounds), tuple(records), why=str(error))
-            records = tuple(kept)
-            end = self._known(weighing) or self._spent(rounds)
-            if end is not None:
-                rounds.append(Round(weighing, None))
-                return Outcome(end, tuple(rounds), tuple(kept))
-            possible = self.possible(weighing)
-            noise = weighing.cases[0].noise
-            try:
-                proposal = self.choose(possible, self.asked, noise, self.run, self.tell)
-            except ParameterError as error:
-                rounds.append(Round(weighing, None))
-                return Outcome("failed", tuple(rounds), tuple(kept), why=str(error))
-            if proposal.decided < self.rules.worth and not self._widens(proposal, rounds):
-                rounds.append(Round(weighing, None))
-                proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
-                return Outcome("undecidable", tuple(rounds), tuple(kept), proofs)
-            self.hear(Round(weighing, proposal))
-            try:
-                record = self.play(proposal)
-            except DeviceError as error:
-                rounds.append(Round(weighing, None))
-                return Outcome("broken", tuple(rounds), tuple(kept), why=str(error))
-            rounds.append(Round(weighing, proposal if record is not None else None))
-            if record is None:
-                return Outcome("declined", tuple(rounds), tuple(kept))
-            kept.append(record)
+                session.records.pop()
+                return session.ended("failed", why=str(error))
+            session.weighing = now
+        return outcome
 
     def possible(self, weighing: Weighing) -> list[Hypothesis]:
-        """Return the causes for which a run is designed."""
-        return weighing.hypotheses(self.rules.possible)[: self.rules.most]
+        """Return the causes for which a run is designed: those that may be, and those that fit as well."""
+        near = weighing.near_by_data(self.rules.by_data)
+        every = weighing.hypotheses()
+        return [h for h in every if h.probability >= self.rules.possible or h.name in near][: self.rules.most]
+
+    def _round(self, session: _Session) -> Outcome | None:
+        """Design a run and have it played; return how the loop ended, None where it goes on."""
+        weighing = session.weighing
+        if end := self._known(weighing) or self._spent(session.rounds):
+            return session.ended(end)
+        possible, noise = self.possible(weighing), weighing.cases[0].noise
+        try:
+            proposal = self.choose(possible, self.asked, noise, self.run, self.tell)
+        except ParameterError as error:
+            return session.ended("failed", why=str(error))
+        if proposal.decided < self.rules.worth and not self._widens(proposal, session.rounds):
+            proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
+            return session.ended("undecidable", proofs)
+        self.hear(Round(weighing, proposal))
+        try:
+            record = self.play(proposal)
+        except DeviceError as error:
+            return session.ended("broken", why=str(error))
+        if record is None:
+            return session.ended("declined")
+        session.rounds.append(Round(weighing, proposal))
+        session.records.append(record)
+        return None
 
     def _known(self, weighing: Weighing) -> End | None:
         """Return how the loop ends by what is known, None where it goes on."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None
-        if weighing.best_by_data < self.rules.by_data:
+        if weighing.near_by_data(self.rules.by_data):
             return None
         if weighing.left > self.rules.floor:
             return "unexplained"

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -107,7 +109,7 @@ class Proposal:
             table[i, j] = table[j, i] = np.inf
         if not np.isfinite(table).any():
             return None
-        i, j = np.unravel_index(int(np.argmin(table)), table.shape)
+        i, j = divmod(int(np.argmin(table)), len(table))
         return self.names[i], self.names[j], float(table[i, j])
 
 
@@ -214,8 +216,8 @@ def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArra
     """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
     stack, asked = np.array(tables), judge.asked
     apart = np.eye(len(judge.hypotheses), dtype=bool)
-    for i, j in zip(*np.triu_indices(len(apart), 1), strict=True):
-        i, j = (i, j) if stack[:, i, j].max() > stack[:, j, i].max() else (j, i)
+    for a, b in combinations(range(len(apart)), 2):
+        i, j = (a, b) if stack[:, a, b].max() > stack[:, b, a].max() else (b, a)
         best = int(np.argmax(stack[:, i, j]))
         if stack[best, i, j] < _FAR:
             case = judge.case(judge.within(shapes[best], asked.probe), is_quick=True)
@@ -245,7 +247,8 @@ def refined(start: Shape, value: Callable[[Shape], float], asked: Asked, say: Pr
     seen: list[tuple[float, Shape]] = []
 
     def loss(x: FloatArray) -> float:
-        shape = replace(start, **{n: _outer(n, float(v), asked) for n, v in zip(names, x, strict=True)})
+        moved: dict[str, Any] = {n: _outer(n, float(v), asked) for n, v in zip(names, x, strict=True)}
+        shape = replace(start, **moved)
         shape = replace(shape, high=max(shape.high, 1.5 * shape.low))
         seen.append((value(shape), shape))
         say("refining", 0.6 + 0.35 * min(1.0, len(seen) / max(asked.refine, 1)))

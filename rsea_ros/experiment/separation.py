@@ -17,7 +17,7 @@ import numpy as np
 from rsea_ros.experiment.hypothesis import Hypothesis, Response
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map, jacobian, power, serial
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import BoolArray, FloatArray
 
 ENOUGH = 12.0
 """S that decides between two: odds of 400 to one, so that noise hardly ever turns them below 20."""
@@ -87,12 +87,12 @@ def refitted(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial)
     return Refit(cost, power(residual))
 
 
-def nearest(table: FloatArray, apart: FloatArray) -> FloatArray:
+def nearest(table: FloatArray, apart: BoolArray) -> FloatArray:
     """Return for each hypothesis the S of its worst rival, shape (k,). apart: pairs that no run separates."""
-    return np.where(apart, np.inf, table).min(axis=1)
+    return np.asarray(np.where(apart, np.inf, table).min(axis=1))
 
 
-def decided(table: FloatArray, probability: FloatArray, apart: FloatArray) -> float:
+def decided(table: FloatArray, probability: FloatArray, apart: BoolArray) -> float:
     """Return the share that a run is expected to decide: the mean of 1 - exp(-S / ENOUGH), S the worst."""
     worst = nearest(table, apart)
     share = np.where(np.isfinite(worst), -np.expm1(-np.minimum(worst, 1e6) / ENOUGH), 0.0)

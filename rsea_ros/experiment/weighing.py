@@ -68,14 +68,16 @@ class Weighing:
         """RMS over the noise that the best cause leaves."""
         return self.fits[self.best].left
 
-    @property
-    def best_by_data(self) -> float:
-        """How much worse than the best, in S, the data alone fit to any other cause of no more parameters."""
-        best = self.fits[self.best]
-        size = len(best.solution.theta)
-        others = (f for n, f in self.fits.items() if n != self.best and len(f.solution.theta) <= size)
-        worse = (power(f.solution.residual) - power(best.solution.residual) for f in others)
-        return min(worse, default=math.inf) / self.scale
+    def near_by_data(self, least: float) -> list[str]:
+        """Return the causes of no more parameters than the best that fit less than `least` worse, in S.
+
+        By the data alone, whatever the priors say of them.
+        """
+        best = self.fits[self.best].solution
+        others = {n: f.solution for n, f in self.fits.items() if n != self.best}
+        fewer = {n: s for n, s in others.items() if len(s.theta) <= len(best.theta)}
+        away = {n: (power(s.residual) - power(best.residual)) / self.scale for n, s in fewer.items()}
+        return [n for n, s in away.items() if s < least]
 
     def hypotheses(self, least: float = 0.0) -> list[Hypothesis]:
         """Return the causes with a probability of at least `least`, the likeliest first."""
