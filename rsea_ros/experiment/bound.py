@@ -22,10 +22,11 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve
 from rsea_ros.signals import FloatArray
 
-_LENGTH = 2.0
+_LENGTH = 1.0
 """s of a sine, of which the first is left to settle by its ramp; low frequencies get a period."""
 _LEVELS = ((1.0, 0.0), (0.3, 0.0), (0.4, 0.5))
 """Amplitude and bias of the sines, as shares of what the limits allow."""
+_FREQUENCIES = 8
 _LAWSON = 3
 _ITERATIONS = 8
 HOPELESS = 6.0
@@ -64,7 +65,7 @@ def bound(
     run: Map = serial,
 ) -> Bound:
     """Return the most that a run of `duration` s separates two hypotheses. noise: by channel. rate: Hz."""
-    frequencies = np.geomspace(0.5, 0.4 * rate, 8)
+    frequencies = np.geomspace(0.5, 0.4 * rate, _FREQUENCIES)
     sines = [(f, _sine(float(f), level, true, limits, rate)) for f in frequencies for level in _LEVELS]
     problem = replace(true.problem, cases=tuple(run_case(u, rate, noise) for _, u in sines))
     outputs = problem.outputs(true.if_there())

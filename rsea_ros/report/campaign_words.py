@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
+from rsea_ros.diagnosis.causes import MODEL_DOUBT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import Outcome
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.weighing import Weighing
+from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report.experiment_words import plain_name
 from rsea_ros.wording import listed
 
@@ -19,7 +23,7 @@ def known(weighing: Weighing) -> str:
 
 
 def size(weighing: Weighing, name: str) -> str:
-    """Return a cause's main parameter with one sigma; empty for no cause."""
+    """Return a cause's main parameter with one sigma, the simulation's own doubt included; empty for none."""
     if name == NOTHING:
         return ""
     main = effect_named(name).main
@@ -27,9 +31,12 @@ def size(weighing: Weighing, name: str) -> str:
     k = [u.name for u in hypothesis.problem.unknowns].index(f"{name}.{main.name}")
     unknown, at = hypothesis.problem.unknowns[k], float(hypothesis.theta[k])
     sd = float(hypothesis.sd()[k])
-    spread = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
+    value = unknown.outer(at)
+    noise = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
+    clock = CLOCK_DOUBT if main.unit == "s" else 0.0
+    spread = math.hypot(noise, MODEL_DOUBT * value, clock)
     unit = "" if main.unit == "1" else f" {main.unit}"
-    return f"{main.name.replace('_', ' ')} {unknown.outer(at):.4g} ± {spread:.2g}{unit}"
+    return f"{main.name.replace('_', ' ')} {value:.4g} ± {spread:.2g}{unit}"
 
 
 def end_sentence(outcome: Outcome) -> str:

@@ -10,7 +10,7 @@ from independent.hidden import hide
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.experiment.causes import causes_from
-from rsea_ros.experiment.design import Asked
+from rsea_ros.experiment.design import Asked, propose
 from rsea_ros.experiment.limits import Limits
 from rsea_ros.experiment.weighing import middles_of_runs, weigh
 from rsea_ros.model.rig_file import load_rig
@@ -35,8 +35,20 @@ def known(log):
     return weigh([log], RIG, CAUSES)
 
 
-def campaign(play, **more):
-    return Campaign(RIG, CAUSES, ASKED, play, **more)
+@pytest.fixture(scope="module")
+def proposal(known):
+    """The run that is designed first."""
+    return propose(known.hypotheses(), ASKED, known.cases[0].noise)
+
+
+@pytest.fixture
+def campaign(proposal):
+    """A function that makes a loop; every run that it proposes is the first one."""
+
+    def make(play, **more):
+        return Campaign(RIG, CAUSES, ASKED, play, choose=lambda *_: proposal, **more)
+
+    return make
 
 
 def test_what_the_log_could_not_show_stays_as_likely_as_no_cause(known):
@@ -44,7 +56,7 @@ def test_what_the_log_could_not_show_stays_as_likely_as_no_cause(known):
     assert min(known.probability.values()) > 0.05
 
 
-def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, tmp_path):
+def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_path):
     rng, played = np.random.default_rng(2), []
 
     def play(proposal):
@@ -63,7 +75,7 @@ def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, tmp_path):
     assert load_rig(tmp_path / "out" / "model.yaml").effects[-1].name == "current_loop_lag"
 
 
-def test_nothing_is_learnt_from_a_run_that_broke(log, known):
+def test_nothing_is_learnt_from_a_run_that_broke(log, known, campaign):
     def play(proposal):
         raise DeviceError("driver: overload")
 
@@ -73,12 +85,12 @@ def test_nothing_is_learnt_from_a_run_that_broke(log, known):
     assert outcome.weighing.probability == known.probability
 
 
-def test_a_person_may_say_no(log, known):
+def test_a_person_may_say_no(log, known, campaign):
     outcome = campaign(lambda proposal: None).go([log], known)
     assert outcome.end == "declined" and outcome.seconds == 0.0
 
 
-def test_a_budget_that_is_too_small_for_a_run_ends_the_loop(log, known):
+def test_a_budget_that_is_too_small_for_a_run_ends_the_loop(log, known, campaign):
     outcome = campaign(lambda proposal: pytest.fail("played"), budget=Budget(seconds=0.1)).go([log], known)
     assert outcome.end == "spent"
 

@@ -16,7 +16,7 @@ from rsea_ros.experiment.hypothesis import motion, run_case
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used
 from rsea_ros.experiment.margins import at_ends
 from rsea_ros.experiment.separation import Refit, refitted
-from rsea_ros.experiment.shape import at_rest_around
+from rsea_ros.experiment.shape import Shape, at_rest_around, command_of
 from rsea_ros.experiment.weighing import cases_of
 from rsea_ros.identification.excitation import Settings, chirp
 from rsea_ros.identification.solver import power, solve
@@ -24,7 +24,7 @@ from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
 LIMITS = Limits(torque=15.0, velocity=1.5, deflection=0.03)
-ASKED = Asked(LIMITS, refine=3)
+ASKED = Asked(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
 NOISE = {"ft": 0.03, "position": 6e-6}
 
 
@@ -73,7 +73,7 @@ def test_more_doubt_makes_a_smaller_run():
         [replace(h, information=h.information * weight) for h in possible(nonlinear_spring={"cubic": 100.0})]
         for weight in (100.0, 1.0)
     )
-    tight = Asked(Limits(torque=30.0, deflection=0.012), refine=0, kinds=("multisine",), longest=1.0)
+    tight = Asked(Limits(torque=30.0, deflection=0.012), refine=0, kinds=("chirp",), longest=1.0)
     assert propose(unsure, tight).peaks.expected["torque"] < propose(sure, tight).peaks.expected["torque"]
 
 
@@ -84,14 +84,15 @@ def test_a_peak_at_the_quantile_adds_the_axes_as_squares():
 
 def test_one_cause_gets_the_run_that_narrows_its_parameters():
     (alone,) = possible(current_loop_lag={"time_constant": 3e-3})
-    fast = propose([alone], Asked(LIMITS, refine=0, longest=2.0))
-    slow = propose([alone], Asked(replace(LIMITS, slew=60.0), refine=0, longest=2.0))
+    asked = Asked(LIMITS, refine=0, longest=1.0, probe=1.0, kinds=("chirp",))
+    fast = propose([alone], asked)
+    slow = propose([alone], replace(asked, limits=replace(LIMITS, slew=60.0)))
     assert fast.sharpened > slow.sharpened + 0.5 > 0.5
 
 
 def test_no_run_tells_a_torque_constant_from_a_gain_of_the_sensor():
     pair = possible(torque_constant_error={"gain": 1.1}, ft_gain_error={"gain": 1.1})
-    advice = advise(pair, replace(ASKED, refine=0, kinds=("multisine",)))
+    advice = advise(pair, replace(ASKED, refine=0, kinds=("chirp",), probe=1.0))
     assert advice.proposal is None
     (proof,) = advice.proofs
     assert proof.bound.most < 1e-3 and proof.bound.duration >= 60.0
@@ -103,8 +104,8 @@ def test_the_bound_leaves_room_where_a_run_separates():
     delay, lag = possible(command_delay={"delay": 3e-3}, current_loop_lag={"time_constant": 3e-3})
     room = bound(delay, lag, LIMITS, 10.0, NOISE)
     assert not room.is_hopeless
-    run = propose([delay, lag], replace(ASKED, refine=0, kinds=("multisine",), longest=10.0), NOISE)
-    found = refitted(delay, lag, run_case(run.command, run.rate, NOISE))
+    command = command_of(Shape("multisine", LIMITS.torque), 1.0, 280.0)
+    found = refitted(delay, lag, run_case(command, 280.0, NOISE))
     assert isinstance(found, Refit) and found.data <= found.total <= room.most
 
 
