@@ -64,7 +64,7 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     cause = accepted.problem.added[-1]
     if not isinstance(case.drive, Drive):
         return Experiment(
-            f"{cause} and {names} do as well on these data; a run at another amplitude would tell more", {}
+            f"{cause} and {names} do as well on these data; a run at another amplitude would show more", {}
         )
     present = float(np.max(np.abs(case.drive.command)))
     tried = []
@@ -103,7 +103,7 @@ def _worded(
     return Experiment(
         f"{cause} and {names} make the same motion under every excitation tried "
         f"(at most {separation:.2f} times the noise apart): "
-        "only a value measured apart tells them, such as the spring stiffness by a known weight",
+        "only a separate measurement distinguishes them, such as the spring stiffness by a known weight",
         run,
     )
 

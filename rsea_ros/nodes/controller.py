@@ -199,7 +199,7 @@ class Controller:
 
 def main() -> int:
     """Run the node."""
-    return run_node("controller", TABLE, Controller)
+    return run_node("controller", TABLE, Controller, waits_for_nobody=True)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,8 @@ def experiment_section(experiment: Experiment) -> str:
     """Return what the next run would tell, its settings, and the command that plays it."""
     settings = words.sentence(say.excitation(experiment.excitation))
     run = paragraph(f"{settings}.") if settings else ""
-    return section("The run that would tell", paragraph(say.prose(experiment.why)), run, _command(experiment))
+    why = paragraph(say.prose(experiment.why))
+    return section("The run that would decide", why, run, _command(experiment))
 
 
 def _command(experiment: Experiment) -> str:

@@ -101,7 +101,9 @@ def misfit(m: Misfit) -> str:
 def confusions(diagnosis: Diagnosis) -> list[str]:
     """Return a sentence for each cause that these data cannot tell from others."""
     return [
-        words.sentence(f"{effect(c.name)}: these data do not tell it from {_either(c.confusable_with)}.")
+        words.sentence(
+            f"{effect(c.name)}: these data do not distinguish it from {_either(c.confusable_with)}."
+        )
         for c in diagnosis.causes
         if c.confusable_with
     ]
