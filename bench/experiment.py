@@ -61,6 +61,8 @@ CAUSES = (
 ALIKE = {"torque_constant_error", "ft_gain_error"}
 """No run tells these apart without a value measured apart: proved by experiment/bound.py on each bench."""
 LIMITS = Limits(torque=25.0, velocity=2.0, deflection=0.04)
+DESIGNS = 5
+"""Benches whose designed runs are played again and again for the limits."""
 SECONDS, SHORTEST = 20.0, 0.1
 """s of excitation that a policy has, and of its first run at least."""
 
@@ -130,7 +132,7 @@ def random_multisine(rms, seed):
 
 def played(policy, first, weighing, bench, rig, rng, pools):
     """Return the outcome of a policy on a bench."""
-    asked = Asked(LIMITS, RATE, SHORTEST, refine=10)
+    asked = Asked(LIMITS, RATE, SHORTEST, probe=1.0, refine=8)
 
     def play(proposal):
         return record_command(bench, proposal.command, rng)
@@ -234,11 +236,11 @@ def limits(runs):
     tight = Limits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
     with worker_pools() as pools:
         designs = []
-        for k in range(8):
+        for k in range(DESIGNS):
             _, bench, *_ = hidden(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
             possible = weigh([first], rig, CAUSES, run=pools.run).hypotheses(0.005)[:7]
-            designs.append((possible, propose(possible, Asked(tight, RATE, refine=4), run=pools.run)))
+            designs.append((possible, propose(possible, Asked(tight, RATE, probe=1.0, refine=0), run=pools.run)))
         for k in range(runs):
             possible, proposal = designs[k % len(designs)]
             shares = np.array([h.probability for h in possible])

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
     from rsea_ros.experiment.files import Model
     from rsea_ros.experiment.hypothesis import Hypothesis
+    from rsea_ros.identification.solver import Map
 
 HELP = "the run that tells apart the causes still possible, within a bench's limits"
 EXAMPLE = "rsea experiment friction/model.yaml play/model.yaml --limits torque=20,velocity=1"
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
         tell("reading", 0.0)
-        hypotheses, noise = _possible(models, args)
+        hypotheses, noise = _possible(models, args, pools.run)
         advice = advise(hypotheses, asked, noise, pools.run, tell)
     report = written(advice, place, args)
     if args.json:
@@ -92,7 +93,9 @@ def models_in(path: str) -> list[Model]:
         raise ParameterError(f"{path}: {error}") from None
 
 
-def _possible(models: Sequence[Model], args: argparse.Namespace) -> tuple[list[Hypothesis], dict[str, float]]:
+def _possible(
+    models: Sequence[Model], args: argparse.Namespace, run: Map
+) -> tuple[list[Hypothesis], dict[str, float]]:
     """Return the hypotheses, and the noise by channel as bags show it (empty without bags)."""
     from rsea_ros.experiment.files import hypotheses_from
 
@@ -106,7 +109,7 @@ def _possible(models: Sequence[Model], args: argparse.Namespace) -> tuple[list[H
     rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
     records = [readable(bag, topic_map(args)) for bag in args.bag]
     names = [m.name for m in models if m.name != NOTHING]
-    weighing = weigh(records, rig, names)
+    weighing = weigh(records, rig, names, run=run)
     listed = {m.name for m in models}
     kept = [h for h in weighing.hypotheses() if h.name in listed]
     return kept, dict(weighing.cases[0].noise)

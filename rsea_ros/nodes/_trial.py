@@ -38,6 +38,7 @@ class Ears:
         self._contents, self._names = Contents(), dict[str, str]()
         self._alarm: Callable[[str], None] = lambda why: None
         self.last = time.monotonic()
+        self._failed: set[str] = set()
         self._taps = {role: self._tap(node, role) for role in ROLES}
         self._health = node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
@@ -65,8 +66,12 @@ class Ears:
         sink.raw.append(raw)
 
     def _on_health(self, message: DiagnosticArray) -> None:
+        """Give the alarm for what fails after the run began, not for what had failed before."""
         for status in message.status:
-            if status.level == ERROR:
+            if status.level != ERROR:
+                self._failed.discard(status.name)
+            elif status.name not in self._failed:
+                self._failed.add(status.name)
                 self._alarm(f"{status.name}: {status.message}")
 
 

@@ -15,8 +15,8 @@ from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
 NODES = (
-    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record", "replay",
-    "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "replay", "watch",
 )  # fmt: skip
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
