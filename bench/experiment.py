@@ -240,7 +240,8 @@ def limits(runs):
             _, bench, *_ = hidden(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
             possible = weigh([first], rig, CAUSES, run=pools.run).hypotheses(0.005)[:7]
-            designs.append((possible, propose(possible, Asked(tight, RATE, probe=1.0, refine=0), run=pools.run)))
+            asked = Asked(tight, RATE, probe=1.0, refine=0)
+            designs.append((possible, propose(possible, asked, run=pools.run)))
         for k in range(runs):
             possible, proposal = designs[k % len(designs)]
             shares = np.array([h.probability for h in possible])

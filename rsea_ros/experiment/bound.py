@@ -129,6 +129,3 @@ def _power(problem: Problem, case: Case, outputs: Mapping[str, FloatArray]) -> f
         float(np.sum(((outputs[n] - case.measured[n]) / case.noise[n]) ** 2)) for n in problem.present(case)
     ]
     return sum(parts) / case.duration
-
-
-__all__ = ["HOPELESS", "Bound", "bound"]

@@ -23,8 +23,6 @@ UNITS: Mapping[str, str] = {
     "power": "W",
     "ft": "N m",
 }
-OF_COMMAND = ("torque", "slew", "heat")
-"""Limits that the command alone meets or not, whatever the bench is."""
 
 
 @dataclass(frozen=True)

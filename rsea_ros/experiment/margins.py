@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.limits import OF_COMMAND, Limits, of_command, of_response, used
+from rsea_ros.experiment.limits import Limits, of_command, of_response, used
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -86,6 +86,3 @@ def at_ends(values: FloatArray) -> float:
 def share_used(found: Peaks, limits: Limits) -> float:
     """Return the largest share of a limit that is used at LEVEL."""
     return used(found.at_level, limits)
-
-
-__all__ = ["LEVEL", "OF_COMMAND", "Peaks", "at_ends", "ends_of", "peaks", "share_used"]
