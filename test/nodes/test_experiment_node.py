@@ -7,9 +7,12 @@ import pytest
 
 from msg_adapters import write_record
 from msg_adapters.ros import DiagnosticArray, JointState, Trigger
+from rsea_ros.experiment.run_file import run_text
+from rsea_ros.experiment.shape import Shape, command_of
 from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes.excite import planned
 from rsea_ros.signals import Channel
 
 RIG = "paper_high_impedance"
@@ -71,3 +74,10 @@ def test_a_run_is_asked_for_and_cancelled_at_any_sample(bench, start, listener, 
     said = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
     assert said["end"] == "broken" and "cancel" in said["why"] and said["seconds"] == 0.0
     assert not list(out.glob("run-*"))
+
+
+def test_excite_plays_the_file_of_a_run(tmp_path):
+    command = command_of(Shape("multisine", 4.0), 0.5, RATE)
+    (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
+    played, rate = planned({"file": str(tmp_path / "run.csv")})
+    assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
