@@ -1,0 +1,280 @@
+"""The search for a law: what is missing, what it depends on, the shortest law of it, its file, and its gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
+from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.verdict import is_at_floor
+from rsea_ros.identification.identify import fit
+from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.steady import steadied
+from rsea_ros.identification.threads import one_blas_thread
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.laws.assembly import curve_of, law_of
+from rsea_ros.laws.candidates import Candidate, candidates_of, columns_of
+from rsea_ros.laws.columns import Bench, bench_of, rows_of
+from rsea_ros.laws.dependence import Dependence, dependences
+from rsea_ros.laws.file import Draft, finished
+from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
+from rsea_ros.laws.law import Law
+from rsea_ros.laws.refinement import Refined, acting, effect_from, refine
+from rsea_ros.laws.result import LawResult, Tried
+from rsea_ros.laws.selection import Model, paths, simplest, standard_error
+from rsea_ros.laws.writing import Provenance
+from rsea_ros.model.extent import bounded
+from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
+from rsea_ros.signals import FloatArray, Record
+
+_SURE, _SURE_ON_TEST = 4.0, 2.0
+"""Standard errors by which a law must gain on the blocks that chose it, and on those that did not."""
+_MATTERS = 0.02
+"""Smallest gain that is written down: 1 - RMS(with) / RMS(without)."""
+_SHORT_ENOUGH = 0.75
+"""Of what a law without a form explains: a short law that explains less gives way to a learnt curve."""
+
+
+@dataclass(frozen=True)
+class Base:
+    """The model whose residual is looked at, fitted to all blocks but the test blocks. cases: all samples."""
+
+    solution: Solution
+    cases: tuple[Case, ...]
+    outputs: list[dict[str, FloatArray]]
+
+    @property
+    def problem(self) -> Problem:
+        """The base model on all samples."""
+        return replace(self.solution.problem, cases=self.cases)
+
+    def score(self, sets: tuple[int, ...]) -> Score:
+        """Return the base's score on some sets of blocks."""
+        return score_on(self.problem, self.cases, sets, self.outputs)
+
+
+@dataclass(frozen=True)
+class Search:
+    """A base model with all columns of laws and their sums of products."""
+
+    base: Base
+    benches: tuple[Bench, ...]
+    candidates: tuple[Candidate, ...]
+    gram: Gram
+
+
+def learn(
+    records: Sequence[Record], rig: Rig, provenance: Provenance | None = None, progress: Progress | None = None
+) -> LawResult:
+    """Return what is missing in a rig's simulation of records, as laws with their effect files.
+
+    Raises IdentificationError when the records are too short or do not hold what the rig needs.
+    """
+    tell = progress or (lambda step, share: None)
+    with one_blas_thread():
+        tell("fitting the model", 0.0)
+        base = fitted_base(records, rig)
+        if is_at_floor(base.score(TEST)):
+            return nothing_left(base, records)
+        tell("looking for what is missing", 0.2)
+        search = searched(base)
+        tell("comparing laws", 0.6)
+        depends = dependences(search.gram, search.candidates)
+        models = chosen_models(search, depends)
+        tell("fitting the law in the simulation", 0.75)
+        return _result(search, depends, models, records, provenance)
+
+
+def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
+    """Fit a rig to all blocks of records but the test blocks."""
+    rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
+    records = [bounded(commanded(r, rig)) for r in records]
+    checked = [check(r, rig) for r in records]
+    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
+    problem = nominal_problem(checked, rig)
+    parts = [part(c, (*TRAIN, *VALIDATION)) for c in problem.cases]
+    start = joint_start(checked[0].record, rig) if rig.loop is not None else None
+    solution, known, _ = fit(parts, rig, start=start)
+    cases = tuple(replace(c, noise=_finer(c, k)) for c, k in zip(problem.cases, known, strict=True))
+    return Base(solution, cases, replace(solution.problem, cases=cases).outputs(solution.theta))
+
+
+def _finer(case: Case, known: Case) -> dict[str, float]:
+    """Return the noise of each channel: what a fit takes for noise may be a misfit."""
+    return {n: min(v, known.noise[n]) for n, v in case.noise.items()}
+
+
+def nothing_left(base: Base, records: Sequence[Record]) -> LawResult:
+    """Return the result where the base model is at the noise floor."""
+    before, noise = _levels(base.problem, base.outputs, base.cases)
+    rig = apply(base.problem.rig, base.problem.unknowns, base.solution.theta)[0]
+    return LawResult(rig.name, tuple(r.source for r in records), sum(c.duration for c in base.cases), rig, rig,
+                     (), (), (), 0.0, (0.0, 0.0), 0.0, before, before, noise, at_floor=True)  # fmt: skip
+
+
+def searched(base: Base) -> Search:
+    """Return a base with the columns of all candidates."""
+    problem, theta = base.problem, base.solution.theta
+    rows = rows_of(problem, theta)
+    benches = tuple(bench_of(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
+    made = candidates_of(benches)
+    gram = gram_of(rows, columns_of(rows, benches, made))
+    return Search(base, benches, tuple(c for c, _ in made), gram)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The models that were compared, and of which the law is made: a short one, a dependence as a curve, or none."""
+
+    compared: tuple[Model, ...]
+    taken: tuple[Model, ...] = ()
+    curve: Dependence | None = None
+
+
+def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
+    """Return the models of the law, if any surely helps; a second place where that surely adds."""
+    gram = search.gram
+    models = paths(gram, search.candidates)
+    none = gram.held_out(np.array([], np.int64))
+    if not models:
+        return Choice(())
+    best = simplest(models, gram)
+    if not surely_helps(gram, none, best.left, best.columns, ()):
+        return Choice(tuple(models))
+    more = paths(gram, search.candidates, best.columns, most=3)
+    second = simplest([Model(best.place, (), best.left), *more], gram)
+    helps = second.columns and surely_helps(gram, best.left, second.left, second.columns, best.columns)
+    taken = (best, second) if helps else (best,)
+    return Choice((*models, *more), taken, _curve(search, depends, none, taken[-1]))
+
+
+def _curve(search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model) -> Dependence | None:
+    """Return the dependence that a learnt curve shall show, where short laws leave much of it."""
+    weight = search.gram.weights(none, SELECTION)
+    room = float(((none - search.gram.count)[SELECTION] @ weight).sum())
+    share = float(((none - short.left)[SELECTION] @ weight).sum()) / max(room, 1e-9)
+    curved = [d for d in depends if any(c.part and (c.place, c.regressor) == (d.place, d.regressor) for c in search.candidates)]
+    best = max(curved, key=lambda d: d.share, default=None)
+    if best is None or share > _SHORT_ENOUGH * best.share or best.share - share < 2.0 * best.se:
+        return None
+    return best
+
+
+def surely_helps(
+    gram: Gram, before: FloatArray, after: FloatArray, columns: Sequence[int], given: Sequence[int]
+) -> bool:
+    """Tell whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
+    weight = gram.weights(before, SELECTION)
+    gain = (before - after)[SELECTION] @ weight
+    if gain.sum() < _SURE * standard_error(gain):
+        return False
+    held = [gram.tested(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
+    fall = (held[0] - held[1])[HELD_BACK]
+    rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
+    return bool(fall.sum() > _SURE_ON_TEST * standard_error(fall) and rms > _MATTERS)
+
+
+def _result(
+    search: Search, depends: Sequence[Dependence], choice: Choice, records: Sequence[Record],
+    provenance: Provenance | None,
+) -> LawResult:  # fmt: skip
+    base = search.base
+    laws = _laws(search, choice)
+    drafts = [Draft(law, effect_from(Draft.source(law), law.name)) for law in laws]
+    with acting([d.effect for d in drafts]):
+        refined = _refined(base, drafts) if drafts else None
+        if refined is None or _gain(base, refined)[0] < _MATTERS:
+            return replace(nothing_left(base, records), dependences=tuple(depends), at_floor=False,
+                           tried=_tried(search, choice, ()))  # fmt: skip
+        gain, ci95 = _gain(base, refined)
+        before, noise = _levels(base.problem, base.outputs, base.cases)
+        problem = replace(refined.solution.problem, cases=base.cases)
+        after = _levels(problem, problem.outputs(refined.solution.theta), base.cases)[0]
+        share = _share(before, after, noise)
+        written = finished(drafts, refined, base.cases, provenance, gain, ci95)
+        rigs = [apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)]
+    return LawResult(
+        rig_name=rigs[0].name, sources=tuple(r.source for r in records),
+        duration=sum(c.duration for c in base.cases), base_rig=rigs[0], rig=rigs[1],
+        dependences=tuple(depends), tried=_tried(search, choice, choice.taken), laws=tuple(written),
+        gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise, at_floor=False,
+    )  # fmt: skip
+
+
+def _laws(search: Search, choice: Choice) -> list[Law]:
+    if choice.curve is not None:
+        return [curve_of(search.gram, search.candidates, search.benches, choice.curve)]
+    return law_of(search.gram, search.candidates, search.benches, choice.taken)
+
+
+def _refined(base: Base, drafts: Sequence[Draft]) -> Refined:
+    """Fit the laws in the simulation, twice: the second time in units of what the first leaves."""
+    starts = [(d.effect, d.law.parameters) for d in drafts]
+    weights = base.score((*TRAIN, *VALIDATION))
+    first = refine(base.solution, base.cases, weights, starts)
+    problem = replace(first.solution.problem, cases=base.cases)
+    left = score_on(problem, base.cases, (*TRAIN, *VALIDATION), problem.outputs(first.solution.theta))
+    n = len(base.solution.theta)
+    nearer = replace(base.solution, theta=first.solution.theta[:n])
+    again = [(d.effect, first.parameters(d.effect.name, d.law.parameters)) for d in drafts]
+    return refine(nearer, base.cases, left, again)
+
+
+def _gain(base: Base, refined: Refined) -> tuple[float, tuple[float, float]]:
+    """Return the gain on the test blocks with its interval."""
+    problem = replace(refined.solution.problem, cases=base.cases)
+    without = base.score(TEST)
+    with_it = score_on(problem, base.cases, TEST, problem.outputs(refined.solution.theta))
+    return gain_of(without, with_it)
+
+
+def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]:
+    """Return 1 - RMS(with) / RMS(without) of all channels together, and its 95 % bootstrap interval."""
+    a, b = with_it.loss(without), without.loss(without)
+    draws = np.random.default_rng(0).integers(0, len(a), (RESAMPLES, len(a)))
+    resampled = 1.0 - np.sqrt(a[draws].sum(axis=1) / np.maximum(b[draws].sum(axis=1), 1e-300))
+    low, high = np.quantile(resampled, [0.025, 0.975])
+    return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
+
+
+def _levels(
+    problem: Problem, outputs: Sequence[dict[str, FloatArray]], cases: Sequence[Case]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the RMS of each channel's residual on the test blocks, and its noise."""
+    score = score_on(problem, cases, TEST, list(outputs))
+    noise = {n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in score.sums}
+    return {n: score.ratio(n) * noise[n] for n in score.sums}, noise
+
+
+def _share(before: dict[str, float], after: dict[str, float], noise: dict[str, float]) -> float:
+    """Return which share of the power above the noise is explained, of the channels that had any."""
+    shares = [
+        ((before[n] ** 2 - after[n] ** 2), before[n] ** 2 - noise[n] ** 2)
+        for n in before
+        if before[n] > 1.1 * noise[n]
+    ]
+    return sum(a / b for a, b in shares) / len(shares) if shares else 0.0
+
+
+def _tried(search: Search, choice: Choice, taken: Sequence[Model]) -> tuple[Tried, ...]:
+    """Return the compared models with what each leaves, held out, over what the base leaves."""
+    gram, first = search.gram, len(search.gram.prior)
+    none = gram.held_out(np.array([], np.int64))
+    weight = gram.weights(none, SELECTION)
+    whole = float((none[SELECTION] @ weight).sum())
+    rows = []
+    for model in choice.compared:
+        terms = [search.candidates[k - first].term for k in model.columns]
+        left = float((model.left[SELECTION] @ weight).sum()) / whole
+        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(left, 0.0))), model in taken))
+    return tuple(rows)
