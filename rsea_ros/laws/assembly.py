@@ -11,7 +11,7 @@ from rsea_ros.laws.candidates import SPLINES, Candidate, basis_of, spline_knots
 from rsea_ros.laws.columns import Bench
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
-from rsea_ros.laws.law import Curve, Law, Part
+from rsea_ros.laws.law import Curve, Law, Part, joined
 from rsea_ros.laws.selection import Model
 from rsea_ros.laws.writing import ranges_of
 
@@ -36,7 +36,7 @@ def law_of(
         parts.setdefault(candidate.place, []).append(Part(candidate.term, float(b / gram.scale[k]), candidate.shape))
     laws = []
     for place, items in parts.items():
-        regressor = _joined(list(dict.fromkeys(p.term.regressor for p in items)))
+        regressor = joined(list(dict.fromkeys(p.term.regressor for p in items)))
         law = Law(f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {})
         laws.append(replace(law, ranges=ranges_of(law, _all_letters(benches)), name=_placed(law.name, place)))
     return laws
@@ -71,6 +71,3 @@ def _slug(text: str) -> str:
 def _placed(name: str, place: str) -> str:
     return name if place == "gear" or name.endswith(place) else f"{name}_at_{place}"
 
-
-def _joined(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

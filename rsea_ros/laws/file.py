@@ -52,12 +52,12 @@ def finished(
     written = []
     for draft in drafts:
         name = draft.effect.name
-        values = refined.parameters(name, draft.law.parameters)
+        values = refined.parameters(name)
         intervals = {n: refined.ci95[f"{name}.{n}"] for n in values if f"{name}.{n}" in refined.ci95}
         law = draft.law if draft.law.is_learnt else draft.law.with_parameters(values, intervals)
         claims = claims_of(law, draft.effect, rig, cases[0])
         shown = shown_of(problem, refined, law, values)
-        written.append(WrittenLaw(law, source_of(law, claims, replace(where, gain=said)), claims, shown))
+        written.append(WrittenLaw(law, draft.effect, source_of(law, claims, replace(where, gain=said)), claims, shown))
     return written
 
 

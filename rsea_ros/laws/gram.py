@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,6 +37,14 @@ class Gram:
     count: FloatArray
     scale: FloatArray
     prior: FloatArray
+
+    @cached_property
+    def by_set(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The sums a, b and rr of each set of blocks, channels apart."""
+        sets = range(4)
+        made = ([v[groups_of((k,))].sum(axis=0) for k in sets] for v in (self.a, self.b, self.rr))
+        a, b, rr = (np.array(v) for v in made)
+        return a, b, rr
 
     @property
     def nominal(self) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -95,8 +95,10 @@ class Law:
         parts = tuple(
             replace(part, coefficient=values[c], shape=values[s] if s else 0.0, ci95=ci95.get(c), shape_ci95=ci95.get(s))
             for part, (c, s) in zip(self.parts, self.names, strict=True)
+            if values[c] != 0.0
         )
-        return replace(self, parts=parts)
+        regressors = dict.fromkeys(part.term.regressor for part in parts)
+        return replace(self, parts=parts, regressor=joined(list(regressors)))
 
     def values(self, variables: Variables) -> FloatArray:
         """Return the law along a record."""
@@ -106,3 +108,8 @@ class Law:
 
         curve = np.interp(variables.letters[self.curve.over], self.curve.x, self.curve.y)
         return curve * factor_of(variables, self.place, self.curve.over, self.curve.factor)
+
+
+def joined(names: Sequence[str]) -> str:
+    """Return names as people list them."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

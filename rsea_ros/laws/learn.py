@@ -12,6 +12,7 @@ from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
 from rsea_ros.diagnosis.verdict import is_at_floor
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.identify import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Case, Problem
@@ -42,6 +43,10 @@ _MATTERS = 0.02
 """Smallest gain that is written down: 1 - RMS(with) / RMS(without)."""
 _SHORT_ENOUGH = 0.75
 """Of what a law without a form explains: a short law that explains less gives way to a learnt curve."""
+
+_NEEDED = 0.03
+"""Of what is left: a term without which the fit leaves no more than that is left out."""
+FITTED = (*TRAIN, *VALIDATION)
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
     checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
     problem = nominal_problem(checked, rig)
-    parts = [part(c, (*TRAIN, *VALIDATION)) for c in problem.cases]
+    parts = [part(c, FITTED) for c in problem.cases]
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None
     solution, known, _ = fit(parts, rig, start=start)
     cases = tuple(replace(c, noise=_finer(c, k)) for c, k in zip(problem.cases, known, strict=True))
@@ -218,24 +223,66 @@ def _laws(search: Search, choice: Choice) -> list[Law]:
 
 
 def _refined(base: Base, drafts: Sequence[Draft]) -> Refined:
-    """Fit the laws in the simulation, twice: the second time in units of what the first leaves."""
-    starts = [(d.effect, d.law.parameters) for d in drafts]
-    weights = base.score((*TRAIN, *VALIDATION))
-    first = refine(base.solution, base.cases, weights, starts)
-    problem = replace(first.solution.problem, cases=base.cases)
-    left = score_on(problem, base.cases, (*TRAIN, *VALIDATION), problem.outputs(first.solution.theta))
-    n = len(base.solution.theta)
-    nearer = replace(base.solution, theta=first.solution.theta[:n])
-    again = [(d.effect, first.parameters(d.effect.name, d.law.parameters)) for d in drafts]
-    return refine(nearer, base.cases, left, again)
+    """Fit the laws in the simulation, in units of what they leave, without the terms that it does not need."""
+    refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
+    weights = _score(base, refined, FITTED)
+    refined = _again(base, drafts, refined, weights, frozenset())
+    held: frozenset[str] = frozenset()
+    while (names := _least(drafts, refined, held)) is not None:
+        fewer = _again(base, drafts, refined, weights, held | names)
+        if fewer.solution.cost > (1.0 + _NEEDED) * refined.solution.cost:
+            break
+        refined, held = fewer, held | names
+    return refined
+
+
+def _starts(drafts: Sequence[Draft], refined: Refined | None) -> list[tuple[Effect, dict[str, float]]]:
+    if refined is None:
+        return [(d.effect, d.law.parameters) for d in drafts]
+    return [(d.effect, refined.parameters(d.effect.name)) for d in drafts]
+
+
+def _again(
+    base: Base, drafts: Sequence[Draft], refined: Refined, weights: Score, held: frozenset[str]
+) -> Refined:
+    """Fit from a fit on, with some parameters held: coefficients at zero, shapes where they are."""
+    nearer = replace(base.solution, theta=refined.solution.theta[: len(base.solution.theta)])
+    starts = [
+        (e, {n: 0.0 if f"{e.name}.{n}" in held and _is_size(d, n) else v for n, v in values.items()})
+        for d, (e, values) in zip(drafts, _starts(drafts, refined), strict=True)
+    ]
+    return refine(nearer, base.cases, weights, starts, held)
+
+
+def _is_size(draft: Draft, name: str) -> bool:
+    return name in {c for c, _ in draft.law.names}
+
+
+def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> frozenset[str] | None:
+    """Return the parameters of the term of least significance, its shape too where no other has it."""
+    terms = [(d.effect.name, c, s) for d in drafts for c, s in d.law.names if f"{d.effect.name}.{c}" not in held]
+    if len(terms) < 2:
+        return None
+
+    def significance(term: tuple[str, str, str]) -> float:
+        name = f"{term[0]}.{term[1]}"
+        low, high = refined.ci95[name]
+        return abs(refined.solution.values[name]) / max(high - low, 1e-300)
+
+    effect, c, s = min(terms, key=significance)
+    shared = any(other != c and shape == s for e, other, shape in terms if e == effect)
+    return frozenset({f"{effect}.{c}", *([f"{effect}.{s}"] if s and not shared else [])})
+
+
+def _score(base: Base, refined: Refined, sets: tuple[int, ...]) -> Score:
+    """Return the score of refined laws on some sets of blocks."""
+    problem = replace(refined.solution.problem, cases=base.cases)
+    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta))
 
 
 def _gain(base: Base, refined: Refined) -> tuple[float, tuple[float, float]]:
     """Return the gain on the test blocks with its interval."""
-    problem = replace(refined.solution.problem, cases=base.cases)
-    without = base.score(TEST)
-    with_it = score_on(problem, base.cases, TEST, problem.outputs(refined.solution.theta))
-    return gain_of(without, with_it)
+    return gain_of(base.score(TEST), _score(base, refined, TEST))
 
 
 def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]:

@@ -32,10 +32,11 @@ class Refined:
     solution: Solution
     ci95: Mapping[str, tuple[float, float]]
 
-    def parameters(self, name: str, start: Mapping[str, float]) -> dict[str, float]:
-        """Return the parameters of one law."""
+    def parameters(self, name: str) -> dict[str, float]:
+        """Return the parameters of one law, held ones included."""
         values = self.solution.values
-        return {n: values.get(f"{name}.{n}", v) for n, v in start.items()}
+        acting = next(e for e in self.solution.problem.rig.effects if e.name == name)
+        return {n: values.get(f"{name}.{n}", v) for n, v in acting.parameters.items()}
 
 
 def effect_from(source: str, name: str) -> Effect:

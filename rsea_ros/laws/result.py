@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rsea_ros.effects.effect import Claims
+from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.law import Law
 from rsea_ros.model.rig import Rig
@@ -39,9 +39,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class WrittenLaw:
-    """A law, the text of its effect file, and what is drawn of it."""
+    """A law, its effect, the text of its file, and what is drawn of it."""
 
     law: Law
+    effect: Effect
     source: str
     claims: Claims
     shown: Shown

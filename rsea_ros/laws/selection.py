@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.laws.candidates import Candidate
-from rsea_ros.laws.gram import FOLDS, SELECTION, Gram, groups_of
+from rsea_ros.laws.gram import FOLDS, SELECTION, Gram
 from rsea_ros.laws.terms import Place
 from rsea_ros.signals import FloatArray, IntArray
 
 MOST_TERMS = 5
 _RIDGE = 1e-7
+_SAME = 0.05
+"""Of what the best model leaves: models that differ by less in power are alike."""
 
 
 @dataclass(frozen=True)
@@ -57,20 +59,15 @@ class Folded:
 
 def folded(gram: Gram, weight: FloatArray) -> Folded:
     """Return the sums of each fold. weight: of each channel."""
-    inside, outside = [], []
-    for fold in FOLDS:
-        fit = groups_of([s for f in FOLDS if f != fold for s in f])
-        held = groups_of(fold)
-        inside.append((_summed(gram.a, fit, weight), np.einsum("c,gci->i", weight, gram.b[fit])))
-        outside.append((_summed(gram.a, held, weight), np.einsum("c,gci->i", weight, gram.b[held]),
-                        float((gram.rr[held] @ weight).sum())))  # fmt: skip
+    products, rights, squares = gram.by_set
+    sets = [k for fold in FOLDS for k in fold]
+    a = {k: np.tensordot(weight, products[k], 1) for k in sets}
+    b = {k: weight @ rights[k] for k in sets}
+    inside = [(sum(a[j] for j in sets if j != k), sum(b[j] for j in sets if j != k)) for k in sets]
+    outside = [(a[k], b[k], float(squares[k] @ weight)) for k in sets]
     penalty = np.zeros(gram.b.shape[2])
     penalty[: len(gram.prior)] = (gram.prior / gram.scale[: len(gram.prior)]) ** 2
     return Folded(tuple(inside), tuple(outside), penalty)
-
-
-def _summed(a: FloatArray, groups: IntArray, weight: FloatArray) -> FloatArray:
-    return np.asarray(np.tensordot(weight, a[groups].sum(axis=0), 1))
 
 
 def paths(
@@ -126,7 +123,7 @@ def simplest(models: Sequence[Model], gram: Gram) -> Model:
 
     def is_near(model: Model) -> bool:
         more = (model.left - best.left)[SELECTION] @ weight
-        return bool(more.sum() <= max(standard_error(more), 0.002 * float((best.left[SELECTION] @ weight).sum())))
+        return bool(more.sum() <= max(standard_error(more), _SAME * float((best.left[SELECTION] @ weight).sum())))
 
     near = [m for m in models if is_near(m)]
     return min(near, key=lambda m: (len(m.columns), m.minus_log_likelihood(gram)))
