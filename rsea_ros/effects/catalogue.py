@@ -40,13 +40,13 @@ def catalogue() -> Mapping[str, Effect]:
 @contextmanager
 def lent(*effects: Effect) -> Iterator[None]:
     """Have effects that lie in no file of the catalogue known within the block, such as one just written."""
-    added = {e.name: e for e in effects}
-    _LENT.update(added)
+    before = dict(_LENT)
+    _LENT.update({e.name: e for e in effects})
     try:
         yield
     finally:
-        for name in added:
-            del _LENT[name]
+        _LENT.clear()
+        _LENT.update(before)
 
 
 def effect_named(name: str) -> Effect:

@@ -1,8 +1,9 @@
 """What the missing torque depends on: laws without a form, each over other variables, judged held out.
 
 A spline over each variable (or terms of its past) is fitted beside all that the rig's own values can do;
-its share is what it takes of the power that is left above the noise. Then every other variable is added to
-the best one: what gains beyond its standard error belongs to it, else it is that variable and nothing else.
+its share is what it takes of the power that is left above the noise. Beside the chosen law each is fitted
+again: what still takes much more than its standard error belongs to it, else it is the law's variable and
+nothing else.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from rsea_ros.laws.candidates import Candidate
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.selection import standard_error
 from rsea_ros.laws.terms import Place
-from rsea_ros.signals import FloatArray
 
 _RIDGE = 1e-4
 """Of each part's power: a spline of many parts must not fit the noise."""
@@ -26,7 +26,7 @@ _RIDGE = 1e-4
 class Dependence:
     """How much of what is left is a function of something. share: of the power above the noise, held out.
 
-    se: its standard error. beside: what it adds where the best one acts already, with its error.
+    se: its standard error. beside: what it takes of the power that the chosen law leaves, with its error.
     """
 
     place: Place
@@ -49,21 +49,23 @@ def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, s
     return made
 
 
-def dependences(gram: Gram, candidates: Sequence[Candidate]) -> tuple[Dependence, ...]:
-    """Return how much of what is left depends on what, most first."""
+def dependences(
+    gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = ()
+) -> tuple[Dependence, ...]:
+    """Return how much of what is left depends on what, most first. given: columns of a law that acts already."""
     made = families(candidates, len(gram.prior))
     none = gram.held_out(np.array([], np.int64))
-    left = {key: gram.held_out(np.array(columns), _RIDGE) for key, columns in made.items()}
-    weight = gram.weights(none, SELECTION)
-    room = max(float(((none - gram.count)[SELECTION] @ weight).sum()), 1e-9)
-
-    def share(before: FloatArray, after: FloatArray) -> tuple[float, float]:
-        gain = (before - after)[SELECTION] @ weight
-        return float(gain.sum()) / room, standard_error(gain) / room
-
-    best = max(left, key=lambda key: share(none, left[key])[0])
+    law = gram.held_out(np.array([*given], np.int64)) if given else none
+    weight, near = gram.weights(none, SELECTION), gram.weights(law, SELECTION)
     result = []
     for key, columns in made.items():
-        both = left[best] if key == best else gram.held_out(np.array([*made[best], *columns]), _RIDGE)
-        result.append(Dependence(*key, *share(none, left[key]), *share(left[best], both)))
+        alone = (none - gram.held_out(np.array(columns), _RIDGE))[SELECTION] @ weight
+        more = [k for k in columns if k not in given]
+        beside = (law - gram.held_out(np.array([*given, *more]), _RIDGE))[SELECTION] @ near
+        left = float((law[SELECTION] @ near).sum())
+        room = max(float(((none - gram.count)[SELECTION] @ weight).sum()), 1e-9)
+        result.append(
+            Dependence(*key, float(alone.sum()) / room, standard_error(alone) / room,
+                       float(beside.sum()) / left, standard_error(beside) / left)
+        )  # fmt: skip
     return tuple(sorted(result, key=lambda d: -d.share))

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.effects.catalogue import lent
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.claims import claims_of
 from rsea_ros.laws.columns import bench_of
 from rsea_ros.laws.law import Law
-from rsea_ros.laws.refinement import Refined
+from rsea_ros.laws.refinement import Refined, effect_from
 from rsea_ros.laws.result import Shown, WrittenLaw
 from rsea_ros.laws.writing import Provenance, letters_of, source_of
 from rsea_ros.model.rig import EffectSetting
@@ -53,11 +54,16 @@ def finished(
     for draft in drafts:
         name = draft.effect.name
         values = refined.parameters(name)
+        if not any(values[n] for n in _sizes(draft.law)):
+            continue
         intervals = {n: refined.ci95[f"{name}.{n}"] for n in values if f"{name}.{n}" in refined.ci95}
         law = draft.law if draft.law.is_learnt else draft.law.with_parameters(values, intervals)
-        claims = claims_of(law, draft.effect, rig, cases[0])
         shown = shown_of(problem, refined, law, values)
-        written.append(WrittenLaw(law, draft.effect, source_of(law, claims, replace(where, gain=said)), claims, shown))
+        whole = len(law.parts) == len(draft.law.parts)
+        effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
+        with lent(effect):
+            claims = claims_of(law, effect, rig, cases[0])
+        written.append(WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=said)), claims, shown))
     return written
 
 

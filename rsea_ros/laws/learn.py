@@ -28,12 +28,12 @@ from rsea_ros.laws.file import Draft, finished
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.refinement import Refined, acting, effect_from, refine
-from rsea_ros.laws.result import LawResult, Tried
+from rsea_ros.laws.result import LawResult, Tried, WrittenLaw
 from rsea_ros.laws.selection import Model, paths, simplest, standard_error
 from rsea_ros.laws.writing import Provenance
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
-from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 
@@ -95,6 +95,8 @@ def learn(
         tell("comparing laws", 0.6)
         depends = dependences(search.gram, search.candidates)
         models = chosen_models(search, depends)
+        taken = [k for m in models.taken for k in m.columns]
+        depends = dependences(search.gram, search.candidates, taken) if taken else depends
         tell("fitting the law in the simulation", 0.75)
         return _result(search, depends, models, records, provenance)
 
@@ -210,10 +212,17 @@ def _result(
         rigs = [apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)]
     return LawResult(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
-        duration=sum(c.duration for c in base.cases), base_rig=rigs[0], rig=rigs[1],
+        duration=sum(c.duration for c in base.cases), base_rig=rigs[0], rig=_with_files(rigs[1], rigs[0], written),
         dependences=tuple(depends), tried=_tried(search, choice, choice.taken), laws=tuple(written),
         gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise, at_floor=False,
     )  # fmt: skip
+
+
+def _with_files(rig: Rig, base: Rig, written: Sequence[WrittenLaw]) -> Rig:
+    """Return a rig with the effects of the base and the laws that have files, with their parameters."""
+    acting = {e.name for e in base.effects}
+    laws = (EffectSetting(w.law.name, w.law.parameters) for w in written)
+    return rig.with_effects(*(e for e in rig.effects if e.name in acting), *laws)
 
 
 def _laws(search: Search, choice: Choice) -> list[Law]:

@@ -68,7 +68,7 @@ def bends(values, angle):  # type: ignore[no-untyped-def]
 def delayed(values: FloatArray, steps: float) -> FloatArray:
     """Return a signal that comes so many steps later, zero before."""
     at = np.arange(len(values)) - steps
-    return np.interp(at, np.arange(len(values)), values, left=0.0)
+    return np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0)
 
 
 def remembered(memory: str, values: FloatArray, step: float, shape: float) -> FloatArray:

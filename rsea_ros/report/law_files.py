@@ -45,7 +45,7 @@ def law_json(result: LawResult) -> dict[str, Any]:
         "noise_rms": numbers(result.noise),
         "laws": [_law(w.law) for w in result.laws],
         "depends_on": [
-            {"what": d.regressor, "at": d.place, "share": d.share, "se": d.se, "beside_first": d.beside}
+            {"what": d.regressor, "at": d.place, "share": d.share, "se": d.se, "of_what_the_law_leaves": d.beside}
             for d in result.dependences
         ],
         "tried": [

@@ -68,7 +68,7 @@ def _over(written: WrittenLaw) -> Figure:
     windows = np.array_split(np.argsort(shown.t), _WINDOWS)
     data: list[Json] = [
         _points(x, y, faint(MEASURED, 0.28), 3.5, "measured"),
-        *(_points(x[k], y[k], faint(BEFORE, 0.85), 5, f"{shown.t[k[0]]:.0f} to {shown.t[k[-1]]:.0f} s", visible=i == 0)
+        *(_points(x[k], y[k], faint(BEFORE, 0.85), 5, "", visible=i == 0)
           for i, k in enumerate(windows)),
         band(centre, low, high, faint(AFTER, 0.16)),
         _bars(centre, middle, error),
@@ -171,10 +171,10 @@ def _depends(result: LawResult) -> str:
         f"<tr><td>{escape(d.regressor)}<small>{escape(d.place)}</small></td>"
         f"<td data-label='alone'>{bars_of(d.share)}</td>"
         f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {196 * d.se:.0f} %</td>"
-        f"<td class='number' data-label='beside the first'>{'–' if d is result.dependences[0] else f'{100 * d.beside:+.1f} %'}</td></tr>"
+        f"<td class='number' data-label='of what the law leaves'>{100 * max(d.beside, 0.0):.1f} %</td></tr>"
         for d in top
     )
-    head = "<tr><th>A function of</th><th></th><th class='number'>explains, held out</th><th class='number'>adds to the first</th></tr>"
+    head = "<tr><th>A function of</th><th></th><th class='number'>explains, held out</th><th class='number'>of what the law leaves</th></tr>"
     return section(
         "What it depends on", f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on others: "

@@ -9,8 +9,8 @@ from rsea_ros.laws.result import LawResult
 from rsea_ros.laws.writing import equation_of
 from rsea_ros.report import words
 
-_CLEARLY = 0.03
-"""Share of what is left that another variable must add to be told of."""
+_CLEARLY = 0.1
+"""Share of what the law leaves that another variable must take to be told of."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
          "t": "time", "share": "time"}  # fmt: skip
 UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s"}
