@@ -16,6 +16,7 @@ import argparse
 import json
 import sys
 import time
+import traceback
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -51,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for case in cases(args.clean):
         if case.group != args.group or case.name in done or args.select not in case.name:
             continue
-        row = outcome(case, args.duration or 30.0)
+        row = _kept(case, args.duration or 30.0)
         with args.log.open("a", encoding="utf-8") as log:
             log.write(json.dumps(row) + "\n")
         print(_line(row), flush=True)
@@ -59,14 +60,30 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--group", choices=("catalogue", "unknown", "clean", "time"), default="catalogue")
     parser.add_argument("--select", default="", metavar="TEXT", help="only cases with TEXT in their name")
-    parser.add_argument("--clean", type=int, default=50, metavar="N", help="clean benches (default %(default)s)")
-    parser.add_argument("--duration", type=float, metavar="S", help="of a record (default 30 s, 160 s for time)")
+    parser.add_argument(
+        "--clean", type=int, default=50, metavar="N", help="clean benches (default %(default)s)"
+    )
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="of a record (default 30 s, 160 s for time)"
+    )
     parser.add_argument("--log", type=Path, default=Path("out/laws.jsonl"), help="outcomes, one a line")
     parser.add_argument("--table", action="store_true", help="print the figures of the log")
     return parser
+
+
+def _kept(case: LawCase, duration: float) -> dict[str, object]:
+    """Return the outcome of a case, or that it broke: one must not stop the others."""
+    try:
+        return outcome(case, duration)
+    except Exception:
+        traceback.print_exc()
+        return {"name": case.name, "group": case.group, "seconds": 0.0, "terms": 0, "learnt": False, "names": ["broken"],
+                "places": [], "regressors": ["broken"], "right": False, "gain": 0.0, "true_gain": 1.0}  # fmt: skip
 
 
 def outcome(case: LawCase, duration: float) -> dict[str, object]:
@@ -155,7 +172,9 @@ def table(rows: Sequence[dict[str, object]]) -> str:
     clean = [r for r in rows if r["group"] == "clean"]
     if clean:
         nothing = [not r["names"] for r in clean]
-        lines.append(f"| clean benches without a law | ≥ 98 % | {100 * np.mean(nothing):.0f} % of {len(clean)} |")
+        lines.append(
+            f"| clean benches without a law | ≥ 98 % | {100 * np.mean(nothing):.0f} % of {len(clean)} |"
+        )
     return "\n".join(lines)
 
 

@@ -57,7 +57,9 @@ class LawCase:
                 bench, 10 * self.seed + 1, "multisine", duration
             )
         rig = _moved(load_rig(self.rig), self.seed)
-        hidden = rig.with_effects(EffectSetting(self.effect.name, dict(self.parameters))) if self.effect else rig
+        hidden = (
+            rig.with_effects(EffectSetting(self.effect.name, dict(self.parameters))) if self.effect else rig
+        )
         made = []
         with lent(*([self.effect] if self.effect else [])):
             for k, excitation in enumerate((chirp_noise, odd_multisine)):
@@ -88,10 +90,10 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "encoder_eccentricity": ("position, periodic, at the encoder",),
     "ft_bias": ("a constant, at the sensor",),
     "ft_drift": ("time, at the sensor",),
-    "ft_gain_error": ("the sensor's torque",),
+    "ft_gain_error": ("the sensor's torque", "command"),
     "ft_sensor_lag": ("the sensor's past",),
-    "gear_compliance": ("the load, at the encoder",),
-    "gravity_error": ("position",),
+    "gear_compliance": ("the load, at the encoder", "command's past"),
+    "gravity_error": ("the load's angle", "position"),
     "hard_stop": ("deflection",),
     "load_dependent_friction": ("speed and load",),
     "lopsided_spring": ("deflection",),
@@ -104,11 +106,12 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "stribeck_friction": ("speed",),
     "structural_resonance": ("the sensor's past",),
     "torque_constant_drift": ("command and time",),
-    "torque_constant_error": ("command",),
+    "torque_constant_error": ("command", "the sensor's torque"),
     "torque_ripple": ("position, periodic",),
     "torque_saturation": ("command",),
     "voltage_sag": ("command and speed", "command"),
 }
+"""The regressors that are right for each effect; those of an effect that it may be confused with count too."""
 
 
 @compiled
@@ -148,7 +151,9 @@ def _effect(name: str, port: Port, function: object, reads: tuple[int, ...], sta
         Parameter(n, unit, 0.0 if k == 0 else v, v / 20.0, 20.0 * v, v, logarithmic=k > 0)
         for k, (n, (unit, v)) in enumerate(sizes.items())
     )
-    return Effect(name, port, parameters, _CLAIMS, function, states=states, reads=reads, equation=" ".join(sizes))
+    return Effect(
+        name, port, parameters, _CLAIMS, function, states=states, reads=reads, equation=" ".join(sizes)
+    )
 
 
 WRITTEN = (
@@ -186,7 +191,9 @@ def cases(clean: int) -> list[LawCase]:
         if name in RIGHT:
             rig = FREE if name == "gravity_error" else RIG
             made.append(LawCase(name, "catalogue", effect, effect.typical, RIGHT[name], rig, seed=11 + k))
-    made += [LawCase(e.name, "unknown", e, e.typical, right, seed=71 + k) for k, (e, right) in enumerate(WRITTEN)]
+    made += [
+        LawCase(e.name, "unknown", e, e.typical, right, seed=71 + k) for k, (e, right) in enumerate(WRITTEN)
+    ]
     for k, (name, (values, near, parameters, right)) in enumerate(OUTSIDE.items()):
         made.append(LawCase(name, "unknown", catalogue()[near], parameters, right, RIG, values, 91 + k))
     for k in range(clean):

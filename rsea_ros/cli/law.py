@@ -33,9 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Look for a law and write it."""
     from rsea_ros.model.rig_file import load_rig
 
-    place = results_place(
-        args, Path("out") / f"law-{Path(args.bags[0]).stem}", FILES, [*args.bags, args.rig]
-    )
+    place = results_place(args, Path("out") / f"law-{Path(args.bags[0]).stem}", FILES, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("law") as tell:
         tell("reading", 0.0)

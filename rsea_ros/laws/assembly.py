@@ -33,11 +33,15 @@ def law_of(
     for k, b in zip(columns, beta, strict=True):
         candidate = candidates[k - first]
         assert candidate.term is not None
-        parts.setdefault(candidate.place, []).append(Part(candidate.term, float(b / gram.scale[k]), candidate.shape))
+        parts.setdefault(candidate.place, []).append(
+            Part(candidate.term, float(b / gram.scale[k]), candidate.shape)
+        )
     laws = []
     for place, items in parts.items():
         regressor = joined(list(dict.fromkeys(p.term.regressor for p in items)))
-        law = Law(f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {})
+        law = Law(
+            f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
+        )
         laws.append(replace(law, ranges=ranges_of(law, _all_letters(benches)), name=_placed(law.name, place)))
     return laws
 
@@ -55,12 +59,21 @@ def curve_of(
     x = np.linspace(knots[0], knots[-1], _POINTS)
     used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
     curve = Curve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
-    law = Law(_placed(f"learnt_law_of_{_slug(dependence.regressor)}", place), place, dependence.regressor, (), {}, curve)
+    law = Law(
+        _placed(f"learnt_law_of_{_slug(dependence.regressor)}", place),
+        place,
+        dependence.regressor,
+        (),
+        {},
+        curve,
+    )
     return replace(law, ranges=ranges_of(law, _all_letters(benches)))
 
 
 def _all_letters(benches: Sequence[Bench]) -> dict[str, np.ndarray]:
-    return {n: np.concatenate([b.variables.letters[n] for b in benches]) for n in benches[0].variables.letters}
+    return {
+        n: np.concatenate([b.variables.letters[n] for b in benches]) for n in benches[0].variables.letters
+    }
 
 
 def _slug(text: str) -> str:
@@ -70,4 +83,3 @@ def _slug(text: str) -> str:
 
 def _placed(name: str, place: str) -> str:
     return name if place == "gear" or name.endswith(place) else f"{name}_at_{place}"
-

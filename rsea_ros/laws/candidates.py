@@ -10,18 +10,20 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from rsea_ros.laws.columns import Bench, Rows
-from rsea_ros.laws.repeats import lines, periods
+from rsea_ros.laws.repeats import lines, modes, periods
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
     CREEP,
     ENCODER_TERMS,
     GEAR_TERMS,
+    LOAD_TERMS,
     MOTOR_TERMS,
     SENSOR_TERMS,
     SPRING_TERMS,
     Place,
     Term,
     hum_terms,
+    mode_terms,
     wave_terms,
 )
 from rsea_ros.laws.variables import Variables
@@ -79,6 +81,7 @@ SPLINES = (
     Spline("encoder", "the load, at the encoder", "T", parts=7),
 )
 
+
 def spline_parts(variables: Variables, spline: Spline, knots: FloatArray) -> FloatArray:
     """Return the parts of a spline along a record, shape (parts, n)."""
     basis = basis_of(variables.letters[spline.over], knots)
@@ -119,13 +122,23 @@ def basis_of(x: FloatArray, knots: FloatArray) -> FloatArray:
 def terms_for(benches: Sequence[Bench]) -> tuple[Term, ...]:
     """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
     bench = benches[0]
-    made: list[Term] = [*GEAR_TERMS, *COMMAND_TERMS, *MOTOR_TERMS, *SPRING_TERMS, *SENSOR_TERMS, *ENCODER_TERMS]
+    made: list[Term] = [
+        *GEAR_TERMS,
+        *COMMAND_TERMS,
+        *MOTOR_TERMS,
+        *SPRING_TERMS, *LOAD_TERMS,
+        *SENSOR_TERMS,
+        *ENCODER_TERMS,
+    ]
     for cycles in wave_numbers(bench):
         made += wave_terms(cycles)
     if "ft" in bench.places:
         made += [t for f in sensor_lines(bench) for t in hum_terms(f)]
+        made += mode_terms(sensor_modes(bench))
     rigid = bench.injector is None
-    return tuple(t for t in made if t.place in bench.places and not (rigid and "d" in (t.over, t.expression[:1])))
+    return tuple(
+        t for t in made if t.place in bench.places and not (rigid and "d" in (t.over, t.expression[:1]))
+    )
 
 
 def wave_numbers(bench: Bench) -> list[float]:
@@ -136,15 +149,19 @@ def wave_numbers(bench: Bench) -> list[float]:
     return periods(theta, missing.torque)
 
 
+def sensor_modes(bench: Bench) -> list[float]:
+    """Return the frequencies of the highest broad peaks of the F/T sensor's residual, Hz."""
+    keep = bench.case.mask["ft"]
+    return modes(bench.case.t["ft"][keep], bench.residual["ft"][keep])
+
+
 def sensor_lines(bench: Bench) -> list[float]:
     """Return the frequency of the sharpest line in what the F/T sensor has beside the mechanics, Hz."""
     case = bench.case
     keep = case.mask["ft"]
     t = case.t["ft"][keep]
     explained = np.interp(t - case.start, bench.missing.t, bench.missing.answers["ft"])
-    assert bench.injector is not None
-    base = np.interp(case.t["ft"], bench.injector.drive.start + bench.injector.middles, bench.injector.base[1:, 3])
-    return lines(t, (case.measured["ft"] - base)[keep] - explained)
+    return lines(t, bench.residual["ft"][keep] - explained)
 
 
 def candidates_of(benches: Sequence[Bench]) -> list[tuple[Candidate, list[FloatArray]]]:

@@ -53,7 +53,9 @@ def _beginning(drive: Drive) -> Drive:
 
 def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:
     """Return what the law changes of every channel under the command times a factor."""
-    scaled = replace(drive, command=factor * drive.command, impulse={n: factor * v for n, v in drive.impulse.items()})
+    scaled = replace(
+        drive, command=factor * drive.command, impulse={n: factor * v for n, v in drive.impulse.items()}
+    )
     setting = EffectSetting(effect.name, law.parameters)
     linear = rig.with_effects()
     without, with_it = (simulate_drive(r, scaled) for r in (linear, linear.with_effects(setting)))

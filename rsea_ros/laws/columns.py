@@ -25,9 +25,13 @@ GROUPS = 8
 
 @dataclass(frozen=True)
 class Bench:
-    """One case with its base model: what is missing, what a law may depend on, and how a torque answers."""
+    """One case with its base model: what is missing, what a law may depend on, and how a torque answers.
+
+    residual: measured less simulated by channel, zero where that is masked.
+    """
 
     case: Case
+    residual: Mapping[str, FloatArray]
     missing: MissingTorque
     variables: Variables
     injector: Injector | None
@@ -43,6 +47,7 @@ class Bench:
             "motor": rig.loop is None,
             "command": rig.loop is None and "motor_torque" in measured,
             "spring": not rig.rigid_spring and rig.ft_end == "spring_end",
+            "load": len(rig.clamped) == 1 and rig.loop is None,
             "ft": "ft" in measured,
             "encoder": "position" in measured and not rig.rigid_spring,
         }
@@ -53,8 +58,8 @@ class Bench:
         case = self.case
         if self.injector is None:
             return {"motor_torque": -smoothed(values, self.variables.step)}
-        if PORTS[place] in (PORTS["command"], PORTS["motor"], PORTS["gear"], PORTS["spring"]):
-            return self.injector.answers(values, PORTS[place])
+        if place not in ("ft", "encoder"):
+            return self.injector.answers(values, place)
         made = {n: np.zeros(len(t)) for n, t in case.t.items()}
         at = self.injector.drive.start + self.injector.middles
         if place == "ft":
@@ -76,7 +81,7 @@ def bench_of(
         t = case.drive.t - case.drive.t[0]
         torque = -residual["motor_torque"]
         missing = MissingTorque(t, torque, case.noise["motor_torque"], {})
-        return Bench(case, missing, variables_along(rig, case.drive), None)
+        return Bench(case, residual, missing, variables_along(rig, case.drive), None)
     since = {n: t - case.start for n, t in case.t.items()}
     sampled = {n: t + clocks.later(n, since[n]) + rig.clock(n, since[n]) for n, t in case.t.items()}
     injector = Injector(rig, case.drive, sampled)
@@ -84,7 +89,7 @@ def bench_of(
     period = float(np.median(np.diff(case.t[channel])))
     motion = missing_torque(case, residual, injector, period)
     missing = motion if place == "gear" else missing_torque(case, residual, injector, period, place)
-    return Bench(case, missing, variables_of(injector, motion), injector)
+    return Bench(case, residual, missing, variables_of(injector, motion), injector)
 
 
 @dataclass(frozen=True)
@@ -106,9 +111,7 @@ class Rows:
     def column(self, answers: Sequence[Mapping[str, FloatArray]]) -> FloatArray:
         """Return answers, one mapping a case, as a column of these rows."""
         cases = self.problem.cases
-        return np.concatenate(
-            [(answers[i][n] / cases[i].noise[n])[cases[i].mask[n]] for i, n in self.masks]
-        )
+        return np.concatenate([(answers[i][n] / cases[i].noise[n])[cases[i].mask[n]] for i, n in self.masks])
 
     @cached_property
     def parts(self) -> dict[tuple[int, int], IntArray]:

@@ -44,7 +44,9 @@ def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, s
         if c.part is not None:
             made.setdefault((c.place, c.regressor), []).append(first + k)
     for k, c in enumerate(candidates):
-        if c.term is not None and ((c.place, c.regressor) not in made or c.term.memory or c.term.shape == "cycles_per_revolution"):
+        if c.term is not None and (
+            (c.place, c.regressor) not in made or c.term.memory or c.term.shape == "cycles_per_revolution"
+        ):
             made.setdefault((c.place, c.regressor), []).append(first + k)
     return made
 

@@ -21,7 +21,7 @@ from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000
 """Of the missing torque that are drawn."""
-_FIRST = ("theta", "d", "w", "u", "T", "q", "t", "share")
+_FIRST = ("theta", "h", "d", "w", "u", "T", "q", "t", "share")
 _NO_PROVENANCE = Provenance("an unknown date", "0", {"unknown": "0"}, "")
 
 
@@ -63,7 +63,9 @@ def finished(
         effect = draft.effect if whole else effect_from(Draft.source(law), law.name)
         with lent(effect):
             claims = claims_of(law, effect, rig, cases[0])
-        written.append(WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=said)), claims, shown))
+        written.append(
+            WrittenLaw(law, effect, source_of(law, claims, replace(where, gain=said)), claims, shown)
+        )
     return written
 
 

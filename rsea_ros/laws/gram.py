@@ -62,7 +62,7 @@ class Gram:
         Each channel weighs as what is left of it (maximum likelihood with unknown noise).
         """
         which = np.concatenate([self.nominal, columns])
-        a = self.a[np.ix_(groups, range(self.a.shape[1]), which, which)].sum(axis=0)
+        a = self.a[np.ix_(groups, np.arange(self.a.shape[1]), which, which)].sum(axis=0)
         b = self.b[groups].sum(axis=0)[:, which]
         rr, count = self.rr[groups].sum(axis=0), np.maximum(self.count[groups].sum(axis=0), 1.0)
         beta = np.zeros(len(which))

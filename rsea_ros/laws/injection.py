@@ -15,6 +15,7 @@ import numpy as np
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.effects.signal_table import Port
+from rsea_ros.laws.terms import PORTS, Place
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.sampling import sample
@@ -28,10 +29,14 @@ _SHARE = 1e-3
 
 @compiled
 def _injected(s, p, x):  # type: ignore[no-untyped-def]
-    """Add p[1:], one value a step, at the port p[0]."""
+    """Add p[1:], one value a step, at the port p[0]; 5 and 6: on the housing's and on the spring's end."""
     at = s[st.TIME] / s[st.STEP]
     if p[0] == 2.0:
         s[st.GEAR_TORQUE] += p[1 + int(at)]
+    elif p[0] == 5.0:
+        s[st.HOUSING_TORQUE] += p[1 + int(at)]
+    elif p[0] == 6.0:
+        s[st.DISTAL_TORQUE] += p[1 + int(at)]
     elif p[0] == 3.0:
         k = int(at + 0.5)
         s[st.SPRING_TORQUE] += 0.5 * (p[k] + p[1 + k]) if s[st.COMMIT] == 1.0 else p[1 + int(at)]
@@ -58,23 +63,23 @@ class Injector:
     @cached_property
     def base(self) -> FloatArray:
         """All OUTPUTS at the ends of the steps, the start first, without anything added."""
-        return self._run(None, Port.GEAR)
+        return self._run(None, "gear")
 
-    def answers(self, torque: FloatArray, port: Port) -> dict[str, FloatArray]:
+    def answers(self, torque: FloatArray, place: Place) -> dict[str, FloatArray]:
         """Return what a torque (N m, one value a step) at a port changes of each sampled channel."""
         largest = float(np.max(np.abs(torque), initial=0.0))
         if largest == 0.0:
             return {n: np.zeros(len(t)) for n, t in self.sampled.items()}
         drive = self.drive
         size = _SHARE * (1.0 if self.rig.loop else float(np.max(np.abs(drive.command), initial=1e-9)))
-        out = (self._run(torque * (size / largest), port) - self.base) * (largest / size)
+        out = (self._run(torque * (size / largest), place) - self.base) * (largest / size)
         at = {n: (t - drive.start) / drive.step for n, t in self.sampled.items()}
         kinks = np.zeros(len(drive.command))
         return {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in at}
 
-    def raw(self, torque: FloatArray, port: Port) -> FloatArray:
+    def raw(self, torque: FloatArray, place: Place) -> FloatArray:
         """Return what a torque (N m) changes of all OUTPUTS at the ends of the steps, the start first."""
-        return self._run(torque, port) - self.base
+        return self._run(torque, place) - self.base
 
     def quiet(self) -> Injector:
         """Return the same rig at rest, without commands and without effects: its linear part."""
@@ -82,11 +87,13 @@ class Injector:
         still = replace(drive, command=np.zeros(len(drive.command)), initial=(0.0, 0.0))
         return Injector(rig.with_effects(), still, self.sampled)
 
-    def _run(self, torque: FloatArray | None, port: Port) -> FloatArray:
+    def _run(self, torque: FloatArray | None, place: Place) -> FloatArray:
         drive, rig = self.drive, self.rig
-        machine = build(rig, drive.step, drive.drift_time, in_loop=len(drive.reference) > 0 or rig.loop is not None)
+        machine = build(
+            rig, drive.step, drive.drift_time, in_loop=len(drive.reference) > 0 or rig.loop is not None
+        )
         if torque is not None:
-            machine = with_injection(machine, torque, port)
+            machine = with_injection(machine, torque, PORTS[place], _kind(rig, place))
         machine.begin(drive.initial)
         out = np.empty((len(drive.command) + 1, len(OUTPUTS)))
         out[0] = machine.table[[st.POSITION, st.VELOCITY, st.COMMAND, st.FT, st.SPRING_ANGLE]]
@@ -98,12 +105,18 @@ class Injector:
         return out
 
 
-def with_injection(machine: Machine, torque: FloatArray, port: Port) -> Machine:
+def _kind(rig: Rig, place: Place) -> float:
+    if place != "load":
+        return float(PORTS[place])
+    return 5.0 if rig.is_free("housing_end") else 6.0
+
+
+def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float) -> Machine:
     """Return a machine to which a torque is added at a port, after the effects that act there."""
     calls, at = machine.calls, int(machine.calls.first[port + 1])
     first = calls.first.copy()
     first[port + 1 :] += 1
-    series = np.concatenate([[float(port)], torque, torque[-1:]])
+    series = np.concatenate([[kind], torque, torque[-1:]])
     changed = Calls(
         first=first,
         address=np.insert(calls.address, at, _injected.address),

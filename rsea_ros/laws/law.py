@@ -93,7 +93,13 @@ class Law:
     def with_parameters(self, values: Mapping[str, float], ci95: Mapping[str, tuple[float, float]]) -> Law:
         """Return the law with fitted parameters and their intervals, by name."""
         parts = tuple(
-            replace(part, coefficient=values[c], shape=values[s] if s else 0.0, ci95=ci95.get(c), shape_ci95=ci95.get(s))
+            replace(
+                part,
+                coefficient=values[c],
+                shape=values[s] if s else 0.0,
+                ci95=ci95.get(c),
+                shape_ci95=ci95.get(s),
+            )
             for part, (c, s) in zip(self.parts, self.names, strict=True)
             if values[c] != 0.0
         )

@@ -78,7 +78,10 @@ class Search:
 
 
 def learn(
-    records: Sequence[Record], rig: Rig, provenance: Provenance | None = None, progress: Progress | None = None
+    records: Sequence[Record],
+    rig: Rig,
+    provenance: Provenance | None = None,
+    progress: Progress | None = None,
 ) -> LawResult:
     """Return what is missing in a rig's simulation of records, as laws with their effect files.
 
@@ -165,12 +168,18 @@ def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
     return Choice((*models, *more), taken, _curve(search, depends, none, taken[-1]))
 
 
-def _curve(search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model) -> Dependence | None:
+def _curve(
+    search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model
+) -> Dependence | None:
     """Return the dependence that a learnt curve shall show, where short laws leave much of it."""
     weight = search.gram.weights(none, SELECTION)
     room = float(((none - search.gram.count)[SELECTION] @ weight).sum())
     share = float(((none - short.left)[SELECTION] @ weight).sum()) / max(room, 1e-9)
-    curved = [d for d in depends if any(c.part and (c.place, c.regressor) == (d.place, d.regressor) for c in search.candidates)]
+    curved = [
+        d
+        for d in depends
+        if any(c.part and (c.place, c.regressor) == (d.place, d.regressor) for c in search.candidates)
+    ]
     best = max(curved, key=lambda d: d.share, default=None)
     if best is None or share > _SHORT_ENOUGH * best.share or best.share - share < 2.0 * best.se:
         return None
@@ -209,7 +218,9 @@ def _result(
         after = _levels(problem, problem.outputs(refined.solution.theta), base.cases)[0]
         share = _share(before, after, noise)
         written = finished(drafts, refined, base.cases, provenance, gain, ci95)
-        rigs = [apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)]
+        rigs = [
+            apply(s.problem.rig, s.problem.unknowns, s.theta)[0] for s in (base.solution, refined.solution)
+        ]
     return LawResult(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
         duration=sum(c.duration for c in base.cases), base_rig=rigs[0], rig=_with_files(rigs[1], rigs[0], written),
@@ -269,7 +280,9 @@ def _is_size(draft: Draft, name: str) -> bool:
 
 def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> frozenset[str] | None:
     """Return the parameters of the term of least significance, its shape too where no other has it."""
-    terms = [(d.effect.name, c, s) for d in drafts for c, s in d.law.names if f"{d.effect.name}.{c}" not in held]
+    terms = [
+        (d.effect.name, c, s) for d in drafts for c, s in d.law.names if f"{d.effect.name}.{c}" not in held
+    ]
     if len(terms) < 2:
         return None
 
@@ -332,5 +345,6 @@ def _tried(search: Search, choice: Choice, taken: Sequence[Model]) -> tuple[Trie
     for model in choice.compared:
         terms = [search.candidates[k - first].term for k in model.columns]
         left = float((model.left[SELECTION] @ weight).sum()) / whole
-        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(left, 0.0))), model in taken))
+        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(left, 0.0))),
+                          any(model is t for t in taken)))  # fmt: skip
     return tuple(rows)

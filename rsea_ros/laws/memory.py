@@ -35,6 +35,31 @@ def bent(before, way, angle):  # type: ignore[no-untyped-def]
     return side + (before - side) * math.exp(-abs(way) / angle)
 
 
+@njit(inline="always")
+def rung(x, first, value, step, frequency, damping_ratio):  # type: ignore[no-untyped-def]
+    """Return y of y'' / w^2 + 2 damping_ratio y' / w + y = value after a step; y and y' are x[first:first + 2].
+
+    frequency: Hz, w = 2 pi frequency; exact for a value that is held over the step.
+    """
+    w = 2.0 * math.pi * frequency
+    decay, turn = damping_ratio * w, w * math.sqrt(1.0 - damping_ratio * damping_ratio)
+    u, v = x[first] - value, x[first + 1]
+    e, c, n = math.exp(-decay * step), math.cos(turn * step), math.sin(turn * step) / turn
+    x[first] = value + e * (u * (c + decay * n) + v * n)
+    x[first + 1] = e * (v * (c - decay * n) - u * w * w * n)
+    return x[first]
+
+
+@njit(cache=True)
+def rings(values, step, frequency, damping_ratio):  # type: ignore[no-untyped-def]
+    """Return the answer of a mode along a signal."""
+    out, x = np.empty(len(values)), np.zeros(2)
+    x[0] = values[0]
+    for k in range(len(values)):
+        out[k] = rung(x, 0, values[k], step, frequency, damping_ratio)
+    return out
+
+
 @njit(cache=True)
 def lags(values, step, time_constant):  # type: ignore[no-untyped-def]
     """Return the lag of a signal at the middle of each step, as one who is called there has it."""
@@ -68,11 +93,15 @@ def bends(values, angle):  # type: ignore[no-untyped-def]
 def delayed(values: FloatArray, steps: float) -> FloatArray:
     """Return a signal that comes so many steps later, zero before."""
     at = np.arange(len(values)) - steps
-    return np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0)
+    return np.asarray(np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0))
 
 
-def remembered(memory: str, values: FloatArray, step: float, shape: float) -> FloatArray:
-    """Return what a memory makes of a signal along the steps. heat: of its square, N² m²."""
+def remembered(
+    memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0
+) -> FloatArray:
+    """Return what a memory makes of a signal along the steps. heat: of its square. constant: a damping ratio."""
+    if memory == "ring":
+        return np.asarray(rings(values, step, shape, constant))
     if memory == "delay":
         return delayed(values, shape / step)
     if memory == "play":

@@ -24,7 +24,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from rsea_ros.identification.problem import Case
 from rsea_ros.laws.injection import Injector
-from rsea_ros.laws.terms import PORTS, Place
+from rsea_ros.laws.terms import Place
 from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray
 
@@ -51,7 +51,7 @@ def missing_torque(
     """
     drive = injector.drive
     count = int(drive.duration / period)
-    t = period * np.arange(count)
+    t = np.asarray(period * np.arange(count), np.float64)
     used = [n for n in residual if n != "motor_torque" or place == "command"]
     size = 2 * count
     answer = _pulse_answers(injector, period, count, place)
@@ -77,7 +77,7 @@ def _pulse_answers(injector: Injector, period: float, count: int, place: Place) 
     hold = max(1, round(period / drive.step))
     pulse = np.zeros(steps)
     pulse[:hold] = 1.0
-    out = quiet.raw(pulse, PORTS[place])
+    out = quiet.raw(pulse, place)
     at = np.minimum(np.rint(period * np.arange(count) / drive.step).astype(np.int64), steps)
     return {n: out[at, k] for k, n in enumerate(OUTPUTS)}
 
@@ -107,4 +107,3 @@ def _prior(right: FloatArray, told: FloatArray, count: int) -> FloatArray:
     width = max(2.0, len(power) / 400.0)
     excess = gaussian_filter1d(power, width) - 1.0 / told
     return np.asarray(np.maximum(excess, 1e-2 / told))
-

@@ -54,7 +54,9 @@ def acting(effects: Sequence[Effect]) -> Iterator[None]:
         yield
 
 
-def with_laws(problem: Problem, laws: Sequence[tuple[Effect, Mapping[str, float]]], held: frozenset[str] = frozenset()) -> Problem:
+def with_laws(
+    problem: Problem, laws: Sequence[tuple[Effect, Mapping[str, float]]], held: frozenset[str] = frozenset()
+) -> Problem:
     """Return a problem with laws acting and their parameters unknown; not those of `held`."""
     settings = [EffectSetting(e.name, dict(p)) for e, p in laws]
     rig = problem.rig.with_effects(*problem.rig.effects, *settings)

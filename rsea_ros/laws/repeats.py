@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.signal import periodogram
+from scipy.signal import periodogram, welch
 
 from rsea_ros.diagnosis.residual_peaks import peaks, refined
 from rsea_ros.signals import FloatArray
@@ -48,3 +48,11 @@ def lines(t: FloatArray, residual: FloatArray) -> list[float]:
     bins, level = periodogram(residual, rate, window="hann")
     level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
     return [refined(bins, level, k) for k in peaks(level, apart=8)[:1]]
+
+
+def modes(t: FloatArray, residual: FloatArray) -> list[float]:
+    """Return the frequencies of the highest broad peaks of a residual's spectrum, Hz, at most two."""
+    rate = 1.0 / float(np.median(np.diff(t)))
+    bins, level = welch(residual, rate, nperseg=min(1024, len(residual)))
+    level = np.where((bins > _LOWEST) & (bins < _HIGHEST * rate), level, 0.0)
+    return [refined(bins, level, k) for k in peaks(level, apart=12)]

@@ -63,7 +63,8 @@ def folded(gram: Gram, weight: FloatArray) -> Folded:
     sets = [k for fold in FOLDS for k in fold]
     a = {k: np.tensordot(weight, products[k], 1) for k in sets}
     b = {k: weight @ rights[k] for k in sets}
-    inside = [(sum(a[j] for j in sets if j != k), sum(b[j] for j in sets if j != k)) for k in sets]
+    whole_a, whole_b = np.sum([a[k] for k in sets], axis=0), np.sum([b[k] for k in sets], axis=0)
+    inside = [(np.asarray(whole_a - a[k]), np.asarray(whole_b - b[k])) for k in sets]
     outside = [(a[k], b[k], float(squares[k] @ weight)) for k in sets]
     penalty = np.zeros(gram.b.shape[2])
     penalty[: len(gram.prior)] = (gram.prior / gram.scale[: len(gram.prior)]) ** 2
@@ -103,9 +104,10 @@ def _path(
 
 
 def _same_form(a: Candidate, b: Candidate) -> bool:
-    """Tell whether two candidates are one term with other shapes (a wave of another period is another)."""
+    """Tell whether two candidates are one term with other shapes; waves and pasts of others are others."""
     assert a.term is not None and b.term is not None
-    return a.term.name == b.term.name and (a.term.shape != "cycles_per_revolution" or a.shape == b.shape)
+    is_many = a.term.shape == "cycles_per_revolution" or a.term.memory in ("lag", "delay", "ring")
+    return a.term.name == b.term.name and (a.shape == b.shape or not is_many)
 
 
 def _acts_right(gram: Gram, candidates: Sequence[Candidate], columns: Sequence[int]) -> bool:
@@ -123,7 +125,9 @@ def simplest(models: Sequence[Model], gram: Gram) -> Model:
 
     def is_near(model: Model) -> bool:
         more = (model.left - best.left)[SELECTION] @ weight
-        return bool(more.sum() <= max(standard_error(more), _SAME * float((best.left[SELECTION] @ weight).sum())))
+        return bool(
+            more.sum() <= max(standard_error(more), _SAME * float((best.left[SELECTION] @ weight).sum()))
+        )
 
     near = [m for m in models if is_near(m)]
     return min(near, key=lambda m: (len(m.columns), m.minus_log_likelihood(gram)))

@@ -1,14 +1,14 @@
 """The terms that a law is made of: physical forms over what a machine shows, each written once.
 
 An expression is read twice: over arrays, to see what it would explain, and as it stands in the generated
-file. In it: w speed, q angle, theta rotor angle, d deflection, T load, u command (all SI), t time (s), share
+file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflection, T load, u command (all SI), t time (s), share
 of the record's length, m what a memory holds, a the shape, such as a width.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import CodeType
@@ -19,12 +19,12 @@ import numpy as np
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.signals import FloatArray
 
-Memory = Literal["", "lag", "delay", "dahl", "play", "heat"]
-Place = Literal["command", "motor", "gear", "spring", "ft", "encoder"]
+Memory = Literal["", "lag", "delay", "dahl", "play", "heat", "ring"]
+Place = Literal["command", "motor", "gear", "spring", "load", "ft", "encoder"]
 """Where a law acts: at the command, which the measured current shows, or behind that; on the gear; in the
-spring; in what the F/T sensor or the encoder shows."""
+spring; on the end that is free; in what the F/T sensor or the encoder shows."""
 PORTS: Mapping[Place, Port] = {
-    "command": Port.COMMAND, "motor": Port.MOTOR, "gear": Port.GEAR, "spring": Port.SPRING,
+    "command": Port.COMMAND, "motor": Port.MOTOR, "gear": Port.GEAR, "spring": Port.SPRING, "load": Port.GEAR,
     "ft": Port.SENSOR, "encoder": Port.SENSOR,
 }  # fmt: skip
 _ARRAYS = {
@@ -40,6 +40,7 @@ class Term:
     regressor: what it depends on, for people. unit: of the coefficient. over: the variable whose size sets
     the shape's; shapes: shapes that are tried, as shares of that size, or as they are where over is empty.
     memory: what m is made of `over` with the shape. is_drag: takes energy when its coefficient is positive.
+    constant: damping ratio of a memory that rings.
     friction: the expression is a size to which the sign of the speed is added, smooth below a creep.
     """
 
@@ -56,6 +57,13 @@ class Term:
     memory: Memory = ""
     is_drag: bool = False
     friction: bool = False
+    constant: float = 0.0
+
+    @property
+    def remembers(self) -> str:
+        """The variable of which its memory is made."""
+        at = {"ft": "T", "spring": "d"}.get(self.place, "u")
+        return at if self.memory in ("lag", "delay", "heat", "ring") else self.over
 
     def values(self, variables: Mapping[str, FloatArray], shape: float) -> FloatArray:
         """Return the term over arrays, for a coefficient of 1. variables: by their letters, m included."""
@@ -81,7 +89,8 @@ _FAST = (0.001, 0.002, 0.004, 0.008, 0.015, 0.03)
 
 
 def _gear() -> tuple[Term, ...]:
-    g, speed, both = cast(Place, "gear"), "speed", "speed and load"
+    g: Place = "gear"
+    speed, both = "speed", "speed and load"
     return (
         Term("offset", g, "a constant", "1.0", "1", "N m"),
         Term("coulomb", g, speed, "1.0", "sign(ω)", "N m", is_drag=True, friction=True),
@@ -104,6 +113,7 @@ def _gear() -> tuple[Term, ...]:
         Term("spread_friction", g, "speed and position", "abs(q)", "|q|·sign(ω)", "N m/rad", friction=True),
         Term("wide_friction", g, "speed and position", "q * q", "q²·sign(ω)", "N m/rad^2", friction=True),
         Term("lean", g, "position", "q", "q", "N m/rad"),
+        Term("weight_at_gear", g, "position", "-sin(q)", "-sin(q)", "N m"),
         Term("bow", g, "position", "q * q", "q²", "N m/rad^2"),
         Term("cubic_angle", g, "position", "q * q * q", "q³", "N m/rad^3"),
         Term("presliding", g, "position's past", "-m", "-z(q)", "N m", "bristle_angle", "rad", "q",
@@ -139,7 +149,8 @@ def _command(port: Place) -> tuple[Term, ...]:
 
 
 def _spring() -> tuple[Term, ...]:
-    p, deflection = cast(Place, "spring"), "deflection"
+    p: Place = "spring"
+    deflection = "deflection"
     return (
         Term("lopsided", p, deflection, "d * d", "d²", "N m/rad^2"),
         Term("even_spring", p, deflection, "abs(d)", "|d|", "N m/rad"),
@@ -159,7 +170,8 @@ def _spring() -> tuple[Term, ...]:
 
 
 def _sensors() -> tuple[Term, ...]:
-    s, load = cast(Place, "ft"), "the sensor's torque"
+    s: Place = "ft"
+    load = "the sensor's torque"
     return (
         Term("ft_bias", s, "a constant, at the sensor", "1.0", "1", "N m"),
         Term("ft_gain", s, load, "T", "T", "1"),
@@ -178,6 +190,11 @@ def _sensors() -> tuple[Term, ...]:
 MOTOR_TERMS = _command("motor")
 COMMAND_TERMS = _command("command")
 GEAR_TERMS, SPRING_TERMS, SENSOR_TERMS = _gear(), _spring(), _sensors()
+LOAD_TERMS = (
+    Term("weight", "load", "the load's angle", "-sin(h)", "-sin(φ)", "N m"),
+    Term("tilt", "load", "the load's angle", "-cos(h)", "-cos(φ)", "N m"),
+    Term("load_lean", "load", "the load's angle", "-h", "-φ", "N m/rad"),
+)
 ENCODER_TERMS = (
     Term("angle_by_load", "encoder", "the load, at the encoder", "T", "T_s", "rad/(N m)"),
     Term("angle_by_side", "encoder", "the load, at the encoder", "tanh(T / a)", "tanh(T_s/{a})", "rad", "load_width",
@@ -207,3 +224,24 @@ def hum_terms(frequency: float) -> tuple[Term, ...]:
              "N m", "frequency", "Hz", "", (frequency,))
         for name, f in (("sine", "sin"), ("cosine", "cos"))
     )  # fmt: skip
+
+
+def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
+    """Return terms of a mode that the load or the deflection shakes, and of a drive that overshoots."""
+    made = []
+    for name, zeta, tried in (
+        *((f"mode_{round(100 * z)}", z, tuple(frequencies)) for z in (0.02, 0.05, 0.12)),
+        *((f"overshoot_{round(100 * z)}", z, (12.0, 20.0, 32.0, 50.0, 80.0)) for z in (0.2, 0.4, 0.7)),
+    ):
+        slow = name.startswith("mode")
+        for place, letter, regressor, unit in (
+            ("ft", "T", "the sensor's past", "1"), ("spring", "d", "deflection's past", "N m/rad"),
+            ("command", "u", "command's past", "1"), ("motor", "u", "command's past", "1"),
+        ):  # fmt: skip
+            if tried and slow == (place in ("ft", "spring")):
+                made.append(
+                    Term(f"{name}_percent", cast(Place, place), regressor, f"m - {letter}",
+                         f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz", "",
+                         tried, memory="ring", constant=zeta)
+                )  # fmt: skip
+    return tuple(made)

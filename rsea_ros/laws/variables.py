@@ -37,8 +37,7 @@ class Variables:
         """Return a term along the record, for a coefficient of 1."""
         letters = dict(self.letters)
         if term.memory:
-            of = {"lag": "T" if term.place == "ft" else "u", "delay": "u", "heat": "u"}.get(term.memory, term.over)
-            letters["m"] = remembered(term.memory, letters[of], self.step, shape)
+            letters["m"] = remembered(term.memory, letters[term.remembers], self.step, shape, term.constant)
         return term.values(letters, shape)
 
     def shapes(self, term: Term) -> tuple[float, ...]:
@@ -73,6 +72,7 @@ def variables_along(rig: Rig, motion: Motion) -> Variables:
 
 def _letters(rig: Rig, t: FloatArray, w: FloatArray, q: FloatArray, d: FloatArray, load: FloatArray,
              u: FloatArray) -> dict[str, FloatArray]:  # fmt: skip
-    letters = {"w": w, "q": q, "theta": train_ratio(rig) * q, "d": d, "T": load, "u": u, "t": t,
+    h = d - q if rig.is_free("housing_end") else q - d
+    letters = {"w": w, "q": q, "h": h, "theta": train_ratio(rig) * q, "d": d, "T": load, "u": u, "t": t,
                "share": t / max(float(t[-1]), 1e-9)}  # fmt: skip
     return {n: np.ascontiguousarray(v) for n, v in letters.items()}

@@ -20,16 +20,23 @@ _FARTHER = 3.0
 _WIDE = 10.0
 """Times the fitted value: bounds of another fit."""
 _READS = {"w": "GEAR_VELOCITY", "q": "OUTPUT_ANGLE", "theta": "ROTOR_ANGLE", "d": "DEFLECTION", "T": "LOAD",
-          "u": "COMMAND"}  # fmt: skip
-_AT_SENSOR = {"theta": "s[TURNS] * s[OUTPUT_ANGLE]", "T": "s[FT]", "w": "s[OUTPUT_VELOCITY]", "q": "s[OUTPUT_ANGLE]"}
+          "u": "COMMAND", "h": "HOUSING_ANGLE"}  # fmt: skip
+_AT_SENSOR = {
+    "theta": "s[TURNS] * s[OUTPUT_ANGLE]",
+    "T": "s[FT]",
+    "w": "s[OUTPUT_VELOCITY]",
+    "q": "s[OUTPUT_ANGLE]",
+}
 _AT_COMMAND = {"w": "s[OUTPUT_VELOCITY]", "q": "s[OUTPUT_ANGLE]", "theta": "s[TURNS] * s[OUTPUT_ANGLE]"}
 _ADDS = {
-    "gear": "s[GEAR_TORQUE] += torque", "spring": "s[SPRING_TORQUE] += torque", "ft": "s[FT] += torque",
+    "gear": "s[GEAR_TORQUE] += torque", "spring": "s[SPRING_TORQUE] += torque",
+    "load": "s[HOUSING_TORQUE] += torque\n    s[DISTAL_TORQUE] += torque", "ft": "s[FT] += torque",
     "motor": "s[COMMAND] += torque", "command": "s[COMMAND] += torque\n    s[CURRENT] += torque",
 }  # fmt: skip
 _LETTERS = {"w": "the speed ω, rad/s", "q": "the angle q, rad", "theta": "the rotor's angle θ, rad",
-            "d": "the deflection d, rad", "T": "the load T, N m", "u": "the command u, N m"}  # fmt: skip
-_SYMBOLS = {"w": "ω", "q": "q", "theta": "θ", "d": "d", "T": "T_s", "u": "u", "t": "t"}
+            "d": "the deflection d, rad", "T": "the load T, N m", "u": "the command u, N m",
+            "h": "the load's angle φ, rad"}  # fmt: skip
+_SYMBOLS = {"w": "ω", "q": "q", "theta": "θ", "d": "d", "T": "T_s", "u": "u", "t": "t", "h": "φ"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,12 @@ class Provenance:
 
 def equation_of(law: Law) -> str:
     """Return the equation with the names of the parameters, in plain text."""
-    left = {"encoder": "position error", "ft": "T_ft error", "motor": "T_m added", "command": "T_m added"}.get(law.place, "T")
+    left = {
+        "encoder": "position error",
+        "ft": "T_ft error",
+        "motor": "T_m added",
+        "command": "T_m added",
+    }.get(law.place, "T")
     if law.curve is not None:
         factor = {"": "", "T": "·|T_s|", "u": "·u", "w": "·ω", "d": "·d"}[law.curve.factor]
         return f"{left} = size · f({_SYMBOLS[law.curve.over]}){factor}, f learnt from data"
@@ -104,21 +116,18 @@ def letters_of(law: Law) -> set[str]:
     for part in law.parts:
         used |= _words(part.term.expression) & set(_READS)
         used |= {"w"} if part.term.friction else set()
-        used |= {_remembered(part)} if part.term.memory else set()
+        used |= {part.term.remembers} if part.term.memory else set()
     if law.curve is not None:
         used |= {law.curve.over, law.curve.factor} & set(_READS)
         used |= {"w"} if law.curve.factor == "w" else set()
     return used
 
 
-def _remembered(part: Part) -> str:
-    term = part.term
-    return {"lag": "T" if term.place == "ft" else "u", "delay": "u", "heat": "u"}.get(term.memory, term.over)
-
-
 def _read(law: Law, letter: str) -> str:
     if law.place in ("ft", "encoder"):
         return _AT_SENSOR.get(letter, f"s[{_READS.get(letter, '')}]")
+    if letter == "h":  # one end is clamped: it stays at zero, and no torque moves it
+        return "s[HOUSING_ANGLE] + s[DISTAL_ANGLE]"
     if law.place in ("command", "motor"):
         return _AT_COMMAND.get(letter, f"s[{_READS.get(letter, '')}]")
     return f"s[{_READS[letter]}]"
@@ -130,8 +139,14 @@ def _variables(law: Law) -> list[str]:
         if letter in letters_of(law):
             limit = law.ranges[letter] * _FARTHER
             value = _read(law, letter)
-            unlimited = letter in ("theta", "q") or (letter in ("T", "u") and law.place in ("ft", "command", "motor"))
-            lines.append(f"{letter} = {value}" if unlimited else f"{letter} = min(max({value}, -{limit:.6g}), {limit:.6g})")
+            unlimited = letter in ("theta", "q") or (
+                letter in ("T", "u") and law.place in ("ft", "command", "motor")
+            )
+            lines.append(
+                f"{letter} = {value}"
+                if unlimited
+                else f"{letter} = min(max({value}, -{limit:.6g}), {limit:.6g})"
+            )
     time = _time_letters(law)
     if "t" in time:
         lines.append("t = s[TIME]")
@@ -141,7 +156,9 @@ def _variables(law: Law) -> list[str]:
 
 
 def _body(law: Law) -> str:
-    lines, sizes, smooth, state, at = _variables(law), [], [], 0, 0
+    lines, state, at = _variables(law), 0, 0
+    sizes: list[str] = []
+    smooth: list[str] = []
     index: dict[str, int] = {}
     for k, name in enumerate(law.parameters):
         index[name] = k
@@ -183,13 +200,26 @@ def _with_letter(expression: str, letter: str, replaced: str) -> str:
 
 def _memory(part: Part, name: str, shape: str, state: int) -> tuple[list[str], int]:
     """Return the lines that keep a memory in the states from `state` on, and the next free one."""
-    of, kind = _remembered(part), part.term.memory
+    of, kind = part.term.remembers, part.term.memory
     if kind in ("lag", "heat"):
         value = f"{of} * {of}" if kind == "heat" else of
-        return [f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})", f"{name} = x[{state}]"], state + 1
+        return [
+            f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})",
+            f"{name} = x[{state}]",
+        ], state + 1
+    if kind == "ring":
+        zeta = part.term.constant
+        rung = f"{name} = rung(x, {state}, {of}, s[STEP], {shape}, {zeta:g})"
+        if part.term.place == "spring":  # called twice a step; only the second may change a state
+            return [f"{name} = x[{state}]", "if s[COMMIT] == 1.0:", f"    {rung}"], state + 2
+        return [rung], state + 2
     if kind == "delay":
         return [f"{name} = from_ring(x, {state}, {of}, {shape} / s[STEP])"], state + RING + 1
-    made = f"bent(x[{state}], {of} - x[{state + 1}], {shape})" if kind == "dahl" else f"played(x[{state}], {of}, {shape})"
+    made = (
+        f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
+        if kind == "dahl"
+        else f"played(x[{state}], {of}, {shape})"
+    )
     keep = [f"{name} = {made}"]
     commit = "if s[COMMIT] == 1.0:" if part.term.place == "spring" else "if True:"
     keep += [commit, f"    x[{state}], x[{state + 1}] = {name}, {of}"]
@@ -200,7 +230,7 @@ def _memory(part: Part, name: str, shape: str, state: int) -> tuple[list[str], i
 
 def states_of(law: Law) -> int:
     """Return how many states the file's function keeps."""
-    sizes = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2}
+    sizes = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
     return int(law.is_friction) + sum(sizes[p.term.memory] for p in law.parts) + 2 * (law.place == "encoder")
 
 
@@ -229,7 +259,7 @@ def _imports(law: Law, body: str) -> str:
     words = _words(body)
     maths = sorted(words & {"sin", "cos", "tanh", "exp", "pi"})
     table = sorted(set(_table_names()) & words | {"Port"})
-    helpers = sorted(words & {"lagged", "bent", "played", "from_ring"})
+    helpers = sorted(words & {"lagged", "bent", "played", "from_ring", "rung"})
     lines = [f"from math import {', '.join(maths)}\n"] if maths else []
     lines += ["import numpy as np\n"] if law.curve is not None else []
     friction = "PRESLIDING, mean_friction" if law.is_friction else ""
@@ -247,9 +277,12 @@ def _table_names() -> list[str]:
 
 
 def _effect(law: Law, claims: Claims, body: str) -> str:
-    port = {"gear": "GEAR", "spring": "SPRING", "motor": "MOTOR", "command": "COMMAND"}.get(law.place, "SENSOR")
+    port = {"gear": "GEAR", "load": "GEAR", "spring": "SPRING", "motor": "MOTOR", "command": "COMMAND"}.get(
+        law.place, "SENSOR"
+    )
     rows = "".join(f"        {row},\n" for row in _parameter_rows(law))
-    reads = [_READS[n] for n in _READS if n in letters_of(law) and law.place in ("gear", "spring")]
+    letters = letters_of(law) - {"u"} if law.place in ("gear", "load", "spring") else set()
+    reads = [_READS[n] for n in _READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
     reading = f"    reads=({', '.join(reads)},),\n" if reads else ""
     exponent = claims.amplitude_exponent
     states = states_of(law)
@@ -279,7 +312,9 @@ def _parameter_rows(law: Law) -> list[str]:
                     f"typical={part.coefficient:.6g})")  # fmt: skip
         if s and s not in seen:
             seen.add(s)
-            near = 1.02 if part.term.shape in ("cycles_per_revolution", "frequency") else _WIDE
+            near = {"cycles_per_revolution": 1.02, "frequency": 1.02, "mode_frequency": 1.5}.get(
+                part.term.shape, _WIDE
+            )
             rows.append(f'Parameter("{s}", "{part.term.shape_unit}", null={part.shape:.6g}, '
                         f"low={part.shape / near:.6g}, high={part.shape * near:.6g}, typical={part.shape:.6g}, "
                         f"logarithmic=True)")  # fmt: skip

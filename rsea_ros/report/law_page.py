@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from rsea_ros.laws.result import LawResult, Shown, WrittenLaw
+from rsea_ros.laws.result import LawResult, WrittenLaw
 from rsea_ros.laws.writing import about_of, equation_of
 from rsea_ros.report import words
 from rsea_ros.report.figure import Figure, Json, axis, band, label, layout, line, numbers
@@ -57,7 +57,9 @@ def _equation(written: WrittenLaw) -> str:
     ]  # fmt: skip
     if law.is_learnt:
         facts.append("A learnt law is a curve through the data. It improves predictions and names no cause.")
-    return section(about_of(law).capitalize(), equation(equation_of(law)), bullets([*parameter_lines(law), *facts]))
+    return section(
+        about_of(law).capitalize(), equation(equation_of(law)), bullets([*parameter_lines(law), *facts])
+    )
 
 
 def _over(written: WrittenLaw) -> Figure:
@@ -98,7 +100,9 @@ def _over(written: WrittenLaw) -> Figure:
     )  # fmt: skip
 
 
-def _points(x: FloatArray, y: FloatArray, colour: str, size: float, name: str, *, visible: bool = True) -> Json:
+def _points(
+    x: FloatArray, y: FloatArray, colour: str, size: float, name: str, *, visible: bool = True
+) -> Json:
     return {"type": "scattergl", "mode": "markers", "x": numbers(x), "y": numbers(y), "name": name,
             "marker": {"size": size, "color": colour}, "visible": visible, "hoverinfo": "skip"}  # fmt: skip
 
@@ -123,7 +127,8 @@ def _folded(written: WrittenLaw) -> FloatArray:
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return places along x, and between which values the law lies there (its 10 to 90 % by what else it reads)."""
-    edges = np.linspace(*np.quantile(x, [0.002, 0.998]), _CURVE + 1)
+    first, last = (float(v) for v in np.quantile(x, [0.002, 0.998]))
+    edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
     centre = 0.5 * (edges[1:] + edges[:-1])
     low, high = np.full(_CURVE, np.nan), np.full(_CURVE, np.nan)
@@ -201,8 +206,14 @@ def _levels(result: LawResult) -> str:
         for n in result.before
     )
     head = "<tr><th>Channel</th><th class='number'>without</th><th class='number'>with the law</th><th class='number'>noise</th></tr>"
-    text = gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
-    return section("What is gained", f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>", caption=text)
+    text = (
+        gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
+    )
+    return section(
+        "What is gained",
+        f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
+        caption=text,
+    )
 
 
 def _tried(result: LawResult) -> str:
@@ -220,7 +231,11 @@ def _tried(result: LawResult) -> str:
         "The shortest law within one standard error of the best is taken (bold); its terms are then fitted in the "
         "simulation, and those that it does not need fall away."
     )
-    return folded("What else was tried", note, f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>")
+    return folded(
+        "What else was tried",
+        note,
+        f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
+    )
 
 
 def _files(result: LawResult) -> str:
@@ -229,10 +244,8 @@ def _files(result: LawResult) -> str:
     names = [f"{w.law.name}.py" for w in result.laws]
     use = "RSEA_EFFECTS=. rsea diagnose RUN.mcap --rig base.yaml --out again"
     text = (
-        f'<p>{", ".join(code(n) for n in names)}: the law as an effect, to read and to change. '
+        f"<p>{', '.join(code(n) for n in names)}: the law as an effect, to read and to change. "
         f"{code('model.yaml')}: the rig with it, {code('base.yaml')}: the rig without.</p>"
         f'<p class="next">On a fresh record, in the folder of these files: {code(use)}</p>'
     )
     return section("How to use it", text)
-
-

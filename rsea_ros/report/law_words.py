@@ -12,8 +12,8 @@ from rsea_ros.report import words
 _CLEARLY = 0.1
 """Share of what the law leaves that another variable must take to be told of."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
-         "t": "time", "share": "time"}  # fmt: skip
-UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s"}
+         "t": "time", "share": "time", "h": "load's angle"}  # fmt: skip
+UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s", "h": "rad"}
 
 
 def headline(result: LawResult) -> str:
@@ -73,7 +73,9 @@ def parameter_lines(law: Law) -> list[str]:
         rows = [(c, part.coefficient, part.ci95, part.term.unit)]
         rows += [(s, part.shape, part.shape_ci95, part.term.shape_unit)] if s and s not in seen else []
         seen.add(s)
-        lines += [f"{name} = {_valued(value, ci95)} {words.unit(unit)}".rstrip() for name, value, ci95, unit in rows]
+        lines += [
+            f"{name} = {_valued(value, ci95)} {words.unit(unit)}".rstrip() for name, value, ci95, unit in rows
+        ]
     return lines
 
 

@@ -7,9 +7,9 @@ from effect_bench import RIG, command
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.identification.unknowns import vector_of
 from rsea_ros.laws.columns import bench_of, rows_of
 from rsea_ros.laws.gram import SELECTION, gram_of
-from rsea_ros.identification.unknowns import vector_of
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 

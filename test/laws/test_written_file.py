@@ -11,8 +11,8 @@ import test_claims as claimed
 from effect_bench import RIG, drive
 from effect_bench import command as chirp
 
-from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.effects.catalogue import catalogue, effect_named, lent
 from rsea_ros.effects.effect import Claims
 from rsea_ros.laws.claims import claims_of
