@@ -111,7 +111,7 @@ RIGHT: Mapping[str, tuple[str, ...]] = {
     "torque_saturation": ("command",),
     "voltage_sag": ("command and speed", "command"),
 }
-"""The regressors that are right for each effect; those of an effect that it may be confused with count too."""
+"""The regressors that are right for each effect, those of one that it may be confused with too."""
 
 
 @compiled
@@ -160,7 +160,8 @@ WRITTEN = (
     (_effect("periodic_stiffness", Port.SPRING, _periodic, (st.DEFLECTION,), 0,
              change=("N m/rad", 300.0), wave=("1/rad", 900.0)),
      ("deflection and position, periodic",)),
-    (_effect("one_sided_drag", Port.GEAR, _one_sided, (st.GEAR_VELOCITY,), 0, coefficient=("N m s^2/rad^2", 20.0)),
+    (_effect("one_sided_drag", Port.GEAR, _one_sided, (st.GEAR_VELOCITY,), 0,
+             coefficient=("N m s^2/rad^2", 20.0)),
      ("speed",)),
     (_effect("soft_saturation", Port.MOTOR, _soft, (), 0, limit=("N m", 40.0)), ("command",)),
     (_effect("warming_motor", Port.MOTOR, _warming, (), 1, loss=("1/(N m)^2", 6e-4), heating_time=("s", 8.0)),

@@ -1,6 +1,6 @@
 """Real machines: what is left after naming, its law, and what it gains held out.
 
-    .venv/bin/python bench/laws_real.py emps --out out/laws-real       a diagnosis, then `rsea law` on its model
+    .venv/bin/python bench/laws_real.py emps --out out/laws-real      a diagnosis, then a law on its model
     .venv/bin/python bench/laws_real.py --table --out out/laws-real    the machines that are done, as a table
 
 Data: ../shared/realdata, beside the repository; its README has origins and licences.

@@ -50,7 +50,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Spline:
-    """A spline without a form over one variable, times a factor. knots: at quantiles, each part within them."""
+    """A spline without a form over one variable, of so many parts, times a factor."""
 
     place: Place
     regressor: str

@@ -25,7 +25,7 @@ _ODD, _EVEN = 1e-7, 0.95
 
 
 def claims_of(law: Law, effect: Effect, rig: Rig, case: Case) -> Claims:
-    """Return channel, parity, exponent and passivity of a law. Along a measured motion they are those of its form."""
+    """Return channel, parity, exponent and passivity of a law; along a measured motion only the last."""
     passive = bool(law.parts) and law.place == "gear" and all(p.term.is_drag for p in law.parts)
     drive = case.drive
     if not isinstance(drive, Drive) or rig.loop is not None:

@@ -74,7 +74,7 @@ class Bench:
 def bench_of(
     problem: Problem, theta: FloatArray, case: Case, outputs: Mapping[str, FloatArray], place: Place = "gear"
 ) -> Bench:
-    """Return a case with its base model at theta. outputs: its simulated channels. place: of what is missing."""
+    """Return a case with its base model at theta. outputs: simulated channels. place: of what is missing."""
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     residual = {n: np.where(case.mask[n], case.measured[n] - outputs[n], 0.0) for n in case.measured}
     if isinstance(case.drive, Motion):

@@ -54,7 +54,7 @@ def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, s
 def dependences(
     gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = ()
 ) -> tuple[Dependence, ...]:
-    """Return how much of what is left depends on what, most first. given: columns of a law that acts already."""
+    """Return how much of what is left depends on what, most first. given: columns of a law that acts."""
     made = families(candidates, len(gram.prior))
     none = gram.held_out(np.array([], np.int64))
     law = gram.held_out(np.array([*given], np.int64)) if given else none

@@ -1,4 +1,4 @@
-"""The finished files of fitted laws: with fitted values, measured claims, provenance, and what is drawn of them."""
+"""The files of fitted laws: fitted values, measured claims, provenance, and what is drawn of them."""
 
 from __future__ import annotations
 

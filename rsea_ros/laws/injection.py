@@ -108,7 +108,7 @@ class Injector:
 def _kind(rig: Rig, place: Place) -> float:
     if place != "load":
         return float(PORTS[place])
-    return 5.0 if rig.is_free("housing_end") else 6.0
+    return 5.0 if rig.end_is_free("housing_end") else 6.0
 
 
 def with_injection(machine: Machine, torque: FloatArray, port: Port, kind: float) -> Machine:

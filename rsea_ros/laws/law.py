@@ -25,7 +25,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Curve:
-    """A learnt curve: values (N m, or rad at the encoder) over a variable, times a factor; held beyond its ends."""
+    """A learnt curve: values (N m, rad at the encoder) over a variable, times a factor, held at its ends."""
 
     over: str
     factor: str

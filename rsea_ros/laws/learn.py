@@ -1,4 +1,4 @@
-"""The search for a law: what is missing, what it depends on, the shortest law of it, its file, and its gain."""
+"""The search for a law: what is missing, what it depends on, the shortest law of it, and its gain."""
 
 from __future__ import annotations
 
@@ -39,6 +39,8 @@ from rsea_ros.signals import FloatArray, Record
 
 _SURE, _SURE_ON_TEST = 4.0, 2.0
 """Standard errors by which a law must gain on the blocks that chose it, and on those that did not."""
+_WORSE, _WORSE_ON_TEST = 0.1, 0.25
+"""Of what groups gain: what others lose, where the gain counts although few groups have it."""
 _MATTERS = 0.02
 """Smallest gain that is written down: 1 - RMS(with) / RMS(without)."""
 _SHORT_ENOUGH = 0.75
@@ -128,7 +130,8 @@ def nothing_left(base: Base, records: Sequence[Record]) -> LawResult:
     """Return the result where the base model is at the noise floor."""
     before, noise = _levels(base.problem, base.outputs, base.cases)
     rig = apply(base.problem.rig, base.problem.unknowns, base.solution.theta)[0]
-    return LawResult(rig.name, tuple(r.source for r in records), sum(c.duration for c in base.cases), rig, rig,
+    duration = sum(c.duration for c in base.cases)
+    return LawResult(rig.name, tuple(r.source for r in records), duration, rig, rig,
                      (), (), (), 0.0, (0.0, 0.0), 0.0, before, before, noise, at_floor=True)  # fmt: skip
 
 
@@ -144,7 +147,7 @@ def searched(base: Base) -> Search:
 
 @dataclass(frozen=True)
 class Choice:
-    """The models that were compared, and of which the law is made: a short one, a dependence as a curve, or none."""
+    """The models that were compared, those that make the law, and the dependence that a curve shall show."""
 
     compared: tuple[Model, ...]
     taken: tuple[Model, ...] = ()
@@ -192,12 +195,21 @@ def surely_helps(
     """Tell whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
     weight = gram.weights(before, SELECTION)
     gain = (before - after)[SELECTION] @ weight
-    if gain.sum() < _SURE * standard_error(gain):
+    if not _is_sure(gain, _SURE, _WORSE):
         return False
     held = [gram.tested(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
     fall = (held[0] - held[1])[HELD_BACK]
     rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
-    return bool(fall.sum() > _SURE_ON_TEST * standard_error(fall) and rms > _MATTERS)
+    return rms > _MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)
+
+
+def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
+    """Tell whether the gains of groups are more than chance: beyond their error, or hardly any is a loss.
+
+    What an excitation shows once, such as a mode that a chirp passes, gains in one group alone.
+    """
+    lost, won = float(-gain[gain < 0.0].sum()), float(gain[gain > 0.0].sum())
+    return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
 
 
 def _result(
@@ -223,7 +235,8 @@ def _result(
         ]
     return LawResult(
         rig_name=rigs[0].name, sources=tuple(r.source for r in records),
-        duration=sum(c.duration for c in base.cases), base_rig=rigs[0], rig=_with_files(rigs[1], rigs[0], written),
+        duration=sum(c.duration for c in base.cases), base_rig=rigs[0],
+        rig=_with_files(rigs[1], rigs[0], written),
         dependences=tuple(depends), tried=_tried(search, choice, choice.taken), laws=tuple(written),
         gain=gain, gain_ci95=ci95, share=share, before=before, after=after, noise=noise, at_floor=False,
     )  # fmt: skip
@@ -243,7 +256,7 @@ def _laws(search: Search, choice: Choice) -> list[Law]:
 
 
 def _refined(base: Base, drafts: Sequence[Draft]) -> Refined:
-    """Fit the laws in the simulation, in units of what they leave, without the terms that it does not need."""
+    """Fit the laws in the simulation, in units of what they leave, without terms that it does not need."""
     refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
     weights = _score(base, refined, FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())

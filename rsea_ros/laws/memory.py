@@ -37,9 +37,10 @@ def bent(before, way, angle):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def rung(x, first, value, step, frequency, damping_ratio):  # type: ignore[no-untyped-def]
-    """Return y of y'' / w^2 + 2 damping_ratio y' / w + y = value after a step; y and y' are x[first:first + 2].
+    """Return y of y'' / w^2 + 2 damping_ratio y' / w + y = value after a step.
 
-    frequency: Hz, w = 2 pi frequency; exact for a value that is held over the step.
+    y and y' are x[first] and x[first + 1]. frequency: Hz, w = 2 pi frequency. Exact for
+    a value that is held over the step.
     """
     w = 2.0 * math.pi * frequency
     decay, turn = damping_ratio * w, w * math.sqrt(1.0 - damping_ratio * damping_ratio)
@@ -99,7 +100,7 @@ def delayed(values: FloatArray, steps: float) -> FloatArray:
 def remembered(
     memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0
 ) -> FloatArray:
-    """Return what a memory makes of a signal along the steps. heat: of its square. constant: a damping ratio."""
+    """Return what a memory makes of a signal along the steps; heat of its square. constant: damping ratio."""
     if memory == "ring":
         return np.asarray(rings(values, step, shape, constant))
     if memory == "delay":

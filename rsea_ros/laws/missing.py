@@ -83,7 +83,7 @@ def _pulse_answers(injector: Injector, period: float, count: int, place: Place) 
 
 
 def _at_sensor(place: Place, period: float, count: int) -> dict[str, FloatArray]:
-    """Return what an error of 1 in a sensor changes of every output: that sensor, and a speed with its angle."""
+    """Return what an error of 1 in a sensor changes of every output; an angle's changes the speed too."""
     answers = {n: np.zeros(count) for n in OUTPUTS}
     if place == "ft":
         answers["ft"][0] = 1.0

@@ -24,9 +24,10 @@ class Tried:
 
 @dataclass(frozen=True)
 class Shown:
-    """The missing torque beside a law, point by point, for the page. t: s; values and law: N m (rad at the encoder).
+    """The missing torque beside a law, point by point, for the page.
 
-    over: what the law depends on most, with its letter and unit. sd: of a value.
+    t: s. values, law: N m, rad at the encoder. over: the letter of what the law
+    depends on most. sd: of a value.
     """
 
     t: FloatArray

@@ -74,7 +74,7 @@ def folded(gram: Gram, weight: FloatArray) -> Folded:
 def paths(
     gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = (), most: int = MOST_TERMS
 ) -> list[Model]:
-    """Return the models of one, two, … terms of every place. given: columns that are part of all of them."""
+    """Return the models of one, two, … terms of every place. given: columns that are part of all."""
     models = []
     for place in dict.fromkeys(c.place for c in candidates):
         models += _path(gram, candidates, place, given, most)

@@ -1,8 +1,8 @@
 """The terms that a law is made of: physical forms over what a machine shows, each written once.
 
 An expression is read twice: over arrays, to see what it would explain, and as it stands in the generated
-file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflection, T load, u command (all SI), t time (s), share
-of the record's length, m what a memory holds, a the shape, such as a width.
+file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflection, T load, u command, t time
+(all SI), share of the record's length, m what a memory holds, a the shape, such as a width.
 """
 
 from __future__ import annotations
@@ -102,11 +102,13 @@ def _gear() -> tuple[Term, ...]:
         Term("quadratic_drag", g, speed, "-w * abs(w)", "-ω·|ω|", "N m s^2/rad^2", is_drag=True),
         Term("even_drag", g, speed, "-w * w", "-ω²", "N m s^2/rad^2"),
         Term("forward_drag", g, speed, "-max(w, 0.0) * w", "-ω·max(ω, 0)", "N m s^2/rad^2", is_drag=True),
-        Term("backward_drag", g, speed, "-min(w, 0.0) * abs(w)", "-|ω|·min(ω, 0)", "N m s^2/rad^2", is_drag=True),
+        Term("backward_drag", g, speed, "-min(w, 0.0) * abs(w)", "-|ω|·min(ω, 0)", "N m s^2/rad^2",
+             is_drag=True),
         Term("cubic_drag", g, speed, "-w * w * w", "-ω³", "N m s^3/rad^3", is_drag=True),
         Term("load_friction", g, both, "abs(T)", "|T_s|·sign(ω)", "1", is_drag=True, friction=True),
         Term("load_drag", g, both, "-abs(T) * w", "-|T_s|·ω", "s/rad", is_drag=True),
-        Term("command_friction", g, "speed and command", "abs(u)", "|T_m|·sign(ω)", "1", is_drag=True, friction=True),
+        Term("command_friction", g, "speed and command", "abs(u)", "|T_m|·sign(ω)", "1", is_drag=True,
+             friction=True),
         Term("drift_drag", g, "speed and time", "-share * w", "-(t/duration)·ω", "N m s/rad"),
         Term("drift_friction", g, "speed and time", "share", "(t/duration)·sign(ω)", "N m", friction=True),
         Term("drift", g, "time", "share", "t/duration", "N m"),
@@ -129,18 +131,18 @@ def _command(port: Place) -> tuple[Term, ...]:
         Term("cubic_command", port, "command", "u * u * u", "u³", "1/(N m)^2"),
         Term("excess", port, "command", "u - min(max(u, -a), a)", "(u - clip(u, ±{a}))", "1", "limit", "N m",
              "u", _WIDE),
-        Term("soft_limit", port, "command", "u - a * tanh(u / a)", "(u - {a}·tanh(u/{a}))", "1", "knee", "N m",
-             "u", (0.35, 0.7, 1.2)),
+        Term("soft_limit", port, "command", "u - a * tanh(u / a)", "(u - {a}·tanh(u/{a}))", "1", "knee",
+             "N m", "u", (0.35, 0.7, 1.2)),
         Term("zone", port, "command", "min(max(u, -a), a)", "clip(u, ±{a})", "1", "zone_width", "N m", "u",
              (0.03, 0.07, 0.15, 0.25)),
-        Term("band", port, "command", "u * max(0.0, min(1.0, 50.0 * (1.0 - abs(u) / a)))", "u where |u| < {a}", "1",
-             "band_width", "N m", "u", (0.05, 0.1, 0.2, 0.3)),
+        Term("band", port, "command", "u * max(0.0, min(1.0, 50.0 * (1.0 - abs(u) / a)))",
+             "u where |u| < {a}", "1", "band_width", "N m", "u", (0.05, 0.1, 0.2, 0.3)),
         Term("speed_gain", port, "command and speed", "u * abs(w)", "u·|ω|", "s/rad"),
         Term("speed_excess", port, "command and speed", "abs(w) * (u - min(max(u, -a), a))",
              "|ω|·(u - clip(u, ±{a}))", "s/rad", "speed_limit", "N m", "u", (0.3, 0.5, 0.7)),
         Term("fading_gain", port, "command and time", "share * u", "(t/duration)·u", "1"),
-        Term("heated_gain", port, "command and temperature", "m * u", "h(u²)·u", "1/(N m)^2", "heating_time",
-             "s", "", _SLOW, memory="heat"),
+        Term("heated_gain", port, "command and temperature", "m * u", "h(u²)·u", "1/(N m)^2",
+             "heating_time", "s", "", _SLOW, memory="heat"),
         Term("lagging", port, "command's past", "m - u", "(lag(u) - u)", "1", "time_constant", "s", "", _FAST,
              memory="lag"),
         Term("delayed", port, "command's past", "m - u", "(u(t - {a}) - u)", "1", "delay", "s", "", _FAST,
@@ -182,8 +184,8 @@ def _sensors() -> tuple[Term, ...]:
         Term("ft_settling", s, "time, at the sensor", "1.0 - exp(-t / a)", "(1 - exp(-t/{a}))", "N m",
              "settling_time", "s", "", (1.0, 3.0, 8.0, 20.0)),
         Term("ft_fading", s, "the sensor's torque and time", "share * T", "(t/duration)·T", "1"),
-        Term("ft_lag", s, "the sensor's past", "m - T", "(lag(T) - T)", "1", "ft_time_constant", "s", "", _FAST,
-             memory="lag"),
+        Term("ft_lag", s, "the sensor's past", "m - T", "(lag(T) - T)", "1", "ft_time_constant", "s", "",
+             _FAST, memory="lag"),
     )  # fmt: skip
 
 
@@ -197,22 +199,23 @@ LOAD_TERMS = (
 )
 ENCODER_TERMS = (
     Term("angle_by_load", "encoder", "the load, at the encoder", "T", "T_s", "rad/(N m)"),
-    Term("angle_by_side", "encoder", "the load, at the encoder", "tanh(T / a)", "tanh(T_s/{a})", "rad", "load_width",
-         "N m", "T", (0.02, 0.1, 0.3)),
+    Term("angle_by_side", "encoder", "the load, at the encoder", "tanh(T / a)", "tanh(T_s/{a})", "rad",
+         "load_width", "N m", "T", (0.02, 0.1, 0.3)),
 )  # fmt: skip
 
 
 def wave_terms(cycles: float) -> tuple[Term, ...]:
-    """Return terms that repeat with the rotor's angle, so often a turn: torques, stiffness, encoder errors."""
+    """Return terms that repeat with the rotor's angle, so often a turn: torque, stiffness, encoder error."""
     made = []
     for name, f in (("sine", "sin"), ("cosine", "cos")):
         wave, shown = f"{f}(a * theta)", f"{f}({{a}}·θ)"
         shape = ("cycles_per_revolution", "1", "", (cycles,))
         made += [
             Term(name, "gear", "position, periodic", wave, shown, "N m", *shape),
-            Term(f"spring_{name}", "spring", "deflection and position, periodic", f"d * {wave}", f"d·{shown}",
-                 "N m/rad", *shape),
-            Term(f"angle_{name}", "encoder", "position, periodic, at the encoder", wave, shown, "rad", *shape),
+            Term(f"spring_{name}", "spring", "deflection and position, periodic", f"d * {wave}",
+                 f"d·{shown}", "N m/rad", *shape),
+            Term(f"angle_{name}", "encoder", "position, periodic, at the encoder", wave, shown, "rad",
+                 *shape),
         ]  # fmt: skip
     return tuple(made)
 
@@ -220,8 +223,8 @@ def wave_terms(cycles: float) -> tuple[Term, ...]:
 def hum_terms(frequency: float) -> tuple[Term, ...]:
     """Return a sine and a cosine of time in the F/T sensor. frequency: Hz."""
     return tuple(
-        Term(f"hum_{name}", "ft", "time, periodic, at the sensor", f"{f}(2.0 * pi * a * t)", f"{f}(2π·{{a}}·t)",
-             "N m", "frequency", "Hz", "", (frequency,))
+        Term(f"hum_{name}", "ft", "time, periodic, at the sensor", f"{f}(2.0 * pi * a * t)",
+             f"{f}(2π·{{a}}·t)", "N m", "frequency", "Hz", "", (frequency,))
         for name, f in (("sine", "sin"), ("cosine", "cos"))
     )  # fmt: skip
 
@@ -241,7 +244,7 @@ def mode_terms(frequencies: Sequence[float]) -> tuple[Term, ...]:
             if tried and slow == (place in ("ft", "spring")):
                 made.append(
                     Term(f"{name}_percent", cast(Place, place), regressor, f"m - {letter}",
-                         f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz", "",
-                         tried, memory="ring", constant=zeta)
+                         f"(mode({letter}, {{a}}, ζ = {zeta:g}) - {letter})", unit, "mode_frequency", "Hz",
+                         "", tried, memory="ring", constant=zeta)
                 )  # fmt: skip
     return tuple(made)

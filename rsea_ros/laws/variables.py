@@ -72,7 +72,7 @@ def variables_along(rig: Rig, motion: Motion) -> Variables:
 
 def _letters(rig: Rig, t: FloatArray, w: FloatArray, q: FloatArray, d: FloatArray, load: FloatArray,
              u: FloatArray) -> dict[str, FloatArray]:  # fmt: skip
-    h = d - q if rig.is_free("housing_end") else q - d
+    h = d - q if rig.end_is_free("housing_end") else q - d
     letters = {"w": w, "q": q, "h": h, "theta": train_ratio(rig) * q, "d": d, "T": load, "u": u, "t": t,
                "share": t / max(float(t[-1]), 1e-9)}  # fmt: skip
     return {n: np.ascontiguousarray(v) for n, v in letters.items()}

@@ -80,7 +80,9 @@ def source_of(law: Law, claims: Claims, provenance: Provenance) -> str:
     """Return the text of the effect file."""
     header = _docstring(law, provenance)
     body = _curve_body(law) if law.curve is not None else _body(law)
-    return f'{header}\n{_imports(law, body)}\n{_tables(law)}\n@compiled\ndef apply(s, p, x):  # type: ignore[no-untyped-def]\n    """Add the law."""\n{body}\n\n\n{_effect(law, claims, body)}'
+    signature = 'def apply(s, p, x):  # type: ignore[no-untyped-def]\n    """Add the law."""'
+    function = f"@compiled\n{signature}\n{body}\n"
+    return f"{header}\n{_imports(law, body)}\n{_tables(law)}\n{function}\n\n{_effect(law, claims)}"
 
 
 def _docstring(law: Law, provenance: Provenance) -> str:
@@ -89,10 +91,10 @@ def _docstring(law: Law, provenance: Provenance) -> str:
     bags = "\n".join(f"    {name}  sha256 {digest}" for name, digest in provenance.bags.items())
     beyond = "its last value" if law.is_learnt else f"the value at {_FARTHER:g} times that range"
     lines = [
-        f'"""{kind}: torque by {law.regressor}.' if law.place != "encoder" else f'"""{kind}: angle error by {law.regressor}.',
+        f'"""{kind}: {"angle error" if law.place == "encoder" else "torque"} by {law.regressor}.',
         "", f"    {equation_of(law)}", "",
         f"Seen in the data: {seen}. Beyond it the law keeps {beyond}.",
-        f"{provenance.gain}", f"Written by rsea law {provenance.version} on {provenance.date} from", bags, '"""',
+        provenance.gain, f"Written by rsea law {provenance.version} on {provenance.date} from", bags, '"""',
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
@@ -184,7 +186,8 @@ def _body(law: Law) -> str:
 def _added(law: Law, state: int) -> list[str]:
     if law.place != "encoder":
         return [_ADDS[law.place]]
-    return ["s[POSITION] += torque", f"s[VELOCITY] += (torque - x[{state}]) / s[STEP] if x[{state + 1}] == 1.0 else 0.0",
+    rate = f"(torque - x[{state}]) / s[STEP] if x[{state + 1}] == 1.0 else 0.0"
+    return ["s[POSITION] += torque", f"s[VELOCITY] += {rate}",
             f"x[{state}], x[{state + 1}] = torque, 1.0"]  # fmt: skip
 
 
@@ -276,7 +279,7 @@ def _table_names() -> list[str]:
     return [n for n in vars(signal_table) if n.isupper()]
 
 
-def _effect(law: Law, claims: Claims, body: str) -> str:
+def _effect(law: Law, claims: Claims) -> str:
     port = {"gear": "GEAR", "load": "GEAR", "spring": "SPRING", "motor": "MOTOR", "command": "COMMAND"}.get(
         law.place, "SENSOR"
     )
@@ -316,7 +319,8 @@ def _parameter_rows(law: Law) -> list[str]:
                 part.term.shape, _WIDE
             )
             rows.append(f'Parameter("{s}", "{part.term.shape_unit}", null={part.shape:.6g}, '
-                        f"low={part.shape / near:.6g}, high={part.shape * near:.6g}, typical={part.shape:.6g}, "
+                        f"low={part.shape / near:.6g}, high={part.shape * near:.6g}, "
+                        f"typical={part.shape:.6g}, "
                         f"logarithmic=True)")  # fmt: skip
     return [*rows, *(["PRESLIDING"] if law.is_friction else [])]
 

@@ -1,7 +1,8 @@
-"""The page of a law: the missing torque over what it depends on, the law through it, and what else was tried."""
+"""The page of a law: the missing torque over what it depends on, the law in it, and what else was tried."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -12,7 +13,7 @@ from rsea_ros.report import words
 from rsea_ros.report.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.law_words import NAMES, UNITS, gain_sentence, headline, parameter_lines
 from rsea_ros.report.page import Block, bullets, code, equation, folded, key_numbers, page, paragraph, section
-from rsea_ros.report.palette import AFTER, BEFORE, MEASURED, QUIET, faint
+from rsea_ros.report.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import UNITS as CHANNEL_UNITS
 from rsea_ros.signals import FloatArray
@@ -20,6 +21,7 @@ from rsea_ros.signals import FloatArray
 _WINDOWS = 12
 _CURVE = 160
 _MOST_TRIED = 12
+_DEPENDENCE_HEADS = ("", "explains, held out", "of what the law leaves")
 
 
 def law_report(result: LawResult, provenance: Provenance | None = None) -> str:
@@ -81,15 +83,18 @@ def _over(written: WrittenLaw) -> Figure:
          "args": ["visible", [True, *(j == i for j in range(_WINDOWS)), True, True, True]]}
         for i, k in enumerate(windows)
     ]  # fmt: skip
-    slider = {"active": 0, "currentvalue": {"prefix": "orange: from ", "suffix": " s on", "font": {"size": 12, "color": QUIET}},
-              "steps": steps, "pad": {"t": 44}, "len": 1.0, "x": 0.0, "tickcolor": QUIET, "font": {"size": 11, "color": QUIET}}  # fmt: skip
+    small = {"size": 12, "color": QUIET}
+    value = {"prefix": "orange: from ", "suffix": " s on", "font": small}
+    slider = {"active": 0, "currentvalue": value, "steps": steps, "pad": {"t": 44}, "len": 1.0, "x": 0.0,
+              "tickcolor": QUIET, "font": small}  # fmt: skip
     top = float(np.quantile(np.abs(y), 0.995))
+    what = "angle" if unit == "rad" else "torque"
     wave = "one period of the " if _cycles(written) else ""
     return Figure(
-        f"The missing {'angle' if unit == 'rad' else 'torque'} over the {NAMES[shown.over]}, and the law through it",
-        f"Grey: what the simulation lacks, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}); black: its mean "
-        "with 95 %. Blue: the law; its band is the spread of what else the law depends on. Move the slider to see one stretch of "
-        "time in orange.",
+        f"The missing {what} over the {NAMES[shown.over]}, and the law in it",
+        f"Grey: what the simulation lacks, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
+        "Black: its mean with 95 %. Blue: the law; its band is the spread by what else the law reads. The "
+        "slider shows one stretch of time in orange.",
         data,
         layout(
             xaxis=axis(f"{wave}{NAMES[shown.over]}, {words.unit(UNITS[shown.over])}"),
@@ -110,8 +115,9 @@ def _points(
 def _bars(x: FloatArray, y: FloatArray, error: FloatArray) -> Json:
     keep = np.isfinite(y)
     return {"type": "scatter", "mode": "markers", "x": numbers(x[keep][::6]), "y": numbers(y[keep][::6]),
-            "error_y": {"type": "data", "array": numbers(error[keep][::6]), "thickness": 1.2, "width": 0, "color": "#1f2933"},
-            "marker": {"size": 6, "color": "#1f2933"}, "name": "mean"}  # fmt: skip
+            "error_y": {"type": "data", "array": numbers(error[keep][::6]), "thickness": 1.2, "width": 0,
+                        "color": INK},
+            "marker": {"size": 6, "color": INK}, "name": "mean"}  # fmt: skip
 
 
 def _cycles(written: WrittenLaw) -> float:
@@ -126,7 +132,7 @@ def _folded(written: WrittenLaw) -> FloatArray:
 
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places along x, and between which values the law lies there (its 10 to 90 % by what else it reads)."""
+    """Return places along x, and the 10 to 90 % of the law there, which spread by what else it reads."""
     first, last = (float(v) for v in np.quantile(x, [0.002, 0.998]))
     edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
@@ -179,11 +185,10 @@ def _depends(result: LawResult) -> str:
         f"<td class='number' data-label='of what the law leaves'>{100 * max(d.beside, 0.0):.1f} %</td></tr>"
         for d in top
     )
-    head = "<tr><th>A function of</th><th></th><th class='number'>explains, held out</th><th class='number'>of what the law leaves</th></tr>"
     return section(
-        "What it depends on", f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
-        caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on others: "
-        "share of the power above the noise that they take.",
+        "What it depends on", _html_table("A function of", _DEPENDENCE_HEADS, rows),
+        caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
+        "others: share of the power above the noise that they take.",
     )  # fmt: skip
 
 
@@ -200,18 +205,21 @@ def bars_of(share: float) -> str:
 def _levels(result: LawResult) -> str:
     rows = "".join(
         f"<tr><td>{escape(words.channel(n))}</td>"
-        f"<td class='number' data-label='without'>{words.quantity(result.before[n], CHANNEL_UNITS[n], 3)}</td>"
-        f"<td class='number' data-label='with the law'>{words.quantity(result.after.get(n, result.before[n]), CHANNEL_UNITS[n], 3)}</td>"
-        f"<td class='number' data-label='noise'>{words.quantity(result.noise[n], CHANNEL_UNITS[n], 3)}</td></tr>"
+        + "".join(
+            f"<td class='number' data-label='{what}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
+            for what, rms in (
+                ("without", result.before[n]), ("with the law", result.after[n]), ("noise", result.noise[n])
+            )
+        )
+        + "</tr>"
         for n in result.before
     )
-    head = "<tr><th>Channel</th><th class='number'>without</th><th class='number'>with the law</th><th class='number'>noise</th></tr>"
     text = (
         gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
     )
     return section(
         "What is gained",
-        f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
+        _html_table("Channel", ("without", "with the law", "noise"), rows),
         caption=text,
     )
 
@@ -223,19 +231,20 @@ def _tried(result: LawResult) -> str:
     ordered += [t for t in result.tried if t.chosen and t not in ordered]
     rows = "".join(
         f"<tr><td>{'<b>' if t.chosen else ''}{escape(', '.join(t.terms))}{'</b>' if t.chosen else ''}"
-        f"<small>{escape(t.place)}</small></td><td class='number' data-label='left'>{100 * t.left:.1f} %</td></tr>"
+        f"<small>{escape(t.place)}</small></td>"
+        f"<td class='number' data-label='left'>{100 * t.left:.1f} %</td></tr>"
         for t in ordered
     )
-    head = "<tr><th>Terms</th><th class='number'>left, held out</th></tr>"
     note = paragraph(
-        "The shortest law within one standard error of the best is taken (bold); its terms are then fitted in the "
-        "simulation, and those that it does not need fall away."
+        "The shortest law within one standard error of the best is taken (bold); its terms are then fitted "
+        "in the simulation, and those that it does not need fall away."
     )
-    return folded(
-        "What else was tried",
-        note,
-        f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>",
-    )
+    return folded("What else was tried", note, _html_table("Terms", ("left, held out",), rows))
+
+
+def _html_table(first: str, others: Sequence[str], rows: str) -> str:
+    head = f"<th>{first}</th>" + "".join(f"<th class='number'>{name}</th>" for name in others)
+    return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
 
 
 def _files(result: LawResult) -> str:

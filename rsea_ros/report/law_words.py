@@ -13,7 +13,8 @@ _CLEARLY = 0.1
 """Share of what the law leaves that another variable must take to be told of."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
          "t": "time", "share": "time", "h": "load's angle"}  # fmt: skip
-UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s", "h": "rad"}
+UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s",
+         "h": "rad"}  # fmt: skip
 
 
 def headline(result: LawResult) -> str:
@@ -52,8 +53,8 @@ def gain_sentence(result: LawResult) -> str:
     """Return the gain on blocks that took part in nothing."""
     low, high = result.gain_ci95
     return (
-        f"The residual falls by {100 * result.gain:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f} %) on blocks "
-        "of time that took part in no fit and no choice."
+        f"The residual falls by {100 * result.gain:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f} %) on "
+        "blocks of time that took part in no fit and no choice."
     )
 
 

@@ -1,4 +1,4 @@
-"""Input estimation: a torque that nobody told the model of is found again, within the doubt that is stated."""
+"""Input estimation: a torque that the model does not know is reconstructed within the stated doubt."""
 
 from __future__ import annotations
 
