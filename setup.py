@@ -10,7 +10,9 @@ from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 SHARE = Path("share") / NAME
@@ -24,7 +26,7 @@ def tree(top: str) -> list[tuple[str, list[str]]]:
 
 
 def requirements(part: str) -> list[str]:
-    """Return what a part of requirements.in asks for; its parts begin with a comment and end with an empty line."""
+    """Return what a part of requirements.in asks for: a comment, a package a line, an empty line."""
     parts = Path("requirements.in").read_text(encoding="utf-8").split("\n\n")
     (lines,) = (text.splitlines() for text in parts if text.startswith(f"# {part}"))
     return [line for line in lines if not line.startswith("#")]
@@ -44,8 +46,11 @@ setup(
     zip_safe=False,
     package_data={
         "": ["py.typed"],
-        "rsea_ros.report": ["*.css", "*.js"],
+        "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
+        "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
+        "rsea_ros.nodes": ["*.xml"],
+        "rsea_ros.watch": ["page/*"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

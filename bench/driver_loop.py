@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 from rsea_ros.hardware.device import State
+from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.dynamixel.settings import usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
@@ -24,7 +25,7 @@ class Loop:
                  latency: float = 0.0, limits: Limits | None = None) -> None:  # fmt: skip
         limits = limits or Limits(68.0, lost_cycles=lost_cycles)
         self.device = DynamixelNetft(
-            MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate)),
+            Motor(MotorSettings(bench.port, 4_000_000, latency=latency or usual_latency(rate))),
             SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, ft_timeout), limits, STIFFNESS,
         )  # fmt: skip
         self.guarded = Guarded(self.device, limits, rate)

@@ -102,7 +102,7 @@ class McapStorage:
         self._times += [min(times), max(times)] if self._index else []
         self._chunk, self._index = bytearray(), {}
 
-    def remark(self, texts: Mapping[str, str]) -> None:
+    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
         """Keep texts by name in a metadata record."""
         self.flush()
         if texts:

@@ -66,6 +66,16 @@ def known(bag: Path, contents: Contents) -> Known:
     return found
 
 
+def remarks_in(path: Path, data: bytes) -> Remarks:
+    """Return the remarks in the metadata that a storage file holds; none where they are not understood."""
+    try:
+        document = yaml_text.document(path, data)
+        custom = document[ROOT]["custom_data"]
+    except (BagError, TypeError, ValueError, KeyError):
+        return Remarks()
+    return remarks_of(custom if isinstance(custom, dict) else {})
+
+
 def _known(bag: Path, document: Any) -> Known:
     """Raises NotUnderstood, TypeError, ValueError or KeyError for what rosbag2 does not write."""
     root = document[ROOT] if isinstance(document, dict) else None

@@ -24,11 +24,13 @@ class RawReader:
     """Reads the stamp and some numbers of the messages of a topic.
 
     fields: name and index of each number; one that a message does not have is nan.
-    joint: name that the joint of a message with names must have; empty: any.
+    joint: name that the joint of a message with names must have; empty: any. most: names that it may have.
     """
 
-    def __init__(self, msgtype: str, fields: Sequence[tuple[str, int]], joint: str = "") -> None:
-        self._msgtype, self._fields, self._joint = msgtype, fields, joint
+    def __init__(
+        self, msgtype: str, fields: Sequence[tuple[str, int]], joint: str = "", most: int = 1
+    ) -> None:
+        self._msgtype, self._fields, self._joint, self._most = msgtype, fields, joint, most
         self._length = -1
         self._fixed: list[tuple[int, int, bytes]] = []
         self._stamp, self._double = struct.Struct("<iI"), struct.Struct("<d")
@@ -37,7 +39,7 @@ class RawReader:
     def read(self, raw: bytes) -> tuple[int, list[float]]:
         """Return the stamp, ns, and the numbers.
 
-        Raises ParameterError for several joints or another one, a damaged message, one of more than 64 KiB.
+        Raises ParameterError for too many joints or another one, a damaged message, one of more than 64 KiB.
         """
         if len(raw) > LONGEST:
             raise ParameterError(f"{len(raw)} bytes, expected at most {LONGEST} of a {self._msgtype}")
@@ -53,9 +55,9 @@ class RawReader:
             layout = layout_of(raw, self._msgtype)
         except ValueError as error:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
-        if len(layout.names) > 1:
-            names = brief(", ".join(layout.names[:5]))
-            raise ParameterError(f"{len(layout.names)} joints ({names}), expected one")
+        if len(layout.names) > self._most:
+            names, most = brief(", ".join(layout.names[:5])), "one" if self._most == 1 else self._most
+            raise ParameterError(f"{len(layout.names)} joints ({names}), expected {most}")
         if self._joint and layout.names and layout.names[0] != self._joint:
             raise ParameterError(f"joint {layout.names[0]!r}, expected {self._joint!r} (parameter joint)")
         self._at = [_position(layout, name, index) for name, index in self._fields]

@@ -13,6 +13,7 @@ from msg_adapters.checks import Series, check_finite, note_repeats, on_the_clock
 from msg_adapters.contents import Contents, Messages
 from msg_adapters.decoding import Decoded
 from msg_adapters.health import DIAGNOSTICS, tell_health
+from msg_adapters.inferred import is_inferred
 from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
@@ -52,7 +53,11 @@ def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bo
     _require(source, contents, topics, strict)
     told = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
     series: dict[str, Series] = {}
-    for role in ROLES:
+    roles = [role for role in ROLES if role != "ft" or not is_inferred(contents, topics)]
+    if len(roles) < len(ROLES):
+        made = f"{topics.topic('ft')}: no sensor's, the stiffness of a rig times {topics.topic('deflection')}"
+        told.notes.append(f"{made}; left out")
+    for role in roles:
         messages = contents.topics.get(topics.topic(role))
         if messages is not None and messages.raw:
             series.update(_series(source, role, messages, topics, told))

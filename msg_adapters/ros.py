@@ -63,6 +63,14 @@ def joint_state_message(
     return message
 
 
+def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
+    """Return an angle of the spring, rad, as `deflection` carries it."""
+    message = JointState(name=[joint], position=[float(angle)])
+    message.header.stamp = time_of(stamp_ns)
+    message.header.frame_id = frame
+    return message
+
+
 def wrench_message(
     stamp_ns: int, values: float | Sequence[float], axis: str = "torque.z", frame: str = "ft_sensor"
 ) -> WrenchStamped:
@@ -95,10 +103,20 @@ def diagnostics_message(
     stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object], hardware: str = ""
 ) -> DiagnosticArray:
     """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: what it is about."""
-    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-    message = DiagnosticArray(
-        status=[DiagnosticStatus(level=level, name=name, message=summary, values=pairs, hardware_id=hardware)]
-    )
+    return statuses_message(stamp_ns, [(name, level, summary, values)], hardware)
+
+
+def statuses_message(
+    stamp_ns: int, rows: Sequence[tuple[str, bytes, str, Mapping[str, object]]], hardware: str = ""
+) -> DiagnosticArray:
+    """Return several statuses, each of name, level, summary and values, about the same hardware."""
+    statuses = []
+    for name, level, summary, values in rows:
+        pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        statuses.append(
+            DiagnosticStatus(level=level, name=name, message=summary, values=pairs, hardware_id=hardware)
+        )
+    message = DiagnosticArray(status=statuses)
     message.header.stamp = time_of(stamp_ns)
     return message
 

@@ -11,11 +11,14 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+from msg_adapters import metadata
 from msg_adapters.contents import Contents, Messages
+from msg_adapters.yaml_text import LARGEST
 
 MAGIC = b"SQLite format 3\x00"
 TOPICS = "SELECT id, name, type FROM topics"
 MESSAGES = "SELECT topic_id, timestamp, data FROM messages"
+METADATA = f"SELECT metadata FROM metadata WHERE length(metadata) <= {LARGEST} LIMIT 1"
 COLUMNS = {"topics": {"id", "name", "type"}, "messages": {"topic_id", "timestamp", "data"}}
 PRAGMAS = ("trusted_schema=OFF", "cell_size_check=ON", "query_only=ON")
 JOURNALS = ("-wal", "-journal")
@@ -51,6 +54,7 @@ def scan(path: Path, contents: Contents) -> None:
             database.set_progress_handler(_allowance(size), _STEPS)
             _check_tables(database)
             _messages(database, _topics(database, path, contents), contents, path, size)
+            _remarks(database, path, contents)
     except (sqlite3.Error, sqlite3.Warning) as error:
         raise ValueError(f"no rosbag2 database: {error}") from None
 
@@ -135,6 +139,18 @@ def _messages(
     if damaged:
         detail = "rows without topic, log time or data were left out"
         contents.tell("damaged_messages", path.name, detail, damaged, "messages", damaged / rows)
+
+
+def _remarks(database: sqlite3.Connection, path: Path, contents: Contents) -> None:
+    """Take notes and faults from the metadata of a bag of one file; other recorders may leave none."""
+    try:
+        rows = database.execute(METADATA).fetchall()
+    except sqlite3.Error:
+        return
+    for (data,) in rows:
+        remarks = metadata.remarks_in(path, data if isinstance(data, bytes) else b"")
+        contents.notes.extend(remarks.notes)
+        contents.faults.extend(remarks.faults)
 
 
 def _text(data: bytes | str) -> str:

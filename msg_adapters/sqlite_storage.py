@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from msg_adapters.definitions import definition
+from msg_adapters.metadata import VERSION
 from rsea_ros.files import create
 
 TABLES = """
@@ -26,6 +27,7 @@ INSERT INTO schema VALUES (4, 'rsea_ros');
 """
 TOPIC = "INSERT INTO topics VALUES (NULL, ?, ?, 'cdr', '[]', ?)"
 DEFINITION = "INSERT INTO message_definitions VALUES (NULL, ?, 'ros2msg', ?, ?)"
+METADATA = f"INSERT INTO metadata VALUES (NULL, {VERSION}, ?)"
 MESSAGE = "INSERT INTO messages VALUES (NULL, ?, ?, ?)"
 
 
@@ -64,8 +66,10 @@ class SqliteStorage:
     def sync(self) -> None:
         """Do nothing: a commit waits for the disk."""
 
-    def remark(self, texts: Mapping[str, str]) -> None:
-        """Do nothing: only metadata.yaml has a place for them."""
+    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
+        """Keep the metadata of the bag, which hold the texts too, where rosbag2 keeps them."""
+        with _system_errors():
+            self._database.execute(METADATA, (metadata,))
 
     def close(self) -> None:
         """Commit the rest."""

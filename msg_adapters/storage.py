@@ -24,8 +24,8 @@ class Storage(Protocol):
     def sync(self) -> None:
         """Wait until what was flushed is on the disk: from here on it survives a power cut too."""
 
-    def remark(self, texts: Mapping[str, str]) -> None:
-        """Keep texts by name in the file, where its format has a place for them."""
+    def remark(self, texts: Mapping[str, str], metadata: str) -> None:
+        """Keep texts by name in the file; metadata: the same in what rosbag2 calls metadata.yaml."""
 
     def close(self) -> None:
         """Write the rest and the index."""

@@ -183,19 +183,17 @@ class BagWriter:
 
     def _complete(self) -> None:
         """Close the file, add the metadata, and move everything to its name."""
+        file, topics = self._storage.path, [topic for _, topic in self._topics.values()]
+        known = metadata.text(file, self._kind, topics, self._span, self.remarks)
         if self._single:
-            self._storage.remark(self.remarks.texts())
+            self._storage.remark(self.remarks.texts(), known)
         self._storage.close()
-        file = self._storage.path
         if self._single:
             files.give_names([(file, self.path)], force=self._force)
             files.remove(self.partial)
             return
-        topics = [topic for _, topic in self._topics.values()]
         files.remove(self.partial / metadata.NAME)
-        files.write_new(
-            self.partial / metadata.NAME, metadata.text(file, self._kind, topics, self._span, self.remarks)
-        )
+        files.write_new(self.partial / metadata.NAME, known)
         files.give_names([(self.partial, self.path)], force=self._force)
 
     def _abandon(self) -> None:

@@ -21,13 +21,16 @@ class NotUnderstood(ValueError):
 
 
 def load(path: Path) -> Any:
-    """Return the document of a file as mappings, lists and texts.
-
-    Raises BagError for a file of more than 1 MB, aliases, and deep nesting; NotUnderstood for what is no
-    YAML; FileNotFoundError.
-    """
+    """Return the document of a file. Raises as `document` does, and FileNotFoundError."""
     with path.open("rb") as file:
-        data = file.read(LARGEST + 1)
+        return document(path, file.read(LARGEST + 1))
+
+
+def document(path: Path, data: bytes) -> Any:
+    """Return what a file holds as YAML, as mappings, lists and texts.
+
+    Raises BagError for more than 1 MB, aliases, and deep nesting; NotUnderstood for what is no YAML.
+    """
     if len(data) > LARGEST:
         raise BagError(f"{path}: more than {LARGEST} bytes, expected the metadata of a bag")
     try:

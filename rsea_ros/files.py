@@ -48,12 +48,13 @@ def write_at(descriptor: int, data: bytes, offset: int = 0) -> None:
         rest, offset = rest[done:], offset + done
 
 
-def write_new(path: Path, text: str) -> None:
-    """Write a new file as UTF-8; bytes of a file name that are no UTF-8 are escaped."""
+def write_new(path: Path, content: str | bytes) -> None:
+    """Write a new file, text as UTF-8; bytes of a file name that are no UTF-8 are escaped."""
+    data = content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
     with naming(path):
         descriptor = create(path)
         try:
-            write_at(descriptor, text.encode("utf-8", "backslashreplace"))
+            write_at(descriptor, data)
         finally:
             os.close(descriptor)
 

@@ -70,9 +70,9 @@ class NewFiles:
         self._names.append(name)
         return self._stage.path / name
 
-    def write(self, name: str, text: str) -> Path:
+    def write(self, name: str, content: str | bytes) -> Path:
         """Write a file, and return the path that it will have."""
-        write_new(self.staged(name), text)
+        write_new(self.staged(name), content)
         return self.folder / name
 
     def __exit__(
@@ -116,12 +116,17 @@ class NewFiles:
                     folder.rmdir()
 
 
-def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
+def write_file(path: str | Path, content: str | bytes, *, force: bool = False) -> Path:
     """Write one file into a folder that exists, and return its path. Raises as NewFiles does."""
     with naming(Path(path)):
         Path(path).parent.stat()
     with NewFiles(Place(Path(path).parent, force)) as new:
-        return new.write(Path(path).name, text)
+        return new.write(Path(path).name, content)
+
+
+def write_text(path: str | Path, text: str, *, force: bool = False) -> Path:
+    """Write one file of text as `write_file` does."""
+    return write_file(path, text, force=force)
 
 
 def siblings(path: Path) -> Iterator[Path]:

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "staging", "new_files"}
+FILES = {"interrupts", "files", "staging", "new_files", "processes"}
 FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -28,6 +28,7 @@ OWN = {
     "version": set(),
     "plugins": {"errors"},
     "interrupts": set(),
+    "processes": set(),
     "files": {"errors", "interrupts"},
     "staging": {"files"},
     "new_files": {"errors", "files", "interrupts", "staging"},
@@ -68,7 +69,7 @@ OWN = {
 
 DIAGNOSIS = (
     {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
-    {"result", "score", "short_pieces", "initial_guess"},
+    {"result", "score", "short_pieces", "initial_guess", "recommended_run"},
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
     {"selection", "step_fits", "signature"},
     {"forward_step", "backward_elimination", "evaluation", "flexible"},
@@ -118,7 +119,9 @@ FOREIGN = {
     "library": {"numpy", "plotly", "rich"},
     "stamps": {"numpy"},
     "hardware": {"numpy", "dynamixel_sdk", "serial"},
-    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval", "pyarrow"} | MESSAGES,
+    "msg_adapters": {"numpy", "scipy", "yaml", "rosbags", "lz4", "backports", "compression", "asteval"}
+    | {"pyarrow"}
+    | MESSAGES,
     "report": {"numpy", "plotly", "rich", "schemdraw"},
     "nodes": {"numpy", "rclpy", "rich", "yaml"},
     "cli": {"numpy", "rich", "rclpy", "yaml"},

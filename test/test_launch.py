@@ -99,6 +99,7 @@ def test_only_the_first_node_model_and_identify_start_unasked(describe):
     assert {name: defaults(parts)[name] for name in wanted} == {
         "model": "true",
         "identify": "true",
+        "health": "false",
         "controller": "false",
         "record": "false",
         "excite": "false",

@@ -18,7 +18,9 @@ import rclpy.qos
 from msg_adapters.ros import JointState
 
 ROOT = Path(__file__).resolve().parents[1]
-EXECUTABLES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+EXECUTABLES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +73,8 @@ def test_every_module_is_installed(workspace, top):
 def test_the_style_of_reports_is_installed(workspace):
     (installed,) = (workspace / "install/rsea_ros/lib").glob("python3*/site-packages/rsea_ros/report")
     assert {file.name for file in installed.glob("page.*")} == {"page.py", "page.css", "page.js"}
+    vendored = {file.name for file in (installed / "vendor").iterdir()}
+    assert vendored == {"plotly-cartesian.LICENSE", "plotly-cartesian.min.js.gz"}
 
 
 @pytest.mark.parametrize("top", ["config", "launch"])

@@ -1,24 +1,55 @@
-"""Cells that hold a list, `[0.1, -0.2, 0.3]`: `name[1]` is the second number of the column `name`."""
+"""Columns that hold several numbers: lists in cells, matrices, arrays.
+
+`name[1]` is the second number of each sample: of a list in a cell, or a column of a matrix. `name[1,:]` is
+a row of a matrix whose samples lie side by side; MATLAB's `name(:,2)` and `name(2,:)` are the same two.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 CHOSEN = "#"
 """In the place of a number: the one that is chosen on import."""
-_ELEMENT = re.compile(r"(?P<base>.+)\[(?P<index>[0-9]{1,4})\]")
+_ELEMENT = re.compile(r"(?P<base>.+)\[(?:(?P<row>[0-9]{1,4}),:|(?::,)?(?P<column>[0-9]{1,4}))\]")
+_MATLAB = re.compile(r"(?P<base>.+)\((?:(?P<row>[0-9]{1,4}),:|:,(?P<column>[0-9]{1,4}))\)")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the values of a column are: in `base`, all of it or number `index`, from 0.
+
+    is_row: of the first axis (the samples lie along the second), else of the second.
+    """
+
+    base: str
+    index: int | None = None
+    is_row: bool = False
+
+
+def place_of(column: str) -> Place:
+    """Return the place that the name of a column says."""
+    text = column.replace(" ", "") if column.endswith(("]", ")")) else column
+    for pattern, first in ((_ELEMENT, 0), (_MATLAB, 1)):
+        match = pattern.fullmatch(text)
+        number = match and (match["row"] or match["column"])
+        if match and number and int(number) >= first:
+            return Place(match["base"], int(number) - first, match["row"] is not None)
+    return Place(column)
 
 
 def base_and_index(column: str, names: Sequence[str]) -> tuple[str, int | None]:
-    """Return the column of a file that holds what is asked for, and which number of its cells.
+    """Return the column of a text file that holds what is asked for, and which number of its cells.
 
-    A column that is called `name[1]` itself is taken as it is.
+    A column that is called `name[1]` itself is taken as it is, and a number as that of a column, from 1.
     """
-    found = _ELEMENT.fullmatch(column)
-    if found is None or column in names:
+    if column in names:
         return column, None
-    return found["base"], int(found["index"])
+    place = place_of(column)
+    if place.index is None or place.is_row:
+        return column, None
+    return place.base, place.index
 
 
 def number_in(cell: str, index: int) -> str:
@@ -33,5 +64,12 @@ def number_in(cell: str, index: int) -> str:
 
 
 def chosen(column: str, index: int | None) -> str:
-    """Return a column with the number that is chosen in the place of `#`."""
-    return column if index is None else column.replace(f"[{CHOSEN}]", f"[{index}]")
+    """Return a column, or an expression, with the number that is chosen in the place of each `#`."""
+    if index is None:
+        return column
+    return re.sub(r"(?<=[\[,:])#(?=[\],])", str(index), column)
+
+
+def is_open(text: str) -> bool:
+    """Tell whether a column or an expression still waits for a number in the place of `#`."""
+    return chosen(text, 0) != text

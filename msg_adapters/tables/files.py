@@ -1,27 +1,45 @@
-"""Columns of numbers out of CSV, TSV (each also gzipped) and MAT files."""
+"""Columns of numbers out of files, each format by the end of the file's name."""
 
 from __future__ import annotations
 
 import csv
 import gzip
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from msg_adapters.tables import json_file
+from msg_adapters.tables.json_file import read_json
 from msg_adapters.tables.mat_file import read_mat
+from msg_adapters.tables.npz_file import read_npy, read_npz
+from msg_adapters.tables.parquet_file import read_parquet
 from msg_adapters.tables.table import Table
 from msg_adapters.tables.text_file import read_text
 from rsea_ros.errors import ImportMapError
 
+READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
+    ".mat": read_mat,
+    ".npz": read_npz,
+    ".npy": read_npy,
+    ".parquet": read_parquet,
+    ".pq": read_parquet,
+    ".json": read_json,
+    **dict.fromkeys(json_file.LINES, read_json),
+}
+"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not."""
 
-def read_columns(path: Path, columns: Sequence[str], delimiter: str | None = None) -> Table:
+
+def read_columns(
+    path: Path, columns: Sequence[str], delimiter: str | None = None, header: bool | None = None
+) -> Table:
     """Return the columns asked for.
 
     Text files name their columns in the first row; without names they are called 1, 2, ….
     Raises ImportMapError with file, line, column, value and expectation.
     """
+    reader = READERS.get(path.suffix.lower())
     try:
-        return read_mat(path, columns) if path.suffix == ".mat" else read_text(path, columns, delimiter)
+        return reader(path, columns) if reader else read_text(path, columns, delimiter, header)
     except (gzip.BadGzipFile, zlib.error, EOFError):
         raise ImportMapError(f"{path}: damaged or no gzip file, expected a packed table") from None
     except OSError as error:

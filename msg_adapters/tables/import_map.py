@@ -3,47 +3,32 @@
 about: one line that goes into the bag's notes
 time: {column: t, unit: s}                    # or {rate: 1000} (Hz) where the file has no time
 where: {column: test_nr, below: 100}          # optional: only these rows; also from:, equals:
+runs: {column: episode_index}                 # optional: a file of several runs, one for each value
 delimiter: ";"                                # optional: text files only, else seen from the first line
+header: false                                 # optional: text files only, else seen from the first line
 channels:
   position: {column: phi, unit: deg, sign: -1}
   velocity: {file: states.csv, column: "rates[2]", unit: rad/s}   # of a file in the directory that is read
   command:                                    # a list is summed
     - {column: vir, unit: V, scale: 35.15}    # N m for each V
     - {column: pulses, unit: N m, constant: 0.5}
+  motor_torque: {expression: "0.12 * iq - 0.4 * sign(derivative(phi))", unit: N m}
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from msg_adapters.tables.elements import CHOSEN, chosen
-from msg_adapters.tables.keys import CHANNEL, MAP, RATES, TERM, TIME, WHERE
+from msg_adapters.tables.elements import is_open
+from msg_adapters.tables.keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
+from msg_adapters.tables.terms import Term, checked_keys, column_name, number, term_of, terms_of
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
-from rsea_ros.keys import NEEDED, Key
 from rsea_ros.wording import shown
-
-LARGEST = 1e300
-"""Of the numbers in a map: products of two of them and a unit stay finite."""
-
-
-@dataclass(frozen=True)
-class Term:
-    """A column's part in a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
-
-    file: in the directory that is read; empty for the one file that is.
-    """
-
-    column: str
-    unit: str
-    gain: float
-    constant: float = 0.0
-    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,6 +52,8 @@ class ImportMap:
     where: Rows | None = None
     delimiter: str | None = None
     about: str = ""
+    runs: str | None = None
+    header: bool | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -76,10 +63,9 @@ class ImportMap:
     def at(self, index: int | None) -> ImportMap:
         """Return the map for one number of lists in cells. Raises ImportMapError where none is chosen."""
         channels = {
-            name: tuple(replace(term, column=chosen(term.column, index)) for term in terms)
-            for name, terms in self.channels.items()
+            name: tuple(term.at(index) for term in terms) for name, terms in self.channels.items()
         }
-        left = [t.column for terms in channels.values() for t in terms if t.column.endswith(f"[{CHOSEN}]")]
+        left = [t.column for terms in channels.values() for t in terms if is_open(t.column)]
         if left:
             raise ImportMapError(
                 f"{self.path}: column {left[0]!r} holds several joints, expected the number of one, from 0 "
@@ -94,9 +80,10 @@ class ImportMap:
 
     def columns(self) -> list[str]:
         """Return every column that is needed, each once."""
-        terms = [term.column for terms in self.channels.values() for term in terms]
-        extra = [part.column for part in (self.time, self.where) if part is not None]
-        return list(dict.fromkeys(extra + terms))
+        terms = [column for terms in self.channels.values() for term in terms for column in term.columns]
+        where = [self.where.column] if self.where is not None else []
+        runs = [self.runs] if self.runs is not None else []
+        return list(dict.fromkeys([*(self.time.columns if self.time else ()), *where, *runs, *terms]))
 
 
 def load_map(path: str | Path) -> ImportMap:
@@ -114,25 +101,27 @@ def load_map(path: str | Path) -> ImportMap:
 
 
 def _map(path: Path, document: object) -> ImportMap:
-    body = _keys(document, "map", MAP)
-    time = _keys(body["time"], "time", TIME)
-    if ("rate" in time) == ("column" in time):
+    body = checked_keys(document, "map", MAP)
+    time = checked_keys(body["time"], "time", TIME)
+    if ("rate" in time) == ("column" in time or "expression" in time):
         raise FieldError("time: expected either a column with its unit, or a rate in Hz", "time")
     rate = _rate(time["rate"]) if "rate" in time else None
-    channels = _keys(body["channels"], "channels", CHANNEL)
+    channels = checked_keys(body["channels"], "channels", CHANNEL)
     return ImportMap(
         path=path,
-        channels=_one_kind({name: _terms(name, value) for name, value in channels.items()}),
-        time=None if rate else _term("time", time, "time"),
+        channels=_one_kind({name: terms_of(name, value) for name, value in channels.items()}),
+        time=None if rate else term_of("time", time, "time"),
         rate=rate,
         where=_rows(body["where"]) if "where" in body else None,
         delimiter=_delimiter(body.get("delimiter")),
+        runs=_runs(body["runs"]) if "runs" in body else None,
+        header=_header(body.get("header")),
         about=" ".join(str(body.get("about", "")).split()),
     )
 
 
 def _rate(value: object) -> float:
-    rate = _number(value, "time.rate")
+    rate = number(value, "time.rate")
     if not RATES[0] <= rate <= RATES[1]:
         raise FieldError(
             f"time.rate is {rate}, expected more than 0 Hz: {RATES[0]:g} to {RATES[1]:g} Hz", "time.rate"
@@ -140,45 +129,14 @@ def _rate(value: object) -> float:
     return rate
 
 
-def _terms(channel: str, value: object) -> tuple[Term, ...]:
-    parts = value if isinstance(value, list) else [value]
-    if not parts:
-        raise FieldError(
-            f"channels.{channel} is an empty list, expected a column or more", f"channels.{channel}"
-        )
-    fields = [f"channels.{channel}" + (f"[{i}]" if value is parts else "") for i in range(len(parts))]
-    terms = tuple(_term(field, part, CHANNELS[channel]) for field, part in zip(fields, parts, strict=True))
-    if len({term.file for term in terms}) > 1:
-        raise FieldError(
-            f"channels.{channel} sums columns of several files, expected one file", f"channels.{channel}"
-        )
-    return terms
+def _runs(value: object) -> str:
+    return column_name(checked_keys(value, "runs", RUNS)["column"], "runs.column")
 
 
-def _term(field: str, value: object, dimension: str) -> Term:
-    """Return a term. A unit of another dimension than the channel's needs a scale that converts it."""
-    body = _keys(value, field, TERM)
-    try:
-        found, factor = unit(body["unit"])
-    except ValueError as error:
-        raise FieldError(f"{field}: {error}", f"{field}.unit") from None
-    if LINEAR.get(found, found) != dimension and "scale" not in body:
-        raise FieldError(
-            f"{field}: unit {body['unit']!r} is a {found}, expected a {dimension}, or a scale to it",
-            f"{field}.unit",
-        )
-    sign = _number(body.get("sign", 1), f"{field}.sign")
-    if sign not in (1, -1):
-        raise FieldError(f"{field}.sign is {sign}, expected 1 or -1", f"{field}.sign")
-    scale = _number(body.get("scale", 1), f"{field}.scale")
-    if scale == 0.0:
-        raise FieldError(
-            f"{field}.scale is 0, expected another number: the channel would be lost", f"{field}.scale"
-        )
-    gain = sign * factor * scale
-    column, constant = _column(body["column"], f"{field}.column"), body.get("constant", 0)
-    file = _file(body.get("file", ""), f"{field}.file")
-    return Term(column, str(body["unit"]), gain, _number(constant, f"{field}.constant"), file)
+def _header(value: object) -> bool | None:
+    if value is None or isinstance(value, bool):
+        return value
+    raise FieldError(f"header is {shown(value)}, expected true or false", "header")
 
 
 def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ...]]:
@@ -197,33 +155,12 @@ def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ..
 
 
 def _rows(value: object) -> Rows:
-    body = _keys(value, "where", WHERE)
-    limits = {key: _number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
+    body = checked_keys(value, "where", WHERE)
+    limits = {key: number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
     if not limits:
         raise FieldError("where: expected one of from, below, equals", "where")
-    return Rows(
-        _column(body["column"], "where.column"), limits.get("from"), limits.get("below"), limits.get("equals")
-    )
-
-
-def _number(value: object, field: str) -> float:
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < LARGEST:
-        return float(value)
-    raise FieldError(f"{field} is {shown(value)}, expected a number", field)
-
-
-def _column(value: object, field: str) -> str:
-    """Return the name of a column, or its number."""
-    if isinstance(value, (str, int)) and not isinstance(value, bool):
-        return str(value).strip()
-    raise FieldError(f"{field} is {shown(value)}, expected a name; put quotes around it", field)
-
-
-def _file(value: object, field: str) -> str:
-    """Return the plain name of a file."""
-    if isinstance(value, str) and value == Path(value).name:
-        return value
-    raise FieldError(f"{field} is {shown(value)}, expected the name of a file in the directory", field)
+    column = column_name(body["column"], "where.column")
+    return Rows(column, limits.get("from"), limits.get("below"), limits.get("equals"))
 
 
 def _delimiter(value: object) -> str | None:
@@ -231,19 +168,3 @@ def _delimiter(value: object) -> str | None:
         return None if value is None else DELIMITERS[value]
     known = ", ".join(repr(key) for key in DELIMITERS)
     raise FieldError(f"delimiter is {shown(value)}, expected one of {known}", "delimiter")
-
-
-def _keys(value: object, field: str, keys: Sequence[Key]) -> Mapping[str, Any]:
-    """Return a mapping that has only these keys, and all of them that are needed."""
-    allowed = ", ".join(sorted(key.name for key in keys))
-    if not isinstance(value, Mapping):
-        held = "empty" if value is None else shown(value)
-        raise FieldError(f"{field} is {held}, expected a mapping with {allowed}", field)
-    for name in value:
-        if name not in [key.name for key in keys]:
-            raise FieldError(f"{field}: unknown key {shown(name)}, expected {allowed}", f"{field}.{name}")
-    needed = sorted(key.name for key in keys if key.default == NEEDED)
-    for name in needed:
-        if name not in value:
-            raise FieldError(f"{field}: no {name!r}, expected {', '.join(needed)}", field)
-    return value

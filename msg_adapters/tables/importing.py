@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from msg_adapters.tables.clock import repaired
 from msg_adapters.tables.files import read_columns
-from msg_adapters.tables.import_map import ImportMap, Rows, Term
+from msg_adapters.tables.import_map import ImportMap, Rows
 from msg_adapters.tables.table import Table
+from msg_adapters.tables.terms import Term
 from rsea_ros.errors import ImportMapError
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 
@@ -19,8 +21,26 @@ UNDATED = 1e8
 """Stamps below this (s, three years after 1970) have no date: the file's clock starts near zero."""
 START_NS = 1_000_000_000
 """Where an undated record starts: a stamp of zero would mean `not set`."""
+MOST_RUNS = 10_000
+"""Of a file: a bag each."""
 LATEST = 2.0**31
 """s. The seconds of a message's stamp are a signed integer of 32 bits."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A record, and which joint and which run of the file it is: None where there is one of them only."""
+
+    record: Record
+    mapping: ImportMap
+    index: int | None = None
+    run: float | None = None
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others of the same file: `-joint2-run7`."""
+        joint = "" if self.index is None else f"-joint{self.index}"
+        return joint + ("" if self.run is None else f"-run{self.run:.15g}")
 
 
 @dataclass(frozen=True)
@@ -34,17 +54,45 @@ class _Part:
 
 
 def import_record(path: str | Path, mapping: ImportMap, index: int | None = None) -> Record:
-    """Read a measurement as its map says; the record's notes tell what was repaired.
+    """Read a measurement of one run as its map says; the record's notes tell what was repaired.
 
     path: a file, or the directory of the files that the map names. index: of the joint, from 0, where cells
     hold several. Raises ImportMapError with file, row, column, value and expectation.
     """
-    mapping = mapping.at(index)
-    parts = [_part(_file(Path(path), file, mapping), mapping.of_file(file)) for file in mapping.files]
+    imported = list(import_records(path, mapping, (index,)))
+    if len(imported) > 1:
+        raise ImportMapError(f"{path}: {len(imported)} runs in {mapping.runs}, expected one")
+    return imported[0].record
+
+
+def import_records(
+    path: str | Path, mapping: ImportMap, indices: Sequence[int | None] = (None,)
+) -> Iterator[Imported]:
+    """Yield a record for each joint of `indices` and each run of the file, which is read once.
+
+    Raises as import_record does.
+    """
+    maps = [mapping.at(index) for index in indices]
+    tables = {name: _table(_file(Path(path), name, mapping), name, maps) for name in mapping.files}
+    for index, joint in zip(indices, maps, strict=True):
+        for run in _runs(path, tables, joint):
+            parts = [
+                _part(_file(Path(path), name, mapping), table, joint.of_file(name), run)
+                for name, table in tables.items()
+            ]
+            with _naming(path, mapping, run):
+                record = _record(path, parts, joint)
+            yield Imported(record, joint, index, run)
+
+
+@contextmanager
+def _naming(path: str | Path, mapping: ImportMap, run: float | None) -> Iterator[None]:
+    """Let an error name file and run. Raises ImportMapError."""
+    where = f"{path}" if run is None else f"{path}: {mapping.runs} = {run:g}"
     try:
-        return _record(path, parts, mapping)
-    except ImportMapError as error:
-        raise ImportMapError(f"{path}: {error}") from None
+        yield
+    except ValueError as error:
+        raise ImportMapError(f"{where}: {error}") from None
 
 
 def _file(path: Path, name: str, mapping: ImportMap) -> Path:
@@ -54,14 +102,28 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
     return path / name if name else path
 
 
-def _part(path: Path, mapping: ImportMap) -> _Part:
-    table = read_columns(path, mapping.columns(), mapping.delimiter)
-    try:
-        keep, undated = _rows_kept(table, mapping)
+def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
+    """Read what all joints need of a file."""
+    columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
+    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header)
+
+
+def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> list[float | None]:
+    """Return the runs in order, None where the map knows of no runs."""
+    if mapping.runs is None:
+        return [None]
+    values = next(iter(tables.values()))[mapping.runs]
+    runs = np.unique(values[~np.isnan(values)])
+    if not 0 < len(runs) <= MOST_RUNS:
+        raise ImportMapError(f"{path}: {len(runs)} values in {mapping.runs}, expected 1 to {MOST_RUNS} runs")
+    return [float(run) for run in runs]
+
+
+def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _Part:
+    with _naming(path, mapping, run):
+        keep, undated = _rows_kept(table, mapping, run)
         stamps, note = _stamps(table, mapping, keep)
-    except ImportMapError as error:
-        raise ImportMapError(f"{path}: {error}") from None
-    values = {name: _values(table, terms)[keep] for name, terms in mapping.channels.items()}
+        values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
     return _Part(stamps, values, note, tuple(_rows_left_out(path, table, undated)))
 
 
@@ -93,14 +155,15 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
     return lines
 
 
-def _rows_kept(table: Table, mapping: ImportMap) -> tuple[BoolArray, int]:
+def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[BoolArray, int]:
     """Return which rows count, and how many are left out for want of a stamp or of what `where` asks."""
     keep = np.ones(len(next(iter(table.columns.values()))), np.bool_)
-    for part in (mapping.time, mapping.where):
-        if part is not None:
-            keep &= ~np.isnan(table[part.column])
-    undated = int(np.count_nonzero(~keep))
     where = mapping.where
+    for column in (*(mapping.time.columns if mapping.time else ()), *([where.column] if where else [])):
+        keep &= ~np.isnan(table[column])
+    undated = int(np.count_nonzero(~keep))
+    if mapping.runs is not None:
+        keep &= table[mapping.runs] == run
     if where is not None:
         values = table[where.column]
         keep &= values >= where.start if where.start is not None else True
@@ -149,12 +212,18 @@ def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> 
 
 
 def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:
-    """Return the stamp of each row that counts, s, increasing, and what was repaired."""
+    """Return the stamp of each row that counts, s, increasing, and what was repaired.
+
+    Stamps that repeat are spread over all dated rows of a run, those that `where` leaves out included.
+    """
     if mapping.time is None:
-        return np.flatnonzero(keep) / float(mapping.rate or 1.0), ""
-    stamps = _values(table, (mapping.time,))
-    dated = np.flatnonzero(~np.isnan(stamps))
-    t = stamps[dated]
+        start = int(np.argmax(keep)) if mapping.runs is not None else 0
+        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), ""
+    whole = ~np.isnan(_column_of(table, mapping.time.columns))
+    if mapping.runs is not None:
+        whole &= table[mapping.runs] == table[mapping.runs][np.argmax(keep)]
+    dated = np.flatnonzero(whole)
+    t = _values(table, (mapping.time,), whole, dated.astype(np.float64))
     back = np.flatnonzero(np.diff(t) < 0)
     if back.size:
         at = back[0] + 1
@@ -162,8 +231,13 @@ def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArr
         raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
-    stamps[dated], note = repaired(t)
-    return stamps[keep], note
+    t, note = repaired(t)
+    return t[keep[dated]], note
+
+
+def _column_of(table: Table, columns: Sequence[str]) -> FloatArray:
+    """Return a sum of columns: NaN where one of them is missing."""
+    return np.asarray(sum(table[column] for column in columns))
 
 
 def _check_range(start: float, stop: float, epoch_ns: int) -> None:
@@ -176,9 +250,16 @@ def _check_range(start: float, stop: float, epoch_ns: int) -> None:
         )
 
 
-def _values(table: Table, terms: Sequence[Term]) -> FloatArray:
+def _values(table: Table, terms: Sequence[Term], keep: BoolArray, t: FloatArray) -> FloatArray:
+    """Return a channel in the rows that count. t: their stamps, s. Raises ValueError for an expression."""
+    total = np.zeros(len(t))
     with np.errstate(over="ignore", invalid="ignore"):
-        values = terms[0].gain * table[terms[0].column] + terms[0].constant
-        for term in terms[1:]:
-            values += term.gain * table[term.column] + term.constant
-    return np.asarray(values, np.float64)
+        for term in terms:
+            if term.expression is None:
+                values = table[term.column][keep]
+            else:
+                values = term.expression.values({name: table[name][keep] for name in term.columns}, t)
+            values *= term.gain
+            values += term.constant
+            total += values
+    return total

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+from msg_adapters.tables.expression import FUNCTIONS
 from msg_adapters.tables.units import CHANNELS, FACTORS
 from rsea_ros.keys import NEEDED, Key, table
 
@@ -14,6 +15,8 @@ MAP = (
     Key("about", "text", "empty", "one line that goes into the bag's notes"),
     Key("time", "mapping", NEEDED, "where the stamps come from: a column with its unit, or a rate"),
     Key("where", "mapping", "all rows", "which rows count"),
+    Key("runs", "mapping", "one run", "a file of several runs: each value of a column is one, a bag each"),
+    Key("header", "`true`, `false`", "as the line looks", "whether the first line of a text has names"),
     Key(
         "delimiter",
         "`,` `;` `|` `tab` `blanks`",
@@ -24,8 +27,12 @@ MAP = (
 )
 TIME = (
     Key("column", "name or number of a column", "a rate", "the stamps, increasing, of each file"),
-    Key("unit", "unit of time", "needed with a column", "of the stamps"),
+    Key("expression", "expression", "a column", "of columns, instead of one"),
+    Key("unit", "unit of time", "needed but with a rate", "of the stamps"),
     Key("rate", f"{RATES[0]:g} to {RATES[1]:g} Hz", "a column", "samples a second, of a file without stamps"),
+)
+RUNS = (
+    Key("column", "name or number of a column", NEEDED, "the column that counts the runs"),
 )
 WHERE = (
     Key("column", "name or number of a column", NEEDED, "the column that chooses"),
@@ -34,7 +41,8 @@ WHERE = (
     Key("equals", "number, as in the file", "no limit", "rows with exactly this value"),
 )
 TERM = (
-    Key("column", "name or number of a column", NEEDED, "the measured values; `name[2]`: of lists in cells"),
+    Key("column", "name or number of a column", "an expression", "measured values; `q[2]`: one of several"),
+    Key("expression", "expression", "a column", "of columns, instead of one"),
     Key("file", "name of a file", "FILE itself", "that holds it, in the directory FILE"),
     Key("unit", "unit", NEEDED, "of the column; another dimension than the channel's needs a scale"),
     Key("sign", "1 or -1", "1", "-1 turns the axis"),
@@ -46,13 +54,22 @@ SECTIONS: Mapping[str, Sequence[Key]] = {
     "map": MAP,
     "time": TIME,
     "where": WHERE,
+    "runs": RUNS,
     "channels": CHANNEL,
     "channels.NAME": TERM,
 }
 
 
 def tables() -> str:
-    """Return the tables of docs/import.md in Markdown: all keys, then all units."""
+    """Return the tables of docs/import.md in Markdown: all keys, all units, the functions of expressions."""
     rows = [f"| {name} | {', '.join(f'`{unit}`' for unit in factors)} |" for name, factors in FACTORS.items()]
     units = "\n".join(["| dimension | units |", "|---|---|", *rows])
-    return "\n".join([*(table(section, keys) for section, keys in SECTIONS.items()), units]) + "\n"
+    functions = "\n".join(["| function | is |", "|---|---|", *_functions()])
+    sections = (table(section, keys) for section, keys in SECTIONS.items())
+    return "\n".join([*sections, units, "", functions]) + "\n"
+
+
+def _functions() -> Iterator[str]:
+    """Yield a row for each function of an expression."""
+    for name, (_, count, meaning) in FUNCTIONS.items():
+        yield f"| `{name}({', '.join('xyz'[:count])})` | {meaning} |"

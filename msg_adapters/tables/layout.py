@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msg_adapters.tables.elements import base_and_index
+from msg_adapters.tables.table import index_of
 from rsea_ros.decimal_number import is_decimal
 
 COMMENT = "#"
@@ -51,27 +52,38 @@ def split(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def layout_of(first: str, columns: Sequence[str], path: Path, delimiter: str | None) -> Layout:
+def index_in(column: str, names: Sequence[str]) -> int:
+    """Return where a column stands, by its name or its number, from 1. Raises ValueError for neither."""
+    if column not in names and column.isdecimal() and 1 <= int(column[:6]) <= len(names):
+        return int(column) - 1
+    return index_of(column, names)
+
+
+def layout_of(
+    first: str, columns: Sequence[str], path: Path, delimiter: str | None, header: bool | None = None
+) -> Layout:
     """Return the layout by the first line that counts.
 
-    Without a delimiter it is the first of several with which the line has the columns asked for; where
-    none has, the one that makes most cells.
+    header: whether that line names the columns; None: where not all of it is numbers. Without a delimiter it
+    is the first of several with which the line has the columns asked for; where none has, the one that makes
+    most cells.
     """
     usual = "\t" if ".tsv" in path.suffixes else ","
     tried = [delimiter] if delimiter else list(dict.fromkeys([usual, "\t", ";", ",", "|", BLANKS]))
-    layouts = [_layout(first, one) for one in tried]
-    fitting = (
-        layout
-        for layout in layouts
-        if all(base_and_index(column, layout.names)[0] in layout.names for column in columns)
-    )
+    layouts = [_layout(first, one, header) for one in tried]
+    fitting = (layout for layout in layouts if all(_has(layout, column) for column in columns))
     return next(fitting, max(layouts, key=lambda layout: len(layout.names)))
 
 
-def _layout(first: str, delimiter: str) -> Layout:
+def _has(layout: Layout, column: str) -> bool:
+    base, _ = base_and_index(column, layout.names)
+    return base in layout.names or (base.isdecimal() and 1 <= int(base[:6]) <= len(layout.names))
+
+
+def _layout(first: str, delimiter: str, header: bool | None) -> Layout:
     cells = split(first, delimiter)
     while cells[1:] and not cells[-1]:
         cells.pop()
-    if all(is_decimal(cell) for cell in cells):
+    if all(map(is_decimal, cells)) if header is None else not header:
         return Layout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
     return Layout(delimiter, tuple(cells), headed=True)

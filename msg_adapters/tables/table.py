@@ -44,6 +44,14 @@ def index_of(column: str, names: Sequence[str]) -> int:
     return list(names).index(column)
 
 
+def checked_lengths(sizes: Mapping[str, int]) -> None:
+    """Raise ValueError for columns of unequal length. sizes: by column."""
+    if len(set(sizes.values())) > 1:
+        raise ValueError(
+            f"vectors of unequal length {dict(sizes)}, expected one sample each at every stamp"
+        )
+
+
 def check_size(rows: int, columns: int) -> None:
     """Raise ValueError for more numbers than are read."""
     if rows * columns > LARGEST:

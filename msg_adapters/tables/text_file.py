@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters.tables.elements import base_and_index, number_in
-from msg_adapters.tables.layout import BLANKS, Layout, counts, layout_of
+from msg_adapters.tables.layout import BLANKS, Layout, counts, index_in, layout_of
 from msg_adapters.tables.lines import blocks_of_lines
-from msg_adapters.tables.table import Table, check_size, index_of
+from msg_adapters.tables.table import Table, check_size
 from rsea_ros.decimal_number import is_decimal
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import shown
@@ -23,15 +23,17 @@ MOST_LEFT_OUT = 0.1
 _COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 
 
-def read_text(path: Path, columns: Sequence[str], delimiter: str | None) -> Table:
+def read_text(
+    path: Path, columns: Sequence[str], delimiter: str | None, header: bool | None = None
+) -> Table:
     """Return the columns asked for. Raises ValueError with line, column, value and expectation."""
     numbered = _numbered_blocks(path)
     first = next(((number, line) for block in numbered for number, line in block), None)
     if first is None:
         raise ValueError("empty file, expected a row of column names and rows of numbers")
-    layout = layout_of(first[1], columns, path, delimiter)
+    layout = layout_of(first[1], columns, path, delimiter, header)
     places = {column: base_and_index(column, layout.names) for column in columns}
-    indices = {column: index_of(base, layout.names) for column, (base, _) in places.items()}
+    indices = {column: index_in(base, layout.names) for column, (base, _) in places.items()}
     reader = _Reader(layout, indices, {column: element for column, (_, element) in places.items()})
     for block in _numbered_blocks(path):
         reader.add([row for row in block if not (layout.headed and row == first)])

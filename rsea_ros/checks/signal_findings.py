@@ -39,7 +39,7 @@ def excitation(record: Record, rig: Rig) -> list[Finding]:
                 remedy=_EXCITE,
             )
         ]
-    low, high = _band(record)
+    low, high = band(record)
     rms, peak = float(np.std(command.y)), float(np.max(np.abs(command.y)))
     detail = f"{low:.3g} to {high:.3g} Hz, peak {peak:.3g} N m"
     natural = natural_frequency(rig)
@@ -76,7 +76,7 @@ def _rest(share: float) -> list[Finding]:
     ]
 
 
-def _band(record: Record) -> tuple[float, float]:
+def band(record: Record) -> tuple[float, float]:
     """Return the frequencies, Hz, between which the command's power lies."""
     command = record["command"]
     even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)

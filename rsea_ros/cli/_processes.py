@@ -48,6 +48,10 @@ class Processes:
         """Return where the output of a node goes, of its last start."""
         return self._log_of.get(node, self._logs / f"{node}.log")
 
+    def pid(self, node: str) -> int:
+        """Return the number of a node's process."""
+        return self._running[node].pid
+
     def start(self, node: str, parameters: Mapping[str, object]) -> None:
         """Start a node; signals of the terminal reach only this process, which stops the node itself."""
         options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]

@@ -1,37 +1,173 @@
-"""`rsea export`: a rig for other programs."""
+"""`rsea export`: a rig for other programs, with what they cannot say of it."""
 
 from __future__ import annotations
 
 import argparse
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rsea_ros.cli._output import add_force
-from rsea_ros.new_files import check_free, write_text
+from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._output import FOUND, add_force
+from rsea_ros.new_files import check_free, write_file
 
-HELP = "a rig as a model for another program: MJCF for MuJoCo"
+if TYPE_CHECKING:
+    from rsea_ros.exports.coverage import Export
+    from rsea_ros.exports.difference import Difference
+    from rsea_ros.model.rig import Rig
+
+HELP = "a rig as a model for MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and what that cannot say"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
+TARGETS = {
+    "mjcf": "MJCF for MuJoCo 4",
+    "urdf": "URDF, with a block of our own",
+    "sdf": "SDF 1.11, with a block of our own",
+    "fmu": "FMU for co-simulation, FMI 3",
+    "isaac": "actuator of Isaac Lab, a Python file",
+    "bam": "parameters of BAM (M1 to M6), JSON",
+}
+DURATION = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument(
-        "--rig",
-        "--mjcf",
-        required=True,
-        metavar="RIG",
-        help="rig or model.yaml, or the name of one in config/rigs; as MJCF, the only format so far",
-    )
-    parser.add_argument("--out", type=Path, help="file to be written (default NAME.xml)")
+    targets = parser.add_mutually_exclusive_group(required=True)
+    for name, about in TARGETS.items():
+        aliases = ["--rig"] if name == "mjcf" else []
+        about = f"rig, model.yaml or name of a rig: {about}"
+        targets.add_argument(f"--{name}", *aliases, dest=name, metavar="RIG", help=about)
+    add = parser.add_argument
+    add("--out", type=Path, help="file to be written (default the rig's name)")
     add_force(parser)
+    effect = "switch an effect on, SI units"
+    add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)
+    add("--actuator", default="", metavar="NAME", help="of --bam: BAM's name of the servo, such as mx106")
+    add("--no-play", action="store_true", help="write the file without playing it")
+    played = "what --mjcf and --fmu play and simulate: a chirp of so many s"
+    add("--duration", type=positive, default=DURATION, help=f"{played} (default %(default)s)")
+    add("--amplitude", type=positive, help="of that chirp, N m, of a joint rad (default 10 N m, 0.4 rad)")
+    limit = "exit status 1 where a channel differs by more than this many times its sensor's noise"
+    add("--limit", type=positive, metavar="TIMES", help=limit)
+    add("--json", action="store_true", help="print what is said, left out and different as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the file and print its name."""
-    from rsea_ros.design.mjcf import mjcf
+    """Export, play, write, and say what the target says."""
+    from rsea_ros.cli.simulate import parse_effect
+    from rsea_ros.model.effect_settings import check_effects
     from rsea_ros.model.rig_file import load_rig
 
-    rig = load_rig(args.rig)
-    out = args.out or Path(f"{rig.name}.xml")
-    check_free([out], force=args.force, inputs=[args.rig])
-    print(write_text(out, mjcf(rig), force=args.force))
-    return 0
+    target = next(name for name in TARGETS if getattr(args, name))
+    source = getattr(args, target)
+    rig = load_rig(source)
+    rig = rig.with_effects(*rig.effects, *(parse_effect(text) for text in args.effect))
+    check_effects(rig.effects)
+    suffix = {"mjcf": ".xml", "isaac": ".py", "bam": ".json"}.get(target, f".{target}")
+    out = args.out or Path(f"{rig.name}{suffix}")
+    check_free([out], force=args.force, inputs=[source])
+    made = _exporters(args)[target](rig)
+    found, not_played = _played(made, rig, args)
+    write_file(out, made.content, force=args.force)
+    if args.json:
+        print(json.dumps(_document(made, rig, out, found, not_played), indent=2))
+    else:
+        print("\n".join(_lines(made, rig, out, found, not_played)))
+    too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in found)
+    return FOUND if too_far else 0
+
+
+def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]]:
+    from rsea_ros.exports.bam import export_bam
+    from rsea_ros.exports.fmu import export_fmu
+    from rsea_ros.exports.isaac import export_isaac
+    from rsea_ros.exports.mjcf import export_mjcf
+    from rsea_ros.exports.urdf import export_sdf, export_urdf
+
+    def bam(rig: Rig) -> Export:
+        return export_bam(rig, args.actuator)
+
+    return {
+        "mjcf": export_mjcf, "urdf": export_urdf, "sdf": export_sdf, "fmu": export_fmu, "isaac": export_isaac,
+        "bam": bam,
+    }  # fmt: skip
+
+
+def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Difference, ...], str]:
+    """Return the differences to our simulation, and why there are none.
+
+    Raises ParameterError where --limit asks for them and they cannot be had.
+    """
+    from rsea_ros.errors import ParameterError
+    from rsea_ros.exports.difference import RATE, differences, ours
+    from rsea_ros.exports.fmu_play import play_fmu
+    from rsea_ros.exports.mujoco_play import play_mujoco
+
+    players: Mapping[str, Callable[..., Any]] = {"mjcf": play_mujoco, "fmu": play_fmu}
+    why = "--no-play" if args.no_play else ""
+    if made.target not in players:
+        why = f"{TARGETS[made.target].partition(',')[0]} does not run here"
+    if not why:
+        command = _excitation(rig, args, RATE)
+        try:
+            theirs = players[made.target](made.content, rig, command)
+            found = differences(rig, ours(rig, command, RATE), theirs)
+            why = "" if found else "the rig states no sensor's noise, expected sensors.ft.noise or another"
+        except ParameterError as error:
+            found, why = (), str(error)
+        if found:
+            return found, ""
+    if args.limit is not None:
+        raise ParameterError(f"--limit {args.limit:g}: not played: {why}")
+    return (), why
+
+
+def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
+    """Return the chirp that both play, N m or rad."""
+    from dataclasses import replace
+
+    from rsea_ros.identification.excitation import JOINT, Settings, excitation
+
+    default = JOINT if rig.loop else Settings(amplitude=10.0, noise=2.0, high=60.0)
+    size = args.amplitude or default.amplitude
+    noise = default.noise * size / default.amplitude
+    low = max(0.5, 1.0 / args.duration)
+    settings = replace(default, rate=rate, duration=args.duration, low=low, amplitude=size, noise=noise)
+    return excitation("chirp", settings)
+
+
+def _lines(
+    made: Export, rig: Rig, out: Path, found: tuple[Difference, ...], not_played: str
+) -> list[str]:
+    """Return for people what was written, said, left out and played."""
+    from rsea_ros.exports.coverage import coverage_lines
+
+    lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]
+    lines += [f"  {line}" for line in coverage_lines(made.said, made.unsaid)]
+    lines += [
+        f"played in both: {one.channel} differs by {one.times_noise:.3g} times the sensor's noise "
+        f"({one.rms:.3g} {one.unit} of {one.signal:.3g})"
+        for one in found
+    ]
+    return [*lines, f"not played: {not_played}"] if not_played else lines
+
+
+def _document(
+    made: Export, rig: Rig, out: Path, found: tuple[Difference, ...], not_played: str
+) -> dict[str, Any]:
+    return {
+        "schema": 1,
+        "rig": rig.name,
+        "target": made.target,
+        "file": str(out),
+        "says": {one.name: one.how for one in made.said},
+        "leaves_out": {one.name: one.why for one in made.unsaid},
+        "not_played": not_played or None,
+        "difference": {
+            one.channel: {
+                "times_noise": one.times_noise, "rms": one.rms, "signal": one.signal, "noise": one.noise,
+                "unit": one.unit,
+            }
+            for one in found
+        },
+    }  # fmt: skip

@@ -3,42 +3,75 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
 from msg_adapters import write_record
-from msg_adapters.tables import import_record, load_map, summary
+from msg_adapters.tables import Imported, ImportMap, import_records, load_map, summary
 from rsea_ros.cli._maps import map_path
+from rsea_ros.cli._numbers import whole_numbers
 from rsea_ros.cli._output import add_force
 from rsea_ros.cli._topics import add_topic_options, topic_map
-from rsea_ros.new_files import check_free
+from rsea_ros.errors import OutputError
+from rsea_ros.new_files import NewFiles, Place, check_free
 
-HELP = "turn a CSV, TSV or MAT file of a real machine into a bag, by a map of columns and units"
+HELP = "turn a measurement of a real machine (CSV, MAT, Parquet, NPZ, JSON) into a bag, by a map of columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "file", help="measurement: .csv, .tsv (also .gz) or .mat (up to version 7); a directory for some maps"
-    )
+        "files", nargs="+", metavar="FILE",
+        help="measurements: .csv, .tsv or other text (also .gz), .mat (up to version 7), .parquet, .npz, "
+        ".npy, .json, .jsonl; a directory for some maps",
+    )  # fmt: skip
     parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
-    parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
-    which = "which joint, from 0, of cells that hold several (name[#] in a map)"
-    parser.add_argument("--index", type=int, metavar="N", help=which)
+    out = "bag to be made: a directory, or a file .mcap or .db3; the folder of several files, joints or runs"
+    parser.add_argument("--out", required=True, help=out)
+    which = "which joints, from 0, of columns that hold several (name[#] in a map): 2, or 0,1,2, or 0-5"
+    parser.add_argument("--index", type=whole_numbers, default=(None,), metavar="N", help=which)
     add_force(parser)
     parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
     add_topic_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bag and say what is in it."""
+    """Write the bags and say what is in them."""
     path = map_path(args.map)
-    check_free([Path(args.out)], force=args.force, inputs=[args.file, path])
+    check_free([Path(args.out)], force=args.force, inputs=[*args.files, path])
     mapping = load_map(path)
-    record = import_record(args.file, mapping, args.index)
-    write_record(record, args.out, topic_map(args), args.storage, force=args.force)
-    for line in summary(record, mapping.at(args.index)):
-        print(line)
-    rate = next(iter(record.channels.values())).rate
-    print(f"{args.out}: {record.stop - record.start:.3f} s at {rate:.1f} Hz")
+    if len(args.files) == len(args.index) == 1 and mapping.runs is None:
+        (imported,) = import_records(args.files[0], mapping, args.index)
+        write_record(imported.record, args.out, topic_map(args), args.storage, force=args.force)
+        lines = list(_said(imported, args.out))
+    else:
+        lines = _write_several(args, mapping)
+    print("\n".join(lines))
     return 0
+
+
+def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
+    """Write a bag for each file, joint and run, all of them or none, and return what is in them."""
+    folder, names = Path(args.out), set[str]()
+    lines: list[str] = []
+    if folder.suffix in (".mcap", ".db3"):
+        raise OutputError(f"{folder}: is one bag, expected a folder for several")
+    with NewFiles(Place(folder, args.force)) as new:
+        for file in args.files:
+            for imported in import_records(file, mapping, args.index):
+                name = Path(file).name.partition(".")[0] + imported.name
+                if name in names:
+                    raise OutputError(f"{folder / name}: is the bag of two inputs, expected other file names")
+                names.add(name)
+                write_record(imported.record, new.staged(name), topic_map(args), args.storage)
+                lines += _said(imported, folder / name)
+    return lines
+
+
+def _said(imported: Imported, out: str | Path) -> Iterator[str]:
+    """Yield lines on what is in a bag."""
+    record = imported.record
+    yield from summary(record, imported.mapping)
+    rate = next(iter(record.channels.values())).rate
+    yield f"{out}: {record.stop - record.start:.3f} s at {rate:.1f} Hz"

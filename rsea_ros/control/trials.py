@@ -115,7 +115,7 @@ def _followed(rig: Rig, loads: Mapping[str, Rig], design: Design) -> Iterator[Tr
     )
     for name in list(loads)[1:4]:
         error, amplitude = 100.0 * tracked(rig, loads, Case(name), design), amplitude_of(loads[name])
-        yield Trial(f"5 Hz, {amplitude:.1f} N m, {name}, not told", error, "%", 5.0)
+        yield Trial(f"5 Hz, {amplitude:.1f} N m, {name}, load unknown", error, "%", 5.0)
 
 
 def _bandwidth(near: Following, far: Following) -> Iterator[Trial]:

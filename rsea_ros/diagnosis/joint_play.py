@@ -19,6 +19,6 @@ def play_not_told(selection: Selection, result: Diagnosis) -> tuple[str, ...]:
     unknowns = zip(trials[-1].problem.unknowns, trials[-1].theta, strict=True)
     gap = next(u.outer(float(value)) for u, value in unknowns if u.name == _GAP)
     return (
-        f"These data cannot tell play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the residual "
-        f"of data that took no part changes by {-100.0 * gains[-1]:+.1f} %.",
+        f"These data cannot determine the play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the "
+        f"residual of data that took no part changes by {-100.0 * gains[-1]:+.1f} %.",
     )

@@ -119,7 +119,7 @@ class Rejected:
 
 @dataclass(frozen=True)
 class Experiment:
-    """The run that would tell what these data cannot."""
+    """The run that would decide what these data cannot."""
 
     why: str
     excitation: Mapping[str, float | str]

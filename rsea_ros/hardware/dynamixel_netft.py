@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.limits import Limits, check_limits
 from rsea_ros.hardware.netft.sensor import Sensor
 from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
@@ -20,19 +19,20 @@ class DynamixelNetft:
 
     Angles count from where the drive stands when the device is opened: torque off, the spring at rest.
     absolute: they count from the motor's own zero instead, its encoder's with its homing offset.
+    motor: alone on its port, or a LineMotor.
     stiffness: of the rig's spring, N m/rad, which the limits are checked against.
     """
 
     def __init__(
         self,
-        motor: MotorSettings,
+        motor: Motor,
         sensor: SensorSettings | None,
         limits: Limits,
         stiffness: float,
         *,
         absolute: bool = False,
     ) -> None:
-        self._motor = Motor(motor)
+        self._motor = motor
         self._sensor = Sensor(sensor) if sensor is not None else None
         self._limits, self._stiffness, self._absolute = limits, stiffness, absolute
         self._epoch = 0

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 
 from rsea_ros.errors import DeviceError, ParameterError
@@ -13,6 +14,7 @@ from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
 from rsea_ros.hardware.protection import NONE
 from rsea_ros.hardware.spring import Spring
+from rsea_ros.hardware.together import cycle
 
 BUSY = "clear_fault or reboot is under way, expected it to be over"
 
@@ -57,19 +59,22 @@ class Guarded:
         self.guard.clear()
 
     def cycle(self, wanted: float, age: float | None) -> State | None:
-        """Write a torque, then read; a reading that trips a fault zeroes the torque at once.
+        """Do a cycle of this device alone, see `together.cycle`."""
+        return cycle([self], [(wanted, age)])[0]
 
-        The write comes first, so that a command takes effect as near to the start of its cycle as can be.
-        """
-        with self._turn:
-            if self.away:
-                return None
-            before = self.guard.fault
-            self.write(wanted, age)
-            state = self.read()
-            if self.guard.fault is not before:
-                self.write(0.0, age)
-            return state
+    def measures_deflection(self) -> bool:
+        """Tell whether a reading has the spring's deflection; False also where the device does not answer."""
+        try:
+            return math.isfinite(self.device.read().deflection)
+        except DeviceError:
+            return False
+
+    def taken(self, kept: ExitStack) -> bool:
+        """Take the device until `kept` ends, for a cycle of several; False where somebody else has it."""
+        if not self._turn.acquire(blocking=False):
+            return False
+        kept.callback(self._turn.release)
+        return not self.away
 
     def read(self) -> State | None:
         """Return the reading of this cycle; None when there was none."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 
@@ -65,7 +66,9 @@ class SimulatedDevice:
         values = {name: self._measured(name, self._values[i]) for i, name in enumerate(OUTPUTS)}
         stamp = self._instant(self._steps)
         wrench = None if self._rig.rigid_spring else (0.0, 0.0, 0.0, 0.0, 0.0, values["ft"])
-        return State(stamp, values["position"], values["velocity"], values["motor_torque"], stamp, wrench)
+        deflection = values["deflection"] if "deflection" in self._rig.sensors else math.nan
+        moved = values["position"], values["velocity"], values["motor_torque"]
+        return State(stamp, *moved, stamp, wrench, deflection=deflection)
 
     def write(self, torque: float) -> None:
         """Hold a torque (N m) from now on. Raises DeviceError for one that is not finite."""

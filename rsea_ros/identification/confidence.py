@@ -47,8 +47,8 @@ _GAIN_SCALE = (
     "constant where a current was measured: gains g times as large scale inertia, damping and friction by g."
 )
 _REMEDY = {
-    "spring.damping": "Excitation above the resonance, or F/T sensor and encoder together, would tell it.",
-    "housing_end.damping": "A free swing of the housing would tell it.",
+    "spring.damping": "Excitation above the resonance, or F/T sensor with encoder, would determine it.",
+    "housing_end.damping": "A free swing of the housing would determine it.",
 }
 
 

@@ -45,6 +45,7 @@ from rsea_ros.identification.unknowns import (
     unknowns_of_rig,
     vector_of,
 )
+from rsea_ros.identification.workers import cores
 from rsea_ros.model.extent import LARGEST, bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
@@ -76,7 +77,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     report("frequency responses", 0.2)
     responses = responses_of(records[0], rig)
     report("fitting", 0.4)
-    with one_blas_thread(), ThreadPoolExecutor(2) as pool:
+    with one_blas_thread(), ThreadPoolExecutor(cores()) as pool:
         solution, cases, asked = fit(cases, rig, run=in_pool(pool), start=_start(records[0], rig, responses))
         steady, misfits = Evened(tuple(records), {}), _misfits(solution, cases)
         while misfits and (more := evened(steady.records, rig, solution)).scatter:

@@ -62,6 +62,11 @@ class ParameterEstimate:
     spread: float
     told_by_data: float
 
+    @property
+    def is_told(self) -> bool:
+        """Return whether the data determine the value, rather than what the rig states."""
+        return self.told_by_data >= _TOLD
+
 
 @dataclass(frozen=True)
 class Overlay:
@@ -133,5 +138,5 @@ class Identification:
         if not self.at_noise or self.silent:
             return "misfit"
         physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
-        told = any(p.told_by_data >= _TOLD for p in physical)
+        told = any(p.is_told for p in physical)
         return "adequate" if told or not physical else "not_identifiable"

@@ -1,4 +1,4 @@
-"""Pools: fits side by side, and the derivatives within each, on two cores.
+"""Pools: fits side by side, and the derivatives within each, on two cores unless fewer are asked for.
 
 Two pools, for a fit waits for its derivatives: a single pool full of fits would wait for itself.
 """
@@ -8,12 +8,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 
 from rsea_ros.identification.solver import Map, in_pool
 from rsea_ros.identification.threads import one_blas_thread
 
-_CORES = 2
+_CORES: ContextVar[int] = ContextVar("cores", default=2)
+
+
+def cores() -> int:
+    """Return how many cores a fit may use."""
+    return _CORES.get()
+
+
+@contextmanager
+def on_cores(count: int) -> Iterator[None]:
+    """Let fits use so many cores within a with statement: one, where a program runs several side by side."""
+    token = _CORES.set(count)
+    try:
+        yield
+    finally:
+        _CORES.reset(token)
 
 
 @dataclass(frozen=True)
@@ -27,5 +43,5 @@ class Pools:
 @contextmanager
 def worker_pools() -> Iterator[Pools]:
     """Hold both pools within a with statement; linear algebra keeps to one thread meanwhile."""
-    with one_blas_thread(), ThreadPoolExecutor(_CORES) as fits, ThreadPoolExecutor(_CORES) as derivatives:
+    with one_blas_thread(), ThreadPoolExecutor(cores()) as fits, ThreadPoolExecutor(cores()) as derivatives:
         yield Pools(fits, in_pool(derivatives))

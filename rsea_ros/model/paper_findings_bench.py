@@ -33,7 +33,7 @@ def identification() -> Iterator[Finding]:
         "silent",
         "Eq. (10)",
         "The paper says that it averages the two. That hides a torque constant that is off, or friction; an "
-        "amplitude series or the drive current would tell.",
+        "amplitude series or the drive current would decide.",
     )
     yield Finding(
         "silent",
@@ -92,7 +92,7 @@ def moving_output() -> Iterator[Finding]:
         "loads moving, or the motor pushing against the ground, as in Fig. 3. The first gives nearly the "
         "same "
         "torque as the unlumped model below 2 Hz, the second up to "
-        f"{gap:.1f} dB more, at {gap_hz:.2f} Hz. What tells is the resonance: {resonance_hz(rig):.1f} Hz "
+        f"{gap:.1f} dB more, at {gap_hz:.2f} Hz. What decides is the resonance: {resonance_hz(rig):.1f} Hz "
         f"unlumped, {resonance_hz(moving):.1f} Hz lumped with moving loads.",
     )
     yield Finding(

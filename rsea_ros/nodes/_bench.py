@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +11,13 @@ from rclpy.node import Node
 from rclpy.serialization import serialize_message
 
 from msg_adapters.raw import RawWriter
-from msg_adapters.ros import JointState, WrenchStamped, joint_state_message, wrench_message
+from msg_adapters.ros import (
+    JointState,
+    WrenchStamped,
+    deflection_message,
+    joint_state_message,
+    wrench_message,
+)
 from msg_adapters.topics import JOINT_STATE, TYPES
 from rsea_ros.hardware.device import State
 from rsea_ros.nodes._anchor import Anchor
@@ -27,11 +34,11 @@ NAMES = (
     Parameter("frame", "", "frame_id of joint_states"),
     Parameter("ft_frame", "ft_sensor", "frame_id of ft"),
 )
+"""Parameters of every bench."""
 SPRING_FRAME = Parameter(
-    "spring_frame", "spring_deflection", "frame_id of ft where it is stiffness times deflection"
+    "spring_frame", "spring_deflection", "frame_id of deflection, and of ft where it is stiffness times that"
 )
 """Of a bench whose device may measure the spring by a second encoder."""
-"""Parameters of every bench."""
 MOST = 100
 """Commands taken in a cycle: 28 kHz of them at 280 Hz; each costs 10 us."""
 
@@ -43,20 +50,26 @@ class Bench:
     """
 
     def __init__(
-        self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False
-    ) -> None:
+        self, node: Node, names: Mapping[str, Any], *, strict: bool = False, every_record: bool = False,
+        part: str = "", deflects: bool = False,
+    ) -> None:  # fmt: skip
         """names: values of NAMES, and of SPRING_FRAME where it may be.
 
         strict: see CommandQueue; then one publisher is obeyed at a time.
 
         every_record: ft gets all that came since the last reading, not one.
+
+        part: name of a bench beside others of the same node; its topics are under it.
+
+        deflects: whether readings have the spring's deflection, which is a topic then.
         """
+        within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
         self.commands, self._obeyed = CommandQueue(strict=strict), Obeyed()
         self._told: Mapping[str, int] = {}
         self._polled = 0
-        self._states = _publisher(node, JointState, "joint_states")
-        self._ft = _publisher(node, WrenchStamped, "ft")
+        self._states = _publisher(node, JointState, f"{within}joint_states")
+        self._ft = _publisher(node, WrenchStamped, f"{within}ft")
         joint, frame, ft_frame = (names[p.name] for p in NAMES)
         self._state_writer = RawWriter(
             serialize_message(joint_state_message(0, 0.0, 0.0, 0.0, joint, frame)), TYPES["joint_states"],
@@ -69,8 +82,14 @@ class Bench:
             )
             for inferred, at in frames.items()
         }
+        self._deflection_writer = RawWriter(
+            serialize_message(deflection_message(0, 0.0, joint, frames[True])),
+            TYPES["deflection"], "position",
+        )  # fmt: skip
+        self._deflections = _publisher(node, JointState, f"{within}deflection") if deflects else None
         self._wanted = Mailbox(
-            node, JOINT_STATE, "torque_command", COMMAND, self.commands.refuse, ("effort", 0), joint=joint,
+            node, JOINT_STATE, f"{within}torque_command", COMMAND, self.commands.refuse, ("effort", 0),
+            joint=joint,
             admit=self._admit if strict else None,
         )  # fmt: skip
 
@@ -95,6 +114,9 @@ class Bench:
                 self._ft.publish(writer.write(stamp + shift, wrench))
         elif state.wrench is not None:
             self._ft.publish(writer.write(state.ft_stamp + shift, state.wrench))
+        if self._deflections is not None and math.isfinite(state.deflection):
+            raw = self._deflection_writer.write(state.stamp + shift, (state.deflection,))
+            self._deflections.publish(raw)
 
     def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
         """Return the health of a bench that runs in a cycle; warnings are of what is new since the last.
@@ -126,7 +148,7 @@ class Bench:
 
     def close(self) -> None:
         """Take the topics away."""
-        for publisher in (self._states, self._ft):
+        for publisher in filter(None, (self._states, self._ft, self._deflections)):
             self._node.destroy_publisher(publisher)
         self._node.destroy_subscription(self._wanted.subscription)
 

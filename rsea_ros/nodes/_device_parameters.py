@@ -7,6 +7,7 @@ from rsea_ros.nodes._parameters import AXIS, Parameter
 MOTOR = (
     Parameter("port", "/dev/ttyUSB0", "serial port of the motor"),
     Parameter("baud", 1_000_000, "of the serial port, as the motor is set", "bit/s", 9600, 10_500_000),
+    Parameter("fast_sync", False, "whether several motors on a port answer in one packet"),
     Parameter("id", 1, "of the motor on its bus", "", 0, 252),
     Parameter(
         "model", 0, "number that the motor must have (docs/hardware.md); 0: any that is known", "", 0, 65535

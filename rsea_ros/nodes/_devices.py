@@ -9,6 +9,9 @@ from typing import Any
 from msg_adapters.topics import sign_and_index
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.device import Device
+from rsea_ros.hardware.dynamixel.line import Line
+from rsea_ros.hardware.dynamixel.line_motor import LineMotor
+from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
 from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.dynamixel.settings import usual_latency
@@ -22,6 +25,7 @@ from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.rig_file import load_rig
 
 Values = Mapping[str, Any]
+
 
 def limits_of(values: Values) -> Limits:
     """Return the limits that the parameters set. Raises ParameterError for one that cannot be applied.
@@ -108,7 +112,8 @@ def _simulated(values: Values) -> Device:
     return SimulatedDevice(load_rig(values["rig"]), values["rate"], seed=values["seed"])
 
 
-def _dynamixel_netft(values: Values) -> Device:
+def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
+    """Return motor and sensor, not open. line: of a motor that shares its port. Raises ParameterError."""
     rig = load_rig(values["rig"])
     if values["baud"] not in BAUD_RATES:
         known = ", ".join(map(str, BAUD_RATES))
@@ -119,14 +124,14 @@ def _dynamixel_netft(values: Values) -> Device:
         identity=values["id"],
         model=values["model"],
         torque_constant=values["torque_constant"],
-        latency=values["latency"] or usual_latency(values["rate"]),
+        latency=latency_of(values),
         watchdog=values["watchdog"],
         supervisor=values["supervisor"],
     )
     sensor = SensorSettings(*(values[f"ft_{name}"] for name in ("host", "port", "page_port", "timeout")))
     stiffness = math.inf if rig.rigid_spring else rig["spring.stiffness"]
     return DynamixelNetft(
-        motor,
+        Motor(motor) if line is None else LineMotor(motor, line),
         sensor if values["ft_host"] else None,
         limits_of(values),
         stiffness,
@@ -134,7 +139,13 @@ def _dynamixel_netft(values: Values) -> Device:
     )
 
 
+def latency_of(values: Values) -> float:
+    """Return what a reply may be late, s."""
+    return float(values["latency"] or usual_latency(values["rate"]))
+
+
+DYNAMIXEL = "dynamixel_netft"
 DEVICES: Mapping[str, Callable[[Values], Device]] = {
     "simulated": _simulated,
-    "dynamixel_netft": _dynamixel_netft,
+    DYNAMIXEL: dynamixel_netft,
 }

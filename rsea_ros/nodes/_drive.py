@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from typing import Protocol
 
 from rsea_ros.hardware.device import State
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Fault
+from rsea_ros.hardware.together import Shared, cycle
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
 
@@ -26,36 +27,38 @@ class Source(Protocol):
 
 
 class Drive:
-    """A guarded device, driven by what a source has. rate: Hz. anchor: the clock of stamps and ages."""
+    """A guarded device, driven by what a source has. rate: Hz. anchor: the clock of stamps and ages.
+
+    lock: held while a cycle takes a command and the device gets it.
+    """
 
     def __init__(self, guarded: Guarded, source: Source, anchor: Anchor, rate: float) -> None:
-        self._guarded, self._source, self.anchor = guarded, source, anchor
+        self.guarded, self._source, self.anchor = guarded, source, anchor
         self._period = round(SECOND / rate)
-        self._lock = threading.Lock()
+        self.lock = threading.Lock()
         self._deaf = 0
 
-    def step(self, stamp: int) -> State | None:
-        """Write the command that is in force from this cycle on (its stamp rounded), read; None: no reading.
+    def wanted(self, stamp: int, by: int) -> tuple[float, float | None]:
+        """Return the torque (N m) that is in force from this cycle on (its stamp rounded), and its age (s).
 
         stamp: the cycle's, ns since the epoch. One that was held up takes what is due by now.
+        by: ns by which the clock was set since the last cycle.
         """
-        with self._lock:
-            stamp += self._see_to_the_clock()
-            self._source.poll(self.anchor)
-            commands, now = self._source.commands, self.anchor.now()
-            commands.take(max(stamp, now - self._period) + self._period // 2)
-            age = None if self._deaf else commands.age(now)
-            return self._guarded.cycle(commands.torque, age)
+        self._see_to_the_clock(by)
+        self._source.poll(self.anchor)
+        commands, now = self._source.commands, self.anchor.now()
+        commands.take(max(stamp, now - self._period) + self._period // 2)
+        return commands.torque, None if self._deaf else commands.age(now)
 
     @contextmanager
     def deaf(self) -> Iterator[None]:
         """Let no command through while something is done to the device, also none that came meanwhile."""
-        with self._lock:
+        with self.lock:
             self._deaf += 1
         try:
             yield
         finally:
-            with self._lock:
+            with self.lock:
                 self._source.poll(self.anchor)
                 self._source.commands.clear(self.anchor.now())
                 self._deaf -= 1
@@ -63,17 +66,28 @@ class Drive:
     def stop(self) -> None:
         """End the torque with the next cycle, until the fault is cleared; commands so far are forgotten."""
         with self.deaf():
-            self._guarded.guard.trip(Fault(STOPPED, detail="the service stop was called"))
+            self.guarded.guard.trip(Fault(STOPPED, detail="the service stop was called"))
 
-    def _see_to_the_clock(self) -> int:
-        """Follow the system clock; return by how much it was set, ns.
+    def _see_to_the_clock(self, by: int) -> None:
+        """Move the commands with a system clock that was set.
 
         Where that was under torque nobody knows which commands are of now: it is a fault.
         """
-        by = self.anchor.follow()
         if by:
             self._source.commands.shift(by)
-            if self._guarded.guard.torque != 0.0:
+            if self.guarded.guard.torque != 0.0:
                 detail = f"the system clock was set by {by / SECOND:+.3f} s"
-                self._guarded.guard.trip(Fault(CLOCK_STEP, detail=detail))
-        return by
+                self.guarded.guard.trip(Fault(CLOCK_STEP, detail=detail))
+
+
+def step(drives: Sequence[Drive], stamp: int, buses: Sequence[Shared] = ()) -> list[State | None]:
+    """Do a cycle of joints that share an anchor; return the reading of each, None where it has none.
+
+    stamp: the cycle's, ns since the epoch. buses: through which several joints are written and read.
+    """
+    with ExitStack() as kept:
+        for drive in drives:
+            kept.enter_context(drive.lock)
+        by = drives[0].anchor.follow()
+        wanted = [drive.wanted(stamp + by, by) for drive in drives]
+        return cycle([drive.guarded for drive in drives], wanted, buses)

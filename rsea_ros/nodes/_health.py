@@ -28,16 +28,19 @@ class Report(NamedTuple):
 
 
 class Health:
-    """Publish what `assess` returns. hardware: what it is about."""
+    """Publish what `assess` returns. hardware: what it is about. part: of a node that has several."""
 
-    def __init__(self, node: Node, assess: Callable[[], Report], hardware: str = "") -> None:
+    def __init__(
+        self, node: Node, assess: Callable[[], Report], hardware: str = "", part: str = ""
+    ) -> None:
         self._node, self._assess, self.hardware = node, assess, hardware
+        self._part = f"/{part}" if part else ""
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", COMMAND)
         node.create_timer(1.0, self.publish, clock=STEADY)
 
     def publish(self) -> None:
         """Publish now. An assessment that fails is an error of its own, and ends no node."""
-        name = self._node.get_fully_qualified_name()
+        name = f"{self._node.get_fully_qualified_name()}{self._part}"
         try:
             report = self._assess()
         except Exception as error:

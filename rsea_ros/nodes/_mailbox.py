@@ -39,14 +39,17 @@ class Mailbox:
 
     def __init__(
         self, node: Node, msgtype: str, topic: str, qos: QoSProfile, refuse: Callable[[], None],
-        *fields: tuple[str, int], joint: str = "", admit: Callable[[object], bool] | None = None,
+        *fields: tuple[str, int], joint: str = "", most: int = 1,
+        admit: Callable[[object], bool] | None = None, keep: Callable[[int, bytes], None] | None = None,
     ) -> None:  # fmt: skip
         """fields: name and index of each number; one that a message does not have is nan.
 
-        joint: name that a message with names must have; empty: any.
+        joint: name that a message with names must have; empty: any. most: names that it may have.
+        keep: gets arrival (ns) and bytes of all.
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
-        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields, joint)
+        self._keep = keep
+        self._kind, self._reader = message_type(msgtype), RawReader(msgtype, fields, joint, most)
         self.subscription: Any = node.create_subscription(
             self._kind, topic, lambda message: None, qos, callback_group=Polled(), raw=True,
             qos_overriding_options=OVERRIDES,
@@ -65,6 +68,8 @@ class Mailbox:
                     return
                 if self._admit is not None and not self._admit(message[1]["publisher_gid"]["data"]):
                     continue
+                if self._keep is not None:
+                    self._keep(message[1]["received_timestamp"], message[0])
                 try:
                     stamp, numbers = self._reader.read(message[0])
                 except ParameterError as error:

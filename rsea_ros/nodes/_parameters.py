@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from msg_adapters.ros import parameter_descriptor
 from msg_adapters.topics import AXES
 from rsea_ros.errors import ParameterError
 
-Value = bool | int | float | str
+Value = bool | int | float | str | list[str]
 
 _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
@@ -22,7 +22,8 @@ _ROS_OWN = ("use_sim_time", "start_type_description_service")
 class Parameter:
     """One parameter. Its type is the default's; a whole number does for a float.
 
-    low, high: inclusive range of a number. choices: what a text may be.
+    low, high: inclusive range of a number. choices: what a text may be. whole: of the node, where the others
+    may be given for each of several joints.
     """
 
     name: str
@@ -32,14 +33,14 @@ class Parameter:
     low: float | None = None
     high: float | None = None
     choices: Sequence[str] = ()
+    whole: bool = False
 
     def expected(self) -> str:
         """Return what a value must be, in words."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
-        kind = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}[
-            type(self.default)
-        ]
+        kind = {bool: "true or false", int: "a whole number", float: "a number", str: "a text",
+                list: "a list of texts"}[type(self.default)]  # fmt: skip
         bounds = "" if self.low is None else f" from {self.low:g} to {self.high:g}"
         return f"{kind}{bounds}{f' {self.unit}' if self.unit else ''}"
 
@@ -47,12 +48,16 @@ class Parameter:
         """Return a value that fits, in the type of the default. Raises ParameterError for any other."""
         if isinstance(self.default, float) and type(value) is int:
             value = float(value)
+        if isinstance(self.default, list):
+            value = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
         if type(value) is not type(self.default) or not self._fits(value):
             raise ParameterError(f"parameter {self.name} = {value!r}, expected {self.expected()}")
         result: Value = value
         return result
 
     def _fits(self, value: Value) -> bool:
+        if isinstance(value, list):
+            return all(isinstance(each, str) for each in value)
         if isinstance(value, str):
             return not self.choices or value in self.choices
         return math.isfinite(value) and (
@@ -64,17 +69,24 @@ AXIS = Parameter(
     "axis", "torque.z", "actuator axis of the wrench on ft", choices=(*AXES, *(f"-{a}" for a in AXES))
 )
 """Of every node that listens to ft."""
-JOINT = Parameter("joint", "joint", "name of the joint in commands and states; another one is refused")
+JOINT = Parameter(
+    "joint", "joint", "name of the joint in commands and states; another one is refused", whole=True
+)
 """Of every node that commands or measures it."""
 
 
-def declare(node: Node, table: Sequence[Parameter]) -> dict[str, Any]:
-    """Declare a table on a node and return the values.
+def declare(
+    node: Node,
+    table: Sequence[Parameter],
+    more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
+) -> dict[str, Any]:
+    """Declare a table on a node and return the values. more: parameters besides, by what was given.
 
     The node was made with `automatically_declare_parameters_from_overrides`, so it has what was given.
     Raises ParameterError for a value that does not fit, and for a name that the table does not have.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+    table = [*table, *more(given)]
     _refuse_unknown(given, table)
     values = {p.name: p.checked(given.get(p.name, p.default)) for p in table}
     for parameter in table:
@@ -90,7 +102,8 @@ def _refuse_unknown(given: Mapping[str, Any], table: Sequence[Parameter]) -> Non
     names = [p.name for p in table]
     for name in given:
         if name not in names and name not in _ROS_OWN and not name.startswith("qos_overrides."):
-            raise ParameterError(f"parameter {name}: no such parameter, expected one of {', '.join(names)}")
+            known = ", ".join(each for each in names if "." not in each)
+            raise ParameterError(f"parameter {name}: no such parameter, expected one of {known}")
 
 
 def _descriptor(parameter: Parameter) -> Any:

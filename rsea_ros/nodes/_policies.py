@@ -23,11 +23,14 @@ from rsea_ros.nodes._parameters import declare
 from rsea_ros.nodes._run import NAMESPACE
 from rsea_ros.nodes.record import TOPICS
 
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
-    "driver": {"autostart": True},
+    "driver": {"autostart": True, "rig": "sea_two_encoders"},
     "record": {"out": "bag"},
     "replay": {"bag": "every topic"},
+    "watch": {"port": 0},
 }
 """What a node needs so that it has all its topics."""
 OPERATOR = "operator"

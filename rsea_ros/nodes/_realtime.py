@@ -21,7 +21,7 @@ SWITCH_INTERVAL = 1e-5
 """s after which a thread of Python must let another one in."""
 REALTIME = Parameter(
     "realtime_priority", 0, "of the thread that keeps time, SCHED_FIFO; 0: as any process", "", 0,
-    os.sched_get_priority_max(os.SCHED_FIFO),
+    os.sched_get_priority_max(os.SCHED_FIFO), whole=True,
 )  # fmt: skip
 """Of every node that has to answer in time."""
 

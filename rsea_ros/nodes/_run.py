@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
 from typing import Any, Protocol
 
@@ -20,6 +20,7 @@ from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import STOPPING, Stopped
 from rsea_ros.nodes._idle import anything_to_do
 from rsea_ros.nodes._parameters import Parameter, declare, usage
+from rsea_ros.nodes._sockets import publish_by_sockets
 from rsea_ros.wording import printable
 
 NAMESPACE = "rsea"
@@ -50,10 +51,13 @@ def run_node(
     *,
     kind: type[Node] = Node,
     endless: bool = True,
+    more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
+    waits_for_nobody: bool = False,
 ) -> int:
     """Run one node in this process and return the exit status.
 
     endless: to be stopped is the regular end; else it is an interruption (status 128 and the signal).
+    more: parameters besides those of the table, by what was given. waits_for_nobody: see _sockets.py.
     Whatever the user can put right is one line in the log and status 2.
     """
     arguments = remove_ros_args(sys.argv)[1:]
@@ -62,11 +66,11 @@ def run_node(
         return SUCCESS
     stop = _Stop()
     try:
-        _initialise(arguments)
+        _initialise(arguments, waits_for_nobody=waits_for_nobody)
         if effects := os.environ.get("RSEA_EFFECTS"):
             get_logger(name).warning(f"RSEA_EFFECTS={printable(effects)}: code from there runs in this node")
         node = _make(kind, name)
-        done = _work(node, make(node, declare(node, table)), stop)
+        done = _work(node, make(node, declare(node, table, more)), stop)
         return SUCCESS if done or endless else stop.status
     except Stopped as stopped:
         return stopped.status
@@ -103,11 +107,13 @@ def _raise(number: int, frame: FrameType | None) -> None:
     raise Stopped(number)
 
 
-def _initialise(arguments: Sequence[str]) -> None:
+def _initialise(arguments: Sequence[str], *, waits_for_nobody: bool = False) -> None:
     """Start ROS. Raises ParameterError for arguments that it cannot read."""
     if arguments:
         raise ParameterError(f"argument {arguments[0]!r}, expected --ros-args -p NAME:=VALUE (see --help)")
     os.environ.setdefault(*LOCAL)
+    if waits_for_nobody:
+        publish_by_sockets()
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

@@ -24,6 +24,7 @@ TOPICS = {
     "torque_command": JOINT_STATE,
     "joint_states": JOINT_STATE,
     "ft": WRENCH,
+    "deflection": JOINT_STATE,
     "torque_estimate": JOINT_STATE,
     "desired_torque": JOINT_STATE,
     "desired_position": JOINT_STATE,

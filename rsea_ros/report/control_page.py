@@ -74,10 +74,10 @@ def _following(study: Study) -> Figure:
         name = "open loop, locked" if rig is study.rig else "open loop, free"
         curves.append(Response(name, MEASURED, hz, opened, 1.2, dash))
     caption = (
-        "Distal over desired torque, sine by sine, in simulation; no load is told to the controller. Slow "
-        "torques are predicted along a parabola; fast ones go through a low pass and come two samples late. "
-        "Hardest of the set: stiffer spring, less drag, one sample more, 2 ms of lag, a mode of 33 Hz at the "
-        "sensor."
+        "Distal over desired torque, sine by sine, in simulation; the controller does not know the load. "
+        "Slow torques are predicted along a parabola; fast ones go through a low pass and come two "
+        "samples late. Hardest of the set: stiffer spring, less drag, one sample more, 2 ms of lag, a "
+        "mode of 33 Hz at the sensor."
     )
     title = "The torque follows alike with the actuator clamped and free"
     return response_figure(

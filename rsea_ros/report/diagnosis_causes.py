@@ -58,7 +58,7 @@ def _rivals(cause: Cause) -> str:
     if not cause.confusable_with:
         return ""
     rivals = listed([say.effect(n) for n in cause.confusable_with])
-    return paragraph(f"These data do not tell it from {rivals}.")
+    return paragraph(f"These data do not distinguish it from {rivals}.")
 
 
 def tried_section(diagnosis: Diagnosis) -> str:

@@ -77,7 +77,7 @@ def _kicker(d: Diagnosis) -> str:
 def _untold(d: Diagnosis) -> str:
     told = [*say.confusions(d), *d.statements]
     body = bullets(told) if told else paragraph("Nothing that was asked for.")
-    return section("What these data cannot tell", body)
+    return section("What these data cannot determine", body)
 
 
 def _faults(d: Diagnosis) -> str:

@@ -12,7 +12,7 @@ STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
 _REASON = {
     "confirmed": "it is surely part of what the simulation lacks",
     "leading": "it surely helps on held-out data, and more is missing",
-    "one_of": "these data do not tell which",
+    "one_of": "these data do not say which",
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,11 +32,6 @@ class Figure:
 def numbers(values: FloatArray) -> list[float | None]:
     """Return values for JSON: five significant digits, None where not finite."""
     return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
-
-
-def packed(values: FloatArray) -> str:
-    """Return values as base64 of little-endian 32-bit floats, a third of their length in JSON."""
-    return base64.b64encode(np.asarray(values).astype("<f4").tobytes()).decode("ascii")
 
 
 def layout(**parts: Any) -> Json:

@@ -94,8 +94,8 @@ def _parameter_finding(identification: Identification) -> str:
     physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
     settled = [p for p in physical if told(p) == "yes"]
     if len(settled) == len(physical):
-        return f"The data tell all {len(physical)} parameters"
-    return f"The data tell {len(settled)} of {len(physical)} parameters, the others not or only in part"
+        return f"The data determine all {len(physical)} parameters"
+    return f"The data determine {len(settled)} of {len(physical)} parameters, the others not or only in part"
 
 
 def _shown(identification: Identification) -> list[Overlay]:
@@ -126,7 +126,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 
 
 def _untold(identification: Identification) -> str:
-    title = "What these data cannot tell"
+    title = "What these data cannot determine"
     said = (*doubt_sentences(identification), *identification.statements)
     body = bullets(said) if said else paragraph("Nothing that was asked for.")
     return section(title, body)

@@ -22,7 +22,7 @@ def verdict_sentence(identification: Identification) -> str:
         silent = words.sentence(listed([words.channel(n) for n in identification.silent]))
         return f"{silent} measures nothing; the model fits the rest: {size}"
     if identification.verdict == "not_identifiable":
-        return f"The model fits: {size}; but these data tell none of its values"
+        return f"The model fits: {size}; but these data determine none of its values"
     return f"The model fits: {size}"
 
 

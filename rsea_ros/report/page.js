@@ -4,9 +4,18 @@
 const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false };
 const MOST_POINTS = 3000;
 
-function unpacked(text) {
+async function gunzipped(text) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  return new Float32Array(bytes.buffer);
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
+}
+
+/* What rsea_ros/report/packing.py has packed: low bytes, then high bytes, of steps about a line. */
+async function unpacked({ first, slope, step, data }) {
+  const planes = new Uint8Array(await (await gunzipped(data)).arrayBuffer()), n = planes.length / 2;
+  return Float64Array.from({ length: n }, (_, k) => {
+    const whole = planes[k] + 256 * planes[n + k];
+    return whole === 65535 ? NaN : first + slope * k + step * whole;
+  });
 }
 
 /* Least and largest value of each block, in the order in which they come. */
@@ -34,17 +43,18 @@ function below(t, value) {
   return low;
 }
 
-function traces(extra) {
-  const t = unpacked(extra.t);
-  const all = extra.series.map((s) => ({ name: s.name, colour: s.colour, y: unpacked(s.y), axis: "y" }));
-  const residuals = all.slice(1).map((s) => ({
-    name: "residual, " + s.name, colour: s.colour, axis: "y2", y: all[0].y.map((v, i) => v - s.y[i]),
-  }));
-  return { t, all: all.concat(residuals) };
+async function traces({ t, measured, residuals }) {
+  const y = await unpacked(measured.y);
+  const off = await Promise.all(residuals.map((r) => unpacked(r.y)));
+  return { t: await unpacked(t), all: [
+    { name: "measured", colour: measured.colour, y, axis: "y" },
+    ...residuals.map((r, i) => ({ name: r.name, colour: r.colour, axis: "y", y: y.map((v, k) => v - off[i][k]) })),
+    ...residuals.map((r, i) => ({ name: "residual, " + r.name, colour: r.colour, axis: "y2", y: off[i] })),
+  ] };
 }
 
-function overlay(node, figure) {
-  const { t, all } = traces(figure.extra);
+async function overlay(node, figure) {
+  const { t, all } = figure.traces = await traces(figure.extra);
   const drawn = ([from, to]) => {
     const a = Math.max(0, below(t, from) - 1), b = Math.min(t.length, below(t, to) + 1);
     return all.map((s) => coarse(t, s.y, a, b));
@@ -83,7 +93,7 @@ function button(text, about, act) {
 /* All samples of an overlay, the drawn points of any other figure: a column pair for each curve. */
 function csv(node, figure) {
   const curves = figure.kind === "overlay"
-    ? (({ t, all }) => all.map((s) => ({ name: s.name, x: t, y: s.y })))(traces(figure.extra))
+    ? figure.traces.all.map((s) => ({ name: s.name, x: figure.traces.t, y: s.y }))
     : node.data.filter((d) => d.x && d.y && d.name);
   const quoted = (s) => '"' + String(s).replace(/<[^>]*>/g, "").replace(/"/g, '""') + '"';
   const head = curves.flatMap((c) => [quoted(c.name + ", x"), quoted(c.name)]).join(",");
@@ -139,10 +149,8 @@ function labelCells() {
 
 /* plotly.js lies in the page compressed: a third of its size. */
 async function unpackPlotly() {
-  const packed = Uint8Array.from(atob(document.getElementById("plotly").textContent), (c) => c.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const script = document.createElement("script");
-  script.textContent = await new Response(stream).text();
+  script.textContent = await (await gunzipped(document.getElementById("plotly").textContent)).text();
   document.head.append(script);
 }
 

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import re
 from collections.abc import Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from html import escape, unescape
-from importlib.util import find_spec
 from pathlib import Path
 
-from rsea_ros.errors import RseaError
+from rsea_ros.report.bundle import plotly_for
 from rsea_ros.report.figure import Figure
 from rsea_ros.report.identification_json import strict
 
 _HERE = Path(__file__).parent
 
-_LEVEL = 5
-"""Of gzip: 9 takes twice the time of each report for one percent of its size."""
 Block = Figure | str
 """A figure, or finished HTML."""
 
@@ -28,6 +22,8 @@ Block = Figure | str
 def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
     """Return the document. title: the verdict in a sentence. kicker: what it is about, above the title."""
     body, contents = _numbered("\n".join(_block(block, i) for i, block in enumerate(blocks)))
+    figures = [block for block in blocks if isinstance(block, Figure)]
+    plotly = plotly_for(figures) if figures else ""
     foot = "".join(f"<p>{escape(line)}</p>" for line in footer)
     return f"""<!doctype html>
 <html lang="en">
@@ -45,7 +41,7 @@ def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]
 {body}
 <footer>{foot}</footer>
 </main>
-<script type="text/plain" id="plotly">{_plotly()}</script>
+<script type="text/plain" id="plotly">{plotly}</script>
 <script>{_asset("page.js")}</script>
 </body>
 </html>
@@ -123,13 +119,3 @@ def _block(block: Block, index: int) -> str:
 
 def _asset(name: str) -> str:
     return (_HERE / name).read_text(encoding="utf-8")
-
-
-@lru_cache(maxsize=1)
-def _plotly() -> str:
-    """Return plotly.js as the plotly package carries it, compressed; page.js unpacks it in the browser."""
-    spec = find_spec("plotly")
-    if spec is None or not spec.submodule_search_locations:
-        raise RseaError("report: package plotly is missing, expected it installed for its plotly.min.js")
-    script = Path(spec.submodule_search_locations[0]) / "package_data" / "plotly.min.js"
-    return base64.b64encode(gzip.compress(script.read_bytes(), _LEVEL, mtime=0)).decode("ascii")

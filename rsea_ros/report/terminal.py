@@ -21,7 +21,7 @@ def terminal_table(identification: Identification, truth: Mapping[str, float] | 
     if truth is not None:
         table.add_column("true", justify="right")
         table.add_column("in interval")
-    table.add_column("told by data")
+    table.add_column("determined by data")
     for p in identification.parameters:
         if not p.name.startswith(CLOCKS):
             table.add_row(*_cells(p, truth))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import resource
 import signal
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +30,17 @@ RIG = (ROOT / "config/rigs/paper_high_impedance.yaml").read_text(encoding="utf-8
 NOBODY = 65534
 
 
-def rsea(*arguments: str | Path, before: Callable[[], None] | None = None, timeout: float = 60.0):
-    command = [sys.executable, "-m", "rsea_ros", *map(str, arguments)]
-    return subprocess.run(
-        command, cwd=ROOT, capture_output=True, text=True, timeout=timeout, preexec_fn=before, check=False
-    )
+def rsea(*arguments: str | Path, before: Callable[[], None] | None = None):
+    """Run a verb: here, or in a process of its own where something is to be done to that first."""
+    command = [str(argument) for argument in arguments]
+    if before is not None:
+        return subprocess.run(
+            [sys.executable, "-m", "rsea_ros", *command],
+            cwd=ROOT, capture_output=True, text=True, timeout=60.0, preexec_fn=before, check=False,
+        )  # fmt: skip
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        status = main(command)
+    return subprocess.CompletedProcess(command, status, out.getvalue(), err.getvalue())
 
 
 def refused(done: subprocess.CompletedProcess[str], *words: str | Path) -> None:

@@ -5,10 +5,12 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.peer import motor
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,3 +58,13 @@ def test_a_file_in_the_place_of_the_port_stays(tmp_path):
     assert (process.returncode, errors.count("\n")) == (2, 1)
     assert "thesis.tex: exists already, expected a new name" in errors
     assert (tmp_path / "thesis.tex").read_text() == "precious"
+
+
+def test_what_it_keeps_for_requests_is_bounded(monkeypatch):
+    """It grew by 3.7 MB a minute."""
+    monkeypatch.setattr(motor, "KEPT", 50)
+    made = motor.Motor(54024, SimpleNamespace(write=lambda torque: None))
+    goal = made.model.registers["goal"]
+    for k in range(200):
+        made.write(k, goal.address, (k % 100).to_bytes(goal.size, "little"))
+    assert 0 < len(made.history) <= 50

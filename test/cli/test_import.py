@@ -119,7 +119,7 @@ def test_what_is_missing_is_on_the_terminal_and_in_the_bag(inputs, capsys):
     assert told in read_record(out).notes
 
 
-@pytest.mark.parametrize("name", ["bag", "bag.mcap"])
+@pytest.mark.parametrize("name", ["bag", "bag.mcap", "bag.db3"])
 def test_what_is_missing_is_a_fault_of_the_bag(name, inputs, tmp_path):
     """A single file kept no count of it."""
     file, mapping, _ = inputs

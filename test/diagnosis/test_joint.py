@@ -37,7 +37,7 @@ def test_friction_and_a_delay_of_the_targets():
     assert sizes["coulomb_friction"] == pytest.approx(0.2, rel=0.03)
     assert sizes["command_delay"] == pytest.approx(0.015, abs=3e-4)
     assert found.verdict == "explained"
-    assert any("cannot tell play in the gear" in s for s in found.statements)
+    assert any("cannot determine the play in the gear" in s for s in found.statements)
 
 
 def test_a_joint_that_is_as_its_rig_says_but_for_its_values():

@@ -11,28 +11,26 @@ from independent.severities import drawn_parameters
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
 
-DURATION = 16.0
-
 
 @pytest.mark.parametrize(
-    ("pair", "severity", "excitation", "seed"),
+    ("pair", "severity", "excitation", "seed", "duration", "gave_way"),
     [
         # the ripple is in what the lag does not explain
-        (("current_loop_lag", "torque_ripple"), "medium", "multisine", 2),
+        (("current_loop_lag", "torque_ripple"), "medium", "multisine", 2, 16.0, ()),
         # without the base a wrong gain of the sensor is likelier
-        (("base_compliance", "torque_constant_error"), "medium", "multisine", 3),
-        # a hardening spring and Coulomb friction are named first; both give way
-        (("hard_stop", "stribeck_friction"), "strong", "chirp_noise", 3),
+        (("base_compliance", "torque_constant_error"), "medium", "multisine", 3, 8.0, ()),
+        (("hard_stop", "stribeck_friction"), "strong", "chirp_noise", 1, 8.0, ("coulomb_friction",)),
     ],
 )
-def test_both_causes_are_found_with_their_sizes(pair, severity, excitation, seed):
+def test_both_causes_are_found_with_their_sizes(pair, severity, excitation, seed, duration, gave_way):
     rng = np.random.default_rng(seed)
     bench, sizes = drawn_bench(rng), {}
     for effect in pair:
         parameters = drawn_parameters(effect, severity, rng)
         bench = hide(bench, effect, parameters)
         sizes[effect] = parameters[MAIN_PARAMETER[effect]]
-    diagnosis = diagnose([record_run(bench, seed, excitation, DURATION)], load_rig("paper_high_impedance"))
+    diagnosis = diagnose([record_run(bench, seed, excitation, duration)], load_rig("paper_high_impedance"))
     assert diagnosis.verdict == "explained"
     found = {c.name: c.parameters[MAIN_PARAMETER[c.name]].value for c in diagnosis.causes}
     assert found == pytest.approx(sizes, rel=0.1)
+    assert {r.name for r in diagnosis.rejected if r.reason == "redundant"} >= set(gave_way)

@@ -7,6 +7,7 @@ from functools import partial
 
 import pytest
 
+from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import Guarded
@@ -24,7 +25,7 @@ def device_on(bench, limits=None, *, absolute=False, **motor):
     """The driver's device on a bench."""
     settings = MotorSettings(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
     sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
-    return DynamixelNetft(settings, sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
+    return DynamixelNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
 
 
 class Loop:

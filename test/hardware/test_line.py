@@ -2,17 +2,21 @@
 
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.dynamixel.line import Line
-from rsea_ros.hardware.dynamixel.member import Member, cycle
+from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.settings import Settings
+from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.guarded import Guarded
 from rsea_ros.hardware.limits import Limits
+from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
 from rsea_ros.hardware.peer.remote import RemoteBench
-from test.hardware.conftest import LATENCY, PERIOD, WATCHDOG
+from rsea_ros.hardware.together import cycle
+from test.hardware.conftest import FT_TIMEOUT, LATENCY, PERIOD, WATCHDOG
 
 MODELS = (1020, 1120, 1170)
 SMALL = Limits(3.0, deflection=math.inf, lost_cycles=3)
@@ -23,11 +27,12 @@ class Three:
 
     def __init__(self, bench, fast):
         self.bench = bench
-        usual = {"latency": LATENCY, "watchdog": WATCHDOG}
-        settings = [Settings(bench.port, 4_000_000, k + 1, **usual) for k in range(3)]
-        self.line = Line(settings, fast=fast)
-        self.line.open()
-        self.members = [Guarded(Member(self.line, k + 1), SMALL, 1.0 / PERIOD) for k in range(3)]
+        self.line = Line(bench.port, 4_000_000, LATENCY, fast=fast)
+        sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
+        self.members = [
+            Guarded(_device(bench, self.line, k + 1, None if k else sensor), SMALL, 1.0 / PERIOD)
+            for k in range(3)
+        ]
         for member in self.members:
             member.open()
             member.enable()
@@ -36,8 +41,32 @@ class Three:
         """Several; returns the readings of the last."""
         for _ in range(count):
             time.sleep(PERIOD)
-            states = cycle(self.line, self.members, [(torque, 0.0) for torque in torques])
+            states = cycle(self.members, [(torque, 0.0) for torque in torques], [self.line])
         return states
+
+    def beside(self, work):
+        """Do something in a thread while the cycles go on; the readings of each. Raises what it raises."""
+        heard = []
+        with ThreadPoolExecutor(1) as pool:
+            future = pool.submit(work)
+            while not future.done():
+                heard.append(self.cycles(1, (1.0, 1.0, 1.0)))
+        future.result()
+        return heard
+
+    def causes(self):
+        """What is latched, of each."""
+        return [member.fault and member.fault.cause for member in self.members]
+
+    def acting(self):
+        """Whether each motor has a goal and its torque on."""
+        goals = [self.bench.torque(place) for place in range(3)]
+        return [goal != 0 and on for goal, on in goals]
+
+
+def _device(bench, line, identity, sensor=None):
+    settings = Settings(bench.port, 4_000_000, identity, latency=LATENCY, watchdog=WATCHDOG)
+    return DynamixelNetft(LineMotor(settings, line), sensor, SMALL, math.inf)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +83,8 @@ def three(bench, request):
         bench.ask("set", motor=place, temperature=32, voltage=120, hardware_error=0)
     made = Three(bench, request.param)
     yield made
-    made.line.close()
+    for member in made.members:
+        member.device.close()
     assert [bench.torque(place) for place in range(3)] == [(0, False)] * 3
 
 
@@ -70,17 +100,66 @@ def test_each_motor_makes_its_torque_by_two_frames_a_cycle(three):
     assert three.bench.torque(2) == (round(2.0 / 1.939 / 2.69e-3), True)
 
 
+def test_the_first_ones_sensor_is_read_in_the_same_cycle(three):
+    three.cycles(20, (2.0, 0.0, 0.0))
+    state, *others = three.cycles(5, (2.0, 0.0, 0.0))
+    assert len(state.wrenches) > 1 and math.isfinite(state.wrench[5])
+    assert [other.wrench for other in others] == [None, None]
+
+
 def test_a_fault_of_one_zeroes_it_alone_and_is_cleared_alone(three):
     three.cycles(5, (1.0, 1.0, 1.0))
     three.bench.ask("set", motor=1, temperature=90)
     three.cycles(2, (1.0, 1.0, 1.0))
-    assert [member.fault and member.fault.cause for member in three.members] == [None, "temperature", None]
-    goals = [three.bench.torque(place)[0] for place in range(3)]
-    assert goals[1] == 0 and goals[0] != 0 and goals[2] != 0
+    assert three.causes() == [None, "temperature", None]
+    assert three.acting() == [True, False, True]
     three.bench.ask("set", motor=1, temperature=32)
-    three.members[1].clear()
+    heard = three.beside(three.members[1].clear)
     three.cycles(5, (1.0, 1.0, 1.0))
-    assert three.members[1].fault is None and three.bench.torque(1)[0] != 0
+    assert three.causes() == [None] * 3 and three.acting() == [True] * 3
+    assert all(states[0] is not None and states[2] is not None for states in heard)
+
+
+def test_a_reboot_of_one_leaves_the_others_their_torque(three):
+    three.cycles(5, (1.0, 1.0, 1.0))
+    heard = three.beside(three.members[0].reboot)
+    assert len(heard) > 20, "it takes 0.3 s"
+    assert sum(states[1] is None or states[2] is None for states in heard) <= 2
+    assert three.causes() == [None] * 3
+    three.cycles(5, (1.0, 1.0, 1.0))
+    assert three.acting() == [True] * 3
+
+
+def test_a_motor_that_is_unplugged_leaves_the_others_heard(three):
+    """Those behind it in a request wait for its reply, so it comes last in the next one."""
+    three.cycles(5, (1.0, 1.0, 1.0))
+    three.bench.ask("set", motor=0, id=9)
+    try:
+        three.cycles(8, (1.0, 1.0, 1.0))
+        assert three.causes() == ["no_reply", None, None]
+        assert three.acting()[1:] == [True, True]
+        with pytest.raises(DeviceError, match="no reply to ping"):
+            three.beside(three.members[0].clear)
+        assert three.causes() == ["no_reply", None, None]
+    finally:
+        three.bench.ask("set", motor=0, id=1)
+    three.beside(three.members[0].clear)
+    three.cycles(8, (1.0, 1.0, 1.0))
+    assert three.causes() == [None] * 3 and three.acting() == [True] * 3
+
+
+def test_a_port_that_comes_back_is_opened_by_the_first_that_is_cleared(three):
+    three.cycles(5, (1.0, 1.0, 1.0))
+    three.bench.ask("vanish")
+    three.cycles(2, (1.0, 1.0, 1.0))
+    assert three.causes() == ["portlost"] * 3
+    with pytest.raises(DeviceError, match="port"):
+        three.members[1].clear()
+    three.bench.ask("appear")
+    for place in (1, 0, 2):
+        three.members[place].clear()
+    three.cycles(5, (1.0, 1.0, 1.0))
+    assert three.causes() == [None] * 3 and three.acting() == [True] * 3
 
 
 def test_a_line_that_is_not_heard_zeroes_every_motor(three):
@@ -107,8 +186,10 @@ def test_the_death_of_the_host_is_each_motors_own_watchdog(three):
 
 def test_motors_of_two_series_are_refused_on_one_line(tmp_path):
     with RemoteBench(tmp_path / "tty", "--model", 1020, 2120) as bench:
-        line = Line([Settings(bench.port, 4_000_000, k, latency=LATENCY) for k in (1, 2)])
+        line = Line(bench.port, 4_000_000, LATENCY)
+        first, second = _device(bench, line, 1), _device(bench, line, 2)
+        first.open()
         with pytest.raises(DeviceError, match="XM430-W350, PM54-060-S250-R, expected motors of one series"):
-            line.open()
-    with pytest.raises(DeviceError, match="an ID twice"):
-        Line([Settings("/nowhere"), Settings("/nowhere")])
+            second.open()
+        assert first.read().position == pytest.approx(0.0, abs=0.01)
+        first.close()

@@ -1,9 +1,12 @@
 """A motor that loses its torque, its host or its supervisor, on the wire."""
 
+import fcntl
 import os
+import pty
 import signal
 import subprocess
 import sys
+import termios
 import time
 from pathlib import Path
 
@@ -104,6 +107,26 @@ def test_a_service_zeroes_the_torque_when_a_whole_group_is_killed(benches, servi
     finally:
         os.killpg(driver.pid, signal.SIGKILL)
         driver.wait()
+    _until(lambda: bench.torque() == (0, False))
+
+
+def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
+    """Its terminal hangs up, and all that was started from it is killed."""
+    bench, root = benches(), Path(__file__).resolve().parents[2]
+    well_behaved(bench)
+    near, far = pty.openpty()
+    words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, ""]
+    login = subprocess.Popen(
+        list(map(str, words)), cwd=root, start_new_session=True, stdin=far, stdout=far, stderr=far,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    )  # fmt: skip
+    os.close(far)
+    try:
+        _until(lambda: bench.torque()[0] != 0 and bench.torque()[1])
+    finally:
+        os.close(near)
+        os.killpg(login.pid, signal.SIGKILL)
+        login.wait()
     _until(lambda: bench.torque() == (0, False))
 
 

@@ -40,6 +40,11 @@ class Process:
         """What it has written so far, as lines."""
         return self._log.read_text().splitlines()
 
+    @property
+    def pid(self):
+        """Its number."""
+        return self._process.pid
+
     def running(self):
         """Whether it has not ended."""
         return self._process.poll() is None
@@ -63,6 +68,8 @@ class Process:
 def _text(value):
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
     return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
 
 

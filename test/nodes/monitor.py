@@ -9,7 +9,7 @@ from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.protection import BUS_WATCHDOG, Protection
 from rsea_ros.nodes._anchor import SECOND, Anchor
 from rsea_ros.nodes._commands import CommandQueue
-from rsea_ros.nodes._drive import Drive
+from rsea_ros.nodes._drive import Drive, step
 
 LONGEST = WATCHDOG = 0.1
 """s after which a command no longer excuses a torque; of the motor's own watchdog."""
@@ -142,7 +142,7 @@ class World:
         self.steady += round(SECOND / self.RATE)
         if torque is not None:
             self.send(torque)
-        self.drive.step(self.anchor.now())
+        step([self.drive], self.anchor.now())
         self.motor.watch(self.seconds)
         since = self.monitor.fault_since or self.seconds
         self.monitor.fault_since = None if self.guarded.fault is None else since

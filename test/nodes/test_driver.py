@@ -171,16 +171,16 @@ def test_closing_writes_zero_and_lets_go(spied):
 def test_a_fault_of_the_device_zeroes_the_torque_until_it_is_cleared(spied, listener):
     spy, program, node = spied
     spy.fault = DeviceError("no answer from ID 1 within 5 ms")
-    listener.until(lambda: program._guarded.fault is not None)
+    listener.until(lambda: program.joints[0].guarded.fault is not None)
     listener.until(lambda: spy.written[-1] == 0.0)
-    told = program._report()[1].partition("; ")[0]  # what a busy machine adds, such as cycles missed
+    told = program.joints[0].report()[1].partition("; ")[0]  # what a busy machine adds, such as cycles missed
     assert told == "fault deviceerror: no answer from ID 1 within 5 ms"
     clear = listener.node.create_client(Trigger, "/spied/spied/clear_fault")
     listener.until(clear.service_is_ready)
     assert not _called(clear, listener).success
     spy.fault = None
     assert _called(clear, listener).success
-    assert program._guarded.fault is None and spy.on
+    assert program.joints[0].guarded.fault is None and spy.on
     assert node._state_machine.current_state[1] == "active"
 
 
@@ -191,7 +191,7 @@ def test_an_exception_closes_the_device_at_zero_torque_and_can_be_configured_awa
     assert spy.written[-1] == 0.0
     program.finished()
     assert node._state_machine.current_state[1] == "unconfigured"
-    assert program._report()[1] == "a mistake in the program"
+    assert program.joints[0].report()[1] == "a mistake in the program"
     spy.fault = None
     node.trigger_configure()
     assert node._state_machine.current_state[1] == "inactive" and spy.opened
@@ -220,7 +220,7 @@ def test_two_actuators_side_by_side_take_their_commands_alone(listener, monkeypa
     def pushed():
         for name in spies:
             topic[name].publish(torque_command_message(0, 5.0, "left_knee"))
-        return spies["left"].written[-1:] == [5.0] and made[1][0]._bench.commands.refused > 3
+        return spies["left"].written[-1:] == [5.0] and made[1][0].joints[0].bench.commands.refused > 3
 
     listener.until(pushed)
     assert not any(spies["right"].written)

@@ -175,6 +175,30 @@ def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire, listener):
     wire.drive()
 
 
+LISTENER = (
+    "import rclpy\nfrom sensor_msgs.msg import JointState\nrclpy.init()\nnode = rclpy.create_node('held')\n"
+    "node.create_subscription(JointState, '/main/joint_states', lambda message: None, 10)\nrclpy.spin(node)\n"
+)
+
+
+def test_a_listener_that_is_stopped_holds_up_nobody(wire, listener):
+    """Fast DDS waited a second for one that was stopped while it took a message out of shared memory."""
+    program = Path(f"/proc/{wire.process.pid}/maps").read_text()
+    assert "/dev/shm/fast" not in program, "a publisher waits for who has locked the shared memory"
+    count = listener.node.count_subscribers("/main/joint_states")
+    held = subprocess.Popen([sys.executable, "-c", LISTENER], stdin=subprocess.DEVNULL)
+    try:
+        listener.until(lambda: listener.node.count_subscribers("/main/joint_states") > count)
+        wire.drive()
+        held.send_signal(signal.SIGSTOP)
+        for torque in (20.0, 10.0, 20.0, 10.0):
+            wire.push(lambda torque=torque: wire.goal()[0] == wire.counts(torque), torque=torque)
+        assert wire.trigger("clear_fault").message == "clear_fault: there is no fault; nothing was done"
+    finally:
+        held.kill()
+        held.wait()
+
+
 def test_deactivated_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.change(Transition.TRANSITION_DEACTIVATE).success

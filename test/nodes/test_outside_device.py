@@ -37,23 +37,26 @@ def drive(listener, monkeypatch):
 def test_without_protection_it_is_not_configured(drive):
     program, node = drive()
     assert node._state_machine.current_state[1] == "unconfigured"
-    assert "dead-host protection none" in program._report()[1]
+    assert "dead-host protection none" in program.joints[0].report()[1]
 
 
-def test_its_deflection_is_published_as_ft_and_says_so(drive, listener):
+def test_its_deflection_is_published_and_as_ft_which_says_so(drive, listener):
     program, _ = drive(allow_no_dead_host_protection=True, axis="-torque.y")
     wrenches = listener.hear(WrenchStamped, "/toy/ft", MEASUREMENT)
+    deflections = listener.hear(JointState, "/toy/deflection", MEASUREMENT)
     commands = listener.node.create_publisher(JointState, "/toy/torque_command", COMMAND)
 
     def pushed():
         commands.publish(torque_command_message(0, 10.0))
-        return wrenches and wrenches[-1].wrench.torque.y < -15.0
+        return wrenches and wrenches[-1].wrench.torque.y < -15.0 and deflections[-1].position[0] > 0.0099
 
     listener.until(pushed)
+    assert (deflections[-1].name, list(deflections[-1].position)) == (["joint"], [0.01])
+    assert not deflections[-1].velocity and deflections[-1].header.frame_id == "spring_deflection"
     assert wrench_of(wrenches[-1])[1] == 0.0, "torque.z"
     assert wrenches[-1].wrench.torque.y == pytest.approx(-1530.456 * 0.01)
     assert wrenches[-1].header.frame_id == "spring_deflection"
-    values = program._report().values
+    values = program.joints[0].report().values
     assert str(values["dead_host_protection"]) == "none"
     assert values["ft_source"] == "stiffness of 1530 N m/rad times measured deflection"
     assert "toy" in values
@@ -62,4 +65,4 @@ def test_its_deflection_is_published_as_ft_and_says_so(drive, listener):
 def test_a_supervised_one_is_configured_and_its_options_arrive(drive):
     program, node = drive(device_options="supervised=yes")
     assert node._state_machine.current_state[1] == "active"
-    assert str(program._report().values["dead_host_protection"]) == "supervisor, 0.1 s"
+    assert str(program.joints[0].report().values["dead_host_protection"]) == "supervisor, 0.1 s"

@@ -14,7 +14,9 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
-NODES = ("controller", "driver", "excite", "identify", "model", "plant", "record", "replay")
+NODES = (
+    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+)  # fmt: skip
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
 KIND = Parameter("kind", "a", "which", choices=("a", "b"))
@@ -68,6 +70,7 @@ WRONG = {
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
     "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 deg"),
+    "watch": ({"host": "192.0.2.7"}, "page on 192.0.2.7, port 8270: Cannot assign requested address"),
     "identify": ({"rigg": "x"}, "parameter rigg: no such parameter, expected one of rig, out"),
 }
 

@@ -1,5 +1,6 @@
 """SROS 2 policies: they are what the nodes do, and only those that must may command torque."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,7 @@ from xml.etree import ElementTree as XML
 
 import pytest
 
-from rsea_ros.nodes import _policies, _run
+from rsea_ros.nodes import _policies, _run, _sockets
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "security" / "policies.xml"
 
@@ -43,6 +44,43 @@ def test_nodes_are_found_from_this_machine_unless_the_user_opens_it(monkeypatch,
     monkeypatch.setattr(_run.rclpy, "init", lambda **options: None)
     _run._initialise([])
     assert _run.os.environ[variable] == range_
+
+
+SOCKETS = "FASTDDS_BUILTIN_TRANSPORTS"
+
+
+@pytest.mark.parametrize(
+    ("given", "middleware", "expected"),
+    [
+        (
+            {_sockets.RANGE: "LOCALHOST"}, "rmw_fastrtps_cpp",
+            {_sockets.RANGE: "SYSTEM_DEFAULT", _sockets.PROFILE: str(_sockets.FILE), SOCKETS: None},
+        ),
+        ({_sockets.RANGE: "SUBNET"}, "rmw_fastrtps_cpp", {_sockets.RANGE: "SUBNET", SOCKETS: "UDPv4"}),
+        ({_sockets.RANGE: "LOCALHOST"}, "rmw_cyclonedds_cpp", {_sockets.RANGE: "LOCALHOST", SOCKETS: None}),
+        (
+            {_sockets.RANGE: "LOCALHOST", _sockets.USERS[1]: "mine.xml"}, "rmw_fastrtps_cpp",
+            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
+        ),
+        (
+            {_sockets.RANGE: "LOCALHOST", "ROS_DISTRO": "iron"}, "rmw_fastrtps_cpp",
+            {_sockets.RANGE: "LOCALHOST", _sockets.PROFILE: None},
+        ),
+    ],
+)  # fmt: skip
+def test_a_node_with_torque_in_hand_publishes_by_sockets_and_stays_on_this_machine(
+    monkeypatch, given, middleware, expected
+):
+    """The range as the profile says it is this machine's, and only Fast DDS reads the profile."""
+    for name in (_sockets.RANGE, SOCKETS, "ROS_DISTRO", *_sockets.USERS):
+        monkeypatch.setenv(name, given.get(name, ""))
+        if name not in given:
+            monkeypatch.delenv(name)
+    monkeypatch.setattr(_sockets, "get_rmw_implementation_identifier", lambda: middleware)
+    _sockets.publish_by_sockets()
+    assert {name: os.environ.get(name) for name in expected} == expected
+    peers = [e.text for e in XML.parse(_sockets.FILE).iter() if e.tag.endswith("address")]
+    assert peers == ["127.0.0.1"] and "SHM" not in _sockets.FILE.read_text()
 
 
 def test_a_node_that_cannot_be_secured_as_asked_does_not_start(tmp_path, monkeypatch):

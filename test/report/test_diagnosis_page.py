@@ -19,7 +19,7 @@ HEADINGS = (
     "times above the noise floor",
     "F/T torque over time",
     "causes were tried, 1 accepted",
-    "What these data cannot tell",
+    "What these data cannot determine",
     "No fault was found",
 )
 
@@ -67,7 +67,7 @@ def test_every_verdict_makes_a_page(diagnosed, name: str) -> None:
     assert "Faults in the data, masked: frozen samples and NaN in F/T torque." in own
     assert "ros2 run rsea_ros excite --ros-args -p kind:=steps -p amplitude:=12.5" in own
     assert "&lt;tells&gt;" in own and "<tells>" not in own
-    assert ("do not tell it from hard stop or F/T sensor lag" in own) == (name == "partly_explained")
+    assert ("do not distinguish it from hard stop or F/T sensor lag" in own) == (name == "partly_explained")
 
 
 def test_a_failure_leaves_the_old_files_and_nothing_half_written(diagnosed, tmp_path: Path) -> None:

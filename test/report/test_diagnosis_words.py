@@ -52,7 +52,7 @@ def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
     )
     lines = terminal(d)
     assert "rejected    backlash: Coulomb friction explains more" in lines
-    assert "not told    Coulomb friction: these data do not tell it from Stribeck friction." in lines
+    assert "unclear     Coulomb friction: these data do not distinguish it from Stribeck friction." in lines
     assert "data        frozen samples in F/T torque, 5.0 % of the samples" in lines
     assert "wrong at    speed −0.10 to 0 rad/s (48 times)" in lines
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
@@ -24,10 +25,14 @@ REFUSALS = {
 
 
 class Bus:
-    """One motor on a port. alert: bit 7 of the last error byte. errors: failed transactions by kind."""
+    """One motor on a port. alert: bit 7 of the last error byte. errors: failed transactions by kind.
+
+    latency, return_delay: see Port; of this motor's transactions, also where others use the port.
+    """
 
     def __init__(self, port: Port, identity: int) -> None:
         self.port, self._id = port, identity
+        self.latency, self.return_delay = port.latency, port.return_delay
         self.handler = PacketHandler()
         self._failed: Counter[str] = Counter()
         self.alert = False
@@ -40,7 +45,8 @@ class Bus:
     def ping(self) -> int:
         """Return the model number. Raises NoReply."""
         self.handler.expected = 3
-        model, result, error = self.handler.ping(self.port, self._id)
+        with self._turn():
+            model, result, error = self.handler.ping(self.port, self._id)
         self._check("ping", result, error)
         return int(model)
 
@@ -50,7 +56,8 @@ class Bus:
         meanwhile: done while the reply is on its way.
         """
         self.handler.expected, self.handler.meanwhile = size, meanwhile
-        data, result, error = self.handler.readTxRx(self.port, self._id, address, size)
+        with self._turn():
+            data, result, error = self.handler.readTxRx(self.port, self._id, address, size)
         self._check(f"read of {size} bytes at {address}", result, error)
         return bytes(data)
 
@@ -61,18 +68,18 @@ class Bus:
     def put(self, item: Item, value: int) -> None:
         """Write an item; the motor has acknowledged it when this returns."""
         self.handler.expected = 0
-        result, error = self.handler.writeTxRx(
-            self.port, self._id, item.address, item.size, item.data(value)
-        )
+        data = item.data(value)
+        with self._turn():
+            result, error = self.handler.writeTxRx(self.port, self._id, item.address, item.size, data)
         self._check(f"write of {value} at {item.address}", result, error)
 
     def patiently(self, transaction: Callable[[], T]) -> T:
         """Return what a transaction outside the cycle returns: it has time for several attempts."""
-        usual, self.port.latency = self.port.latency, max(self.port.latency, PATIENCE)
+        usual, self.latency = self.latency, max(self.latency, PATIENCE)
         try:
             return _repeated(transaction)
         finally:
-            self.port.latency = usual
+            self.latency = usual
 
     def set(self, item: Item, value: int) -> None:
         """Write an item outside the cycle, patiently."""
@@ -81,7 +88,16 @@ class Bus:
     def reboot(self) -> None:
         """Reboot the motor."""
         self.handler.expected = 0
-        self._check("reboot", *self.handler.reboot(self.port, self._id))
+        with self._turn():
+            result, error = self.handler.reboot(self.port, self._id)
+        self._check("reboot", result, error)
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        """Have the port for a transaction."""
+        with self.port.turns.taken():
+            self.port.latency, self.port.return_delay = self.latency, self.return_delay
+            yield
 
     def _check(self, what: str, result: int, error: int) -> None:
         if result != COMM_SUCCESS:

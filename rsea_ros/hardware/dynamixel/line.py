@@ -7,20 +7,15 @@ the torque of each motor after the driver's death.
 
 from __future__ import annotations
 
-import threading
 import time
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable
+from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, PortLost
-from rsea_ros.hardware.dynamixel.bus import ALERT
 from rsea_ros.hardware.dynamixel.frames import frame
-from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import Port
 from rsea_ros.hardware.dynamixel.receiver import BROADCAST, Receiver
-from rsea_ros.hardware.dynamixel.sample import Sample, sample_of
-from rsea_ros.hardware.dynamixel.settings import Settings
 from rsea_ros.hardware.dynamixel.tables import ControlTable
 
 SYNC_READ, SYNC_WRITE, FAST_SYNC_READ = 0x82, 0x83, 0x8A
@@ -28,148 +23,145 @@ EMPTY = 11
 """Bytes of a status packet without parameters."""
 
 
-class Line:
-    """Motors of one series on a port; open it, then `exchange` once a cycle.
+class Answer(NamedTuple):
+    """Error byte, data of the table's sample, middle of the transaction (monotonic ns)."""
 
-    settings: of each motor, all with one path, baud rate and latency. fast: whether one joint reply is asked
-    for, which newer firmware gives. goals: counts by ID. lost: replies that did not come, by ID.
+    error: int
+    data: bytes
+    instant: int
+
+
+class Line:
+    """A port with motors of one series. Each joins when it is opened, and gives its goal before `exchange`.
+
+    fast: whether one joint reply is asked for, which newer firmware gives. Those behind a silent motor wait
+    for its reply: it comes last in the next request, and each is asked for a reply of its own.
     """
 
-    def __init__(self, settings: Sequence[Settings], *, fast: bool = False) -> None:
-        first = settings[0]
-        self.port = Port(first.path, first.baud, first.latency)
-        self.motors = {each.identity: Motor(each, self.port) for each in settings}
-        if len(self.motors) != len(settings):
-            raise DeviceError(f"motors on {first.path}: an ID twice, expected each once")
-        self._fast, self._receiver = fast, Receiver()
-        self.goals: dict[int, int] = dict.fromkeys(self.motors, 0)
-        self.lost: Counter[int] = Counter()
-        self.busy = threading.Lock()
-        self._longer = 0
-        self._samples: dict[int, tuple[int, bytes]] = {}
-        self._instant = 0
-        self._gone: PortLost | None = None
+    def __init__(self, path: str, baud: int, latency: float, *, fast: bool = False) -> None:
+        self.port = Port(path, baud, latency)
+        self._latency, self._fast, self._receiver = latency, fast, Receiver()
+        self._joined: dict[int, Callable[[], None]] = {}
+        self._delays: dict[int, float] = {}
         self._table: ControlTable | None = None
+        self._goals: dict[int, int] = {}
+        self._answers: dict[int, Answer | PortLost | None] = {}
+        self._silent, self._last = False, list[int]()
+        self._longer = 0
 
-    def open(self) -> None:
-        """Open the port and each motor, torque off. Raises DeviceError; nothing stays open then."""
-        self.port.open()
-        try:
-            for motor in self.motors.values():
-                motor.open()
-            self._table = next(iter(self.motors.values())).known
-            if len({motor.known.series for motor in self.motors.values()}) > 1:
-                names = ", ".join(motor.known.name for motor in self.motors.values())
-                raise DeviceError(f"motors on {self.port.port_name}: {names}, expected motors of one series")
-        except Exception:
-            self.close()
-            raise
+    def join(self, identity: int, close: Callable[[], None]) -> None:
+        """Open the port for a motor, unless it is open. close: closes that motor. Raises PortLost."""
+        with self.port.turns.taken():
+            if not self._joined:
+                self.port.open()
+            self._joined[identity] = close
 
-    def close(self) -> None:
-        """Zero torque of all, off, port closed."""
-        for motor in self.motors.values():
-            motor.close()
-        self.port.close()
+    def admit(self, identity: int, table: ControlTable, return_delay: float) -> None:
+        """Take a motor that has been set up into the exchange. Raises DeviceError for another series."""
+        if self._table is not None and self._table.series != table.series:
+            names = f"{self._table.name}, {table.name}"
+            raise DeviceError(f"motors on {self.port.port_name}: {names}, expected motors of one series")
+        self._table, self._delays[identity] = table, return_delay
+
+    def leave(self, identity: int) -> None:
+        """Close the port with the last motor that leaves."""
+        with self.port.turns.taken():
+            self._goals.pop(identity, None)
+            if self._joined.pop(identity, None) is not None and not self._joined:
+                self.port.close()
+                self._table = None
+
+    def set_goal(self, identity: int, counts: int) -> None:
+        """Set the goal that the next exchange writes; the motor is read in that exchange."""
+        self._goals[identity] = counts
 
     def exchange(self) -> None:
-        """Write all goals, then read all motors; `sample` has what came.
+        """Write the goals that were set, then read these motors; `answer` has what came."""
+        goals, self._goals = self._goals, {}
+        if goals:
+            with self.port.turns.taken():
+                try:
+                    self._write(goals)
+                    self._answers |= self._read(sorted(goals, key=self._place))
+                except PortLost as error:
+                    self._answers |= dict.fromkeys(goals, error)
 
-        Nothing happens while somebody talks to a single motor: nobody is heard in this cycle then.
-        """
-        self._samples, self._gone = {}, None
-        if not self.busy.acquire(blocking=False):
-            return
-        try:
-            self._write()
-            self._samples = self._read()
-        except PortLost as error:
-            self._gone = error
-        finally:
-            self.busy.release()
+    def send(self) -> None:
+        """Write the goals that were set and read nobody; a port that is lost shows in the next exchange."""
+        goals, self._goals = self._goals, {}
+        if goals:
+            with self.port.turns.taken():
+                try:
+                    self._write(goals)
+                except PortLost:
+                    return
 
-    def write(self) -> None:
-        """Write all goals, unless somebody talks to a single motor."""
-        if self.busy.acquire(blocking=False):
-            try:
-                self._write()
-            except PortLost as error:
-                self._gone = error
-            finally:
-                self.busy.release()
+    def asked(self, identity: int) -> bool:
+        """Whether the last exchange has read a motor and its answer has not been taken yet."""
+        return identity in self._answers
 
-    def sample(self, identity: int) -> Sample:
-        """Return what a motor has sent in the last exchange. Raises NoReply, PortLost."""
-        motor = self.motors[identity]
-        table = motor.known
-        if self._gone is not None:
-            raise self._gone
-        if identity not in self._samples:
-            self.lost[identity] += 1
+    def answer(self, identity: int) -> Answer:
+        """Take what a motor has sent in the last exchange. Raises NoReply, PortLost."""
+        answer = self._answers.pop(identity)
+        if answer is None:
             raise NoReply(f"motor ID {identity} on {self.port.port_name}: no reply to the sync read")
-        error, data = self._samples[identity]
-        motor.bus.alert = bool(error & ALERT)
-        if not self.busy.acquire(blocking=False):
-            return sample_of(table, data, self._instant)
-        try:
-            return motor.sample(data, self._instant)
-        finally:
-            self.busy.release()
+        if isinstance(answer, PortLost):
+            raise answer
+        return answer
+
+    def give_up(self) -> None:
+        """Close all motors, and with them a port that is lost; each has to be opened anew."""
+        for close in list(self._joined.values()):
+            close()
+
+    def _write(self, goals: dict[int, int]) -> None:
+        goal = self._known.goal_torque
+        body = bytes((SYNC_WRITE, *_two(goal.address), *_two(goal.size)))
+        for identity, counts in goals.items():
+            body += bytes((identity, *goal.data(counts)))
+        self.port.writePort(frame(BROADCAST, body))
+
+    def _read(self, order: list[int]) -> dict[int, Answer | PortLost | None]:
+        """Return the answer of each motor, None of one that has none."""
+        start, size = self._known.sample
+        size += self._longer
+        fast = self._fast and not self._silent
+        code = FAST_SYNC_READ if fast else SYNC_READ
+        self.port.clearPort()
+        self._receiver.reset()
+        begin = time.monotonic_ns()
+        self.port.writePort(frame(BROADCAST, bytes((code, *_two(start), *_two(size), *order))))
+        self.port.latency = self._latency
+        self.port.return_delay = sum(self._delays.get(identity, 0.0) for identity in order)
+        self.port.setPacketTimeout((EMPTY + size) * len(order))
+        heard = self._heard(order, size, fast=fast)
+        instant = (begin + time.monotonic_ns()) // 2
+        silent = [identity for identity in order if identity not in heard]
+        self._silent = bool(silent)
+        if silent:
+            self._last = [each for each in self._last if each != silent[0]] + silent[:1]
+            self._longer ^= 1  # a reply that comes late has another size than the next one
+        return {each: Answer(*heard[each], instant) if each in heard else None for each in order}
+
+    def _heard(self, order: list[int], size: int, *, fast: bool) -> dict[int, tuple[int, bytes]]:
+        heard: dict[int, tuple[int, bytes]] = {}
+        while not heard.keys() >= set(order):
+            data = self.port.receive()
+            for packet in self._receiver.feed(data, raw=fast):
+                heard |= _joint(packet, size) if fast else _single(packet, size)
+            if not data and self.port.isPacketTimeout():
+                break
+        return {identity: each for identity, each in heard.items() if identity in order}
+
+    def _place(self, identity: int) -> int:
+        """Return the place in a request: the last that was silent is the last."""
+        return self._last.index(identity) if identity in self._last else -1
 
     @property
     def _known(self) -> ControlTable:
         if self._table is None:
             raise PortLost(f"motors on {self.port.port_name}: not open")
         return self._table
-
-    def _write(self) -> None:
-        goal = self._known.goal_torque
-        body = bytes((SYNC_WRITE, *_two(goal.address), *_two(goal.size)))
-        for identity, counts in self.goals.items():
-            body += bytes((identity, *goal.data(counts)))
-        self.port.writePort(frame(BROADCAST, body))
-
-    def _read(self) -> dict[int, tuple[int, bytes]]:
-        """Return error byte and data of each motor that answered."""
-        start, size = self._known.sample
-        size += self._longer
-        code = FAST_SYNC_READ if self._fast else SYNC_READ
-        self.port.clearPort()
-        self._receiver.reset()
-        begin = time.monotonic_ns()
-        self.port.writePort(frame(BROADCAST, bytes((code, *_two(start), *_two(size), *self.motors))))
-        self.port.setPacketTimeout((EMPTY + size) * len(self.motors))
-        answers = self._answers(size)
-        self._instant = (begin + time.monotonic_ns()) // 2
-        if len(answers) < len(self.motors):
-            self._longer ^= 1  # a reply that comes late has another size than the next one
-        return answers
-
-    def _answers(self, size: int) -> dict[int, tuple[int, bytes]]:
-        answers: dict[int, tuple[int, bytes]] = {}
-        while len(answers) < len(self.motors):
-            data = self.port.receive()
-            for packet in self._receiver.feed(data, raw=self._fast):
-                answers |= _joint(packet, size) if self._fast else _single(packet, size)
-            if not data and self.port.isPacketTimeout():
-                break
-        return {identity: each for identity, each in answers.items() if identity in self.motors}
-
-    def reopen(self) -> None:
-        """Open the port anew; each motor has to be set up again. Raises PortLost."""
-        for motor in self.motors.values():
-            motor.close()
-        self.port.close()
-        self.port.open()
-
-    @property
-    def lost_port(self) -> bool:
-        """Whether the port is gone."""
-        try:
-            self.port.writePort(b"")
-            self.port.receive()
-        except PortLost:
-            return True
-        return self.port.descriptor < 0
 
 
 def _two(value: int) -> bytes:

@@ -65,7 +65,7 @@ class Motor:
         self.own = own = own_limits(self.bus, table)
         self.protection = self._protection(table, own)
         self._stop()
-        self.port.return_delay = RETURN_DELAY_UNIT * own.return_delay
+        self.bus.return_delay = RETURN_DELAY_UNIT * own.return_delay
         if own.operating_mode != TORQUE_MODE:
             self.bus.set(table.operating_mode, TORQUE_MODE)
         self._supervise()
@@ -111,15 +111,15 @@ class Motor:
         """
         table = self.known
         start, size = table.sample
-        begin, usual = time.monotonic_ns(), self.port.latency
-        self.port.latency = usual + self._spared
+        begin, usual = time.monotonic_ns(), self.bus.latency
+        self.bus.latency = usual + self._spared
         try:
             data = self.bus.read(start, size + self._longer, meanwhile)
         except NoReply:
             self._longer ^= 1
             raise
         finally:
-            self.port.latency, self._spared = usual, 0.0
+            self.bus.latency, self._spared = usual, 0.0
         instant = (begin + time.monotonic_ns()) // 2
         return self.sample(data, instant)
 

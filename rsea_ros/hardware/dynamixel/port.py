@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import select
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import serial  # type: ignore[import-untyped]
 from dynamixel_sdk import PortHandler
@@ -16,19 +19,40 @@ BAUD_RATES = (
 )  # fmt: skip
 """What the motors can do, bit/s."""
 BITS_PER_BYTE = 10
+RETURN_DELAY = 500e-6
+"""s, of a motor as it is delivered."""
+
+
+class Turns:
+    """Who may use a port: one transaction at a time, the next to who waits, not to who has just had one."""
+
+    def __init__(self) -> None:
+        self._next, self._used = threading.Lock(), threading.Lock()
+
+    @contextmanager
+    def taken(self) -> Iterator[None]:
+        """Wait for the port, and let nobody else have it meanwhile."""
+        with self._next:
+            self._used.acquire()
+        try:
+            yield
+        finally:
+            self._used.release()
 
 
 class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
     """PortHandler of the SDK with a blocking wait and a time-out from baud rate, size and return delay.
 
     latency: what USB adapter and scheduler may add to the time on the wire, s.
-    return_delay: pause of the motor before it answers, s.
+    return_delay: pause of the motor before it answers, s. Both are those of the transaction under way.
+    turns: of the transactions of several motors.
     """
 
     def __init__(self, path: str, baud: int, latency: float) -> None:
         super().__init__(path)
         self.baudrate = baud
-        self.latency, self.return_delay = latency, 500e-6
+        self.latency, self.return_delay = latency, RETURN_DELAY
+        self.turns = Turns()
         self._deadline = 0.0
         self._arrivals: select.epoll | None = None
         self.descriptor = -1

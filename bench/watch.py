@@ -1,0 +1,120 @@
+"""What the live view costs: its processor time as a share of one core, with a page open, at some rates.
+
+Run: python bench/watch.py [--rate 280 1000] [--seconds 20]. A plant, the observer and the node `watch` run as
+processes of their own; a page is a socket that reads all frames. The plant's late cycles, without and with
+the view, say whether it delays the loop. Status 1 when the view takes more than 10 % of a core at 280 Hz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import re
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from tornado.httpclient import HTTPRequest
+from tornado.websocket import WebSocketClientConnection, websocket_connect
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from rsea_ros.cli._processes import Processes
+
+MOST = 0.10
+DOMAIN = 94
+ADDRESS = re.compile(r"open http://(\S+)/\?token=(\S+)")
+
+
+def main() -> int:
+    """Measure at each rate and print a row."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rate", type=float, nargs="+", default=[280.0, 1000.0], help="of the plant, Hz")
+    parser.add_argument("--seconds", type=float, default=20.0, help="of each measurement")
+    given = parser.parse_args()
+    os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
+    print("    rate  pages    core  frames/s   kB/s  plant's missed cycles/s before, with")
+    worst = 0.0
+    for rate in given.rate:
+        for pages, share, row in measured(rate, given.seconds):
+            print(f"{rate:6.0f}Hz {pages:6d} {share:7.1%} {row}", flush=True)
+            worst = max(worst, share if rate <= 280.0 else 0.0)
+    return int(worst > MOST)
+
+
+def measured(rate: float, seconds: float) -> Iterator[tuple[int, float, str]]:
+    """Yield pages, share of a core and the rest of the row for no page and for one."""
+    with tempfile.TemporaryDirectory() as folder, Processes(Path(folder), DOMAIN) as nodes:
+        nodes.start("plant", {"rate": rate})
+        nodes.start("model", {})
+        time.sleep(8.0)
+        before = missed(seconds / 2.0)
+        nodes.start("watch", {"port": 0})
+        address = awaited(lambda: ADDRESS.search(nodes.log("watch").read_text()))
+        time.sleep(3.0)
+        for pages in (0, 1):
+            share, frames, size, late = asyncio.run(watched(nodes.pid("watch"), address, pages, seconds))
+            yield pages, share, f"{frames:9.1f} {size:6.1f}  {before:.2f}, {late:.2f}"
+
+
+async def watched(
+    pid: int, address: re.Match[str], pages: int, seconds: float
+) -> tuple[float, float, float, float]:
+    """Return share of a core, frames/s, kB/s and the plant's missed cycles/s while some pages are open."""
+    host, token = address.groups()
+    port = host.rpartition(":")[2]
+    head = {"Cookie": f"rsea_watch_{port}={token}", "Origin": f"http://{host}"}
+    request = HTTPRequest(f"ws://{host}/socket", headers=head)
+    sockets = [await websocket_connect(request) for _ in range(pages)]
+    counts = [0, 0]
+
+    async def read(socket: WebSocketClientConnection) -> None:
+        while (text := await socket.read_message()) is not None:
+            counts[0] += '"t0"' in text
+            counts[1] += len(text)
+
+    readers = [asyncio.ensure_future(read(s)) for s in sockets]
+    used, begin = processor_time(pid), time.monotonic()
+    late = await asyncio.get_running_loop().run_in_executor(None, missed, seconds)
+    span = time.monotonic() - begin
+    for each in readers:
+        each.cancel()
+    return (processor_time(pid) - used) / span, counts[0] / span, 1e-3 * counts[1] / span, late
+
+
+def missed(seconds: float) -> float:
+    """Return the plant's missed cycles a second, as its diagnostics say."""
+    from rsea_ros.nodes._listener import Listener
+
+    values = []
+    with Listener() as listener:
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            for text in listener.messages("/diagnostics", 1, 5.0):
+                if "/rsea/plant" in text and (found := re.search(r"missed_cycles\n\s+value: '?(\d+)", text)):
+                    values.append(int(found[1]))
+    return (values[-1] - values[0]) / seconds if values else float("nan")
+
+
+def processor_time(pid: int) -> float:
+    """Return the processor time that a process has used, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def awaited(ask: Callable[[], Any], seconds: float = 30.0) -> Any:
+    """Return what becomes true within some seconds."""
+    deadline = time.monotonic() + seconds
+    while not (result := ask()):
+        if time.monotonic() > deadline:
+            raise TimeoutError("the node did not start")
+        time.sleep(0.1)
+    return result
+
+
+if __name__ == "__main__":
+    sys.exit(main())

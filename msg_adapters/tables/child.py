@@ -1,0 +1,97 @@
+"""Readers that run in another process: a damaged file, or one that asks for all memory, ends only that.
+
+A reader is a file `_NAME_child.py` with its ceilings. It is called with FILE, the largest number of values
+and the places of the columns in JSON, and answers with a line of JSON, {"sizes": …} in the order of the
+columns, {"column": …, "names": …} for one that the file has not, or {"error": …}; then the numbers, as
+doubles.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from msg_adapters.tables.elements import place_of
+from msg_adapters.tables.table import Table, checked_lengths, index_of
+from rsea_ros.signals import FloatArray
+from rsea_ros.wording import shown
+
+
+@dataclass(frozen=True)
+class Reader:
+    """name: of the format, for people. child: the program. seconds: after which it is ended."""
+
+    name: str
+    child: Path
+    seconds: float
+    limit: int
+
+    def read(self, path: Path, columns: Sequence[str]) -> Table:
+        """Return the columns asked for. Raises ValueError with column, shape and expectation."""
+        places = json.dumps([{"column": column, **asdict(place_of(column))} for column in columns])
+        with tempfile.TemporaryFile() as output:
+            self._run([str(path.absolute()), str(self.limit), places], output)
+            output.seek(0)
+            answer = self._answer(output.readline())
+            if "names" in answer:
+                index_of(answer["column"], answer["names"])
+            if "sizes" not in answer:
+                raise ValueError(shown(str(answer.get("error")), 200)[1:-1])
+            sizes = dict(zip(columns, answer["sizes"], strict=True))
+            checked_lengths(sizes)
+            vectors = {name: _vector(output, size) for name, size in sizes.items()}
+        return finite_table(vectors)
+
+    def _run(self, arguments: list[str], output: IO[bytes]) -> None:
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+        command = [sys.executable, "-I", str(self.child), *arguments]
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.DEVNULL,
+                env=environment, timeout=self.seconds, check=False,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise ValueError(f"could not be read within {self.seconds:g} s") from None
+        if done.returncode:
+            code = done.returncode
+            reason = signal.Signals(-code).name if code < 0 else f"status {code}"
+            raise ValueError(
+                f"could not be read: the {self.name} reader ended with {reason}; a damaged file?"
+            )
+
+    def _answer(self, line: bytes) -> dict[str, Any]:
+        try:
+            answer = json.loads(line)
+        except ValueError:
+            answer = None
+        if not isinstance(answer, dict):
+            raise ValueError(f"could not be read: the {self.name} reader gave no answer; a damaged file?")
+        return answer
+
+
+def _vector(output: IO[bytes], size: int) -> FloatArray:
+    """Return the next doubles. They are read into place: through `read` they would lie in memory twice."""
+    vector = np.empty(size, "<f8")
+    if output.readinto(vector.view(np.uint8)) != 8 * size:  # type: ignore[attr-defined]
+        raise ValueError("could not be read: the reader gave too few numbers; a damaged file?")
+    return vector
+
+
+def finite_table(vectors: dict[str, FloatArray]) -> Table:
+    """Return a table of vectors of one length. Raises ValueError for an infinite number."""
+    checked_lengths({name: vector.size for name, vector in vectors.items()})
+    for name, vector in vectors.items():
+        at = int(np.argmax(np.isinf(vector)))
+        if np.isinf(vector[at]):
+            raise ValueError(f"{name}[{at}] is {vector[at]}, expected a finite number")
+    return Table(vectors, next(iter(vectors.values())).size)

@@ -1,0 +1,171 @@
+"""Expressions of columns: `0.12 * i_q - 0.4 * sign(omega)`, `derivative(phi)`, `column("tau [Nm]") * gain`.
+
+asteval evaluates them with a table of symbols that holds the columns and the functions below, nothing else.
+Before it sees a text, the syntax tree is held against a list: numbers, names, + - * / **, and calls of
+those functions. So attributes, subscripts, texts, comprehensions, lambdas and imports are never evaluated,
+numbers are doubles, and an expression takes SIZE passes over the samples at most (decision 0130).
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+from rsea_ros.wording import brief, shown
+
+LONGEST, SIZE = 1000, 200
+"""Characters, and parts of the syntax tree."""
+COLUMN = "column"
+"""`column("…")`: a column whose name is no plain word."""
+_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UAdd, ast.USub)
+_NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *_OPERATORS)
+
+PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
+    "abs": (np.abs, 1, "size"),
+    "sqrt": (np.sqrt, 1, "square root"),
+    "sin": (np.sin, 1, "sine of rad"),
+    "cos": (np.cos, 1, "cosine of rad"),
+    "tan": (np.tan, 1, "tangent of rad"),
+    "atan2": (np.arctan2, 2, "angle of (y, x), rad"),
+    "exp": (np.exp, 1, "exponential"),
+    "log": (np.log, 1, "natural logarithm"),
+    "sign": (np.sign, 1, "-1, 0 or 1"),
+    "minimum": (np.minimum, 2, "the smaller of two, sample by sample"),
+    "maximum": (np.maximum, 2, "the larger of two"),
+    "clip": (np.clip, 3, "x within (x, low, high)"),
+    "unwrap": (np.unwrap, 1, "angle in rad without jumps of a turn"),
+    "mean": (np.nanmean, 1, "mean over the record"),
+    "first": (lambda x: x[0] if np.ndim(x) else x, 1, "first sample"),
+}
+"""By name: function, how many arguments, meaning."""
+TIMED: Mapping[str, tuple[Callable[[Any, FloatArray], Any], int, str]] = {
+    "derivative": (lambda x, t: np.gradient(x, t), 1, "change a second, central differences"),
+    "integral": (lambda x, t: _integral(x, t), 1, "over the seconds since the first sample, trapezia"),
+}
+FUNCTIONS = {**PLAIN, **TIMED}
+
+
+@dataclass(frozen=True)
+class Expression:
+    """text: as the map has it. columns: that it names, each once."""
+
+    text: str
+    columns: tuple[str, ...]
+
+    def values(self, columns: Mapping[str, FloatArray], t: FloatArray) -> FloatArray:
+        """Return its value at every sample. columns: by name, shape (n,). t: stamps, s, shape (n,).
+
+        Raises ValueError for what cannot be computed.
+        """
+        from asteval import Interpreter
+
+        evaluator = Interpreter(minimal=True, use_numpy=False, symtable=self._symbols(columns, t))
+        tree = _Doubles().visit(ast.parse(self.text.strip(), mode="eval")).body
+        try:
+            with np.errstate(all="ignore"):
+                result = evaluator.run(tree, expr=self.text)
+                values = np.broadcast_to(np.asarray(result, np.float64), t.shape).copy()
+        except Exception as error:  # whatever asteval makes of what a function raises
+            raise ValueError(f"{shown(self.text)} cannot be computed: {_reason(error)}") from None
+        if np.isinf(values).any():
+            at = int(np.argmax(np.isinf(values)))
+            raise ValueError(
+                f"{shown(self.text)} is {values[at]} at sample {at + 1}, expected a finite number"
+            )
+        return np.asarray(values, np.float64)
+
+    def _symbols(self, columns: Mapping[str, FloatArray], t: FloatArray) -> dict[str, Any]:
+        """Return all that the evaluator knows."""
+        timed = {name: _over(function, t) for name, (function, *_) in TIMED.items()}
+        plain = {name: function for name, (function, *_) in PLAIN.items()}
+        named = {name: columns[name] for name in self.columns}
+        return {**named, **plain, **timed, COLUMN: columns.__getitem__}
+
+
+def parse(text: str) -> Expression:
+    """Return a checked expression. Raises ValueError naming the part that it may not have."""
+    if len(text) > LONGEST:
+        raise ValueError(f"has {len(text)} characters, expected at most {LONGEST}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"is {shown(text)}, expected columns, numbers, + - * / ** and functions") from None
+    nodes = list(ast.walk(tree))
+    if len(nodes) > SIZE:
+        raise ValueError(f"has {len(nodes)} parts, expected at most {SIZE}")
+    functions = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    quoted = {id(text): text.value for text in map(_quoted, nodes) if text is not None}
+    for node in nodes:
+        _check(node, text, is_quoted=id(node) in quoted)
+    plain = [n.id for n in nodes if isinstance(n, ast.Name) and id(n) not in functions]
+    for name in plain:
+        if name in FUNCTIONS or name == COLUMN:
+            raise ValueError(f"has the function {name} without values, expected column({name!r}) or a call")
+    columns = (*plain, *map(str, quoted.values()))
+    if not columns:
+        raise ValueError(f"is {shown(text)}, which names no column, expected one or more")
+    return Expression(text, tuple(dict.fromkeys(columns)))
+
+
+def _quoted(node: ast.AST) -> ast.Constant | None:
+    """Return the text of a node that is `column("…")`, else None."""
+    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == COLUMN):
+        return None
+    text = node.args[0] if len(node.args) == 1 and not node.keywords else None
+    return text if isinstance(text, ast.Constant) and isinstance(text.value, str) else None
+
+
+def _check(node: ast.AST, text: str, *, is_quoted: bool) -> None:
+    """Raise ValueError for a part that is not on the list."""
+    if isinstance(node, ast.operator | ast.unaryop) and not isinstance(node, _OPERATORS):
+        raise ValueError(f"has {type(node).__name__}, expected + - * / **")
+    if not isinstance(node, _NODES):
+        part = brief(ast.get_source_segment(text.strip(), node) or text)
+        raise ValueError(f"has {part!r}, expected columns, numbers, + - * / ** and functions")
+    if isinstance(node, ast.Call) and _quoted(node) is None:
+        _check_call(node)
+    if isinstance(node, ast.Constant) and not is_quoted and not _is_plain(node.value):
+        raise ValueError(f"has {shown(node.value)}, expected a plain number")
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _check_call(node: ast.Call) -> None:
+    name = node.func.id if isinstance(node.func, ast.Name) else "a call of a result"
+    if name not in FUNCTIONS:
+        near = difflib.get_close_matches(name, FUNCTIONS, n=1)
+        hint = f", did you mean {near[0]}?" if near else ""
+        raise ValueError(f"calls {brief(name)}, expected {COLUMN}, {', '.join(FUNCTIONS)}{hint}")
+    count = FUNCTIONS[name][1]
+    if len(node.args) != count or node.keywords:
+        raise ValueError(f"calls {name} with {len(node.args) + len(node.keywords)} values, expected {count}")
+
+
+class _Doubles(ast.NodeTransformer):
+    """Numbers as doubles: powers of integers may grow without end."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.Constant:
+        value = node.value
+        return ast.copy_location(ast.Constant(float(value) if isinstance(value, int) else value), node)
+
+
+def _over(function: Callable[[Any, FloatArray], Any], t: FloatArray) -> Callable[[Any], Any]:
+    return lambda x: function(np.broadcast_to(np.asarray(x, float), t.shape), t)
+
+
+def _integral(x: Any, t: FloatArray) -> Any:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * np.diff(t))])
+
+
+def _reason(error: Exception) -> str:
+    """Return the last line of an error, without the values that asteval shows with it."""
+    lines = str(error).strip().splitlines() or [type(error).__name__]
+    return brief(lines[-1].strip() or type(error).__name__)

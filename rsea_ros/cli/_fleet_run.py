@@ -1,0 +1,138 @@
+"""`rsea fleet run`: new recordings become rows of a store."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, get_args
+
+from rsea_ros.cli._output import FOUND, add_fail_on
+from rsea_ros.cli._progress import progress
+from rsea_ros.errors import ParameterError
+from rsea_ros.fleet.executor import Executor, serial
+from rsea_ros.fleet.joints import Diagnose, load_joints
+from rsea_ros.fleet.summary import Summary
+
+if TYPE_CHECKING:
+    from rsea_ros.fleet.plan import Held
+
+GIGA = 1e9
+MOST_SHOWN = 10
+"""Quarantined recordings that are printed; the store has all."""
+
+
+def add_run(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `run`."""
+    add_work(parser)
+    parser.add_argument("--out", required=True, metavar="STORE", help="folder of the store, made or added to")
+    add_fail_on(parser, ("refused", "quarantined"), " (of rows that this run writes)")
+
+
+def add_work(parser: argparse.ArgumentParser) -> None:
+    """Declare what says which recordings are worked through, how, and where."""
+    add = parser.add_argument
+    add("sources", nargs="+", metavar="SOURCE", help="folder, bag, pattern in quotes, URL, or @FILE: a list")
+    add("--map", required=True, metavar="joints.yaml", help="which joint has which rig and topics")
+    add("--diagnose", choices=get_args(Diagnose), help="which are diagnosed too (default: as the map says)")
+    add("--again", action="store_true", help="try quarantined recordings again")
+    where = parser.add_argument_group("where the work is done")
+    where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: cores)")
+    where.add_argument("--memory", type=float, metavar="GB", help="of each worker (default: all, shared)")
+    where.add_argument("--serial", action="store_true", help="in this process, without Dask")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="on a Dask cluster that runs: tcp://HOST:PORT")
+    dashboard = "of Dask's dashboard (default %(default)s; port 0: any)"
+    where.add_argument("--dashboard", default="127.0.0.1:0", metavar="HOST:PORT", help=dashboard)
+    where.add_argument("--no-wait", action="store_true", help="refuse where another run writes to the store")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Work through what is new, and say what came of it."""
+    check_options(args)
+    summary = worked(args, args.out, bags_in(args))
+    print(summary.sentence())
+    for joint, bag, why in summary.quarantined[:MOST_SHOWN]:
+        print(f"quarantined: {joint}: {bag}: {why}")
+    for line in summary.unreadable[:MOST_SHOWN]:
+        print(f"unreadable, left for the next run: {line}")
+    for bag in summary.changed[:MOST_SHOWN]:
+        print(f"changed while it was read, left for the next run: {bag}")
+    print(f"store: {args.out}; next: rsea fleet report {args.out} --out report")
+    return FOUND if set(summary.outcomes).intersection(args.fail_on) else 0
+
+
+def bags_in(args: argparse.Namespace) -> list[Held]:
+    """Return the recordings of the sources with the joints that each holds, diagnosed as the options say."""
+    from rsea_ros.fleet.sources import bags_of
+
+    joints = load_joints(args.map)
+    if args.diagnose:
+        joints = tuple(replace(joint, diagnose=args.diagnose) for joint in joints)
+    return bags_of(args.sources, joints)
+
+
+def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
+    """Write the rows of all new recordings, and return what came of it."""
+    from rsea_ros.fleet.engine import Engine, Limits
+    from rsea_ros.fleet.plan import is_anything_new
+    from rsea_ros.fleet.store import locked, open_store
+    from rsea_ros.fleet.task import work
+
+    store = open_store(out, create=True)
+    with locked(store, None if args.no_wait else _say_waiting):
+        store.finish()
+        if args.again:
+            store.take_out({"quarantined"})
+        memory = None if args.serial or args.scheduler else _memory(args)
+        place = executor(args, memory) if is_anything_new(store, held) else serial()
+        with place as places, progress("fleet") as tell:
+            return Engine(store, places, work, tell, Limits(memory)).run(held)
+
+
+@contextmanager
+def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]:
+    """Give where the tasks run. memory: bytes of each worker on this machine."""
+    if args.serial:
+        with serial() as here:
+            yield here
+        return
+    from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
+
+    if args.scheduler:
+        with on_scheduler(args.scheduler) as there:
+            yield there
+        return
+    assert memory is not None
+    with on_this_machine(_workers(args), memory, args.dashboard) as (workers, link):
+        print(f"dashboard: {link}", file=sys.stderr, flush=True)
+        yield workers
+
+
+
+def check_options(args: argparse.Namespace) -> None:
+    """Refuse options that make no sense together, before any work."""
+    if args.serial and args.scheduler:
+        raise ParameterError("--serial and --scheduler: expected one of them")
+    if args.workers is not None and args.workers < 1:
+        raise ParameterError(f"--workers {args.workers}, expected 1 or more")
+    if args.memory is not None and not args.memory > 0.0:
+        raise ParameterError(f"--memory {args.memory:g} GB, expected more than 0")
+
+
+def _workers(args: argparse.Namespace) -> int:
+    from rsea_ros.fleet.cluster import cores
+
+    return args.workers or cores()
+
+
+def _memory(args: argparse.Namespace) -> int:
+    from rsea_ros.fleet.cluster import memory_for
+
+    return int(args.memory * GIGA) if args.memory else memory_for(_workers(args))
+
+
+def _say_waiting(holder: str) -> None:
+    print(f"rsea fleet: {holder} is writing to the store: this run begins when that one has ended",
+          file=sys.stderr, flush=True)  # fmt: skip

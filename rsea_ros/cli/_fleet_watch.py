@@ -1,0 +1,57 @@
+"""`rsea fleet watch`: new recordings are worked through as they come, and changes are told once each."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._fleet_run import add_work, bags_in, check_options, worked
+from rsea_ros.cli._output import FOUND
+from rsea_ros.errors import ParameterError
+
+if TYPE_CHECKING:
+    from rsea_ros.fleet.plan import Held
+
+
+def add_watch(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `watch`."""
+    parser.add_argument("store", metavar="STORE", help="folder of the store, made or added to")
+    add_work(parser)
+    every = "s between looks at the sources (default %(default)s)"
+    parser.add_argument("--every", type=float, default=60.0, metavar="S", help=every)
+    once = f"look once, for a scheduler such as cron: exit status {FOUND} where there is a new alarm"
+    parser.add_argument("--once", action="store_true", help=once)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Look, work, tell; with --once this once."""
+    check_options(args)
+    if not args.every > 0.0:
+        raise ParameterError(f"--every {args.every:g} s, expected more than 0")
+    if args.once:
+        return FOUND if _look(args, bags_in(args), at_first=True) else 0
+    seen: dict[str, str] = {}
+    at_first = True
+    while True:
+        held = bags_in(args)
+        _look(args, [(bag, joints) for bag, joints in held if seen.get(bag.url) == bag.stamp], at_first)
+        seen, at_first = {bag.url: bag.stamp for bag, _ in held}, False
+        time.sleep(args.every)
+
+
+def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
+    """Work through recordings, print what is new, and return the number of new alarms.
+
+    held: recordings that were the same at the look before, so that none is still being recorded.
+    """
+    from rsea_ros.fleet.alarms import tell_alarms
+    from rsea_ros.fleet.store import open_store
+
+    summary = worked(args, args.store, held)
+    if summary.rows:
+        print(summary.sentence(), flush=True)
+    told = tell_alarms(open_store(args.store)) if summary.rows or at_first else []
+    for alarm in told:
+        print(f"alarm: {alarm.text}: {alarm.file}", flush=True)
+    return len(told)

@@ -1,0 +1,42 @@
+"""`rsea fleet`: many bags, joints and months: run, report, watch, sql."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql, _fleet_watch
+from rsea_ros.fleet.extra import need_extra
+
+HELP = "many bags of many joints become one store (run), a report on trends (report), answers (sql)"
+EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
+
+
+class Action(NamedTuple):
+    """What stands behind a word after `fleet`."""
+
+    help: str
+    add: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace], int]
+
+
+ACTIONS: Mapping[str, Action] = {
+    "run": Action("work through new recordings, on Dask", _fleet_run.add_run, _fleet_run.run),
+    "report": Action("pages of the fleet and of each joint", _fleet_report.add_report, _fleet_report.run),
+    "watch": Action("run again and again, and tell of changes", _fleet_watch.add_watch, _fleet_watch.run),
+    "sql": Action("ask the store a question", _fleet_sql.add_sql, _fleet_sql.run),
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the actions."""
+    actions = parser.add_subparsers(dest="action", required=True, metavar="|".join(ACTIONS))
+    for name, action in ACTIONS.items():
+        action.add(actions.add_parser(name, help=action.help, description=action.help))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Do what is asked for."""
+    need_extra()
+    return ACTIONS[args.action].run(args)

@@ -1,0 +1,50 @@
+"""`rsea watch`: the live view in a browser."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._ros import need_ros
+
+HELP = "the live view: torques, deflection, flag and health in a browser; records, identifies, diagnoses"
+EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add = parser.add_argument
+    add("--rig", default="paper_high_impedance", help="the bench: a name in config/rigs, or a file")
+    add("--host", default="localhost", help="where the page is served; 0.0.0.0: to the network too (a phone)")
+    add("--port", type=int, default=8270, help="of the page; 0: any (default %(default)s)")
+    add("--command", action="store_true", help="let a page command torque, within the driver's limits")
+    add("--limit", type=positive, default=10.0,
+        help="largest torque of a page, N m (default %(default)s); the driver's counts where it is less")
+    add("--rate", type=positive, default=280.0,
+        help="of a page's commands, Hz, as the bench runs (default %(default)s)")
+    add("--out", type=Path, default=Path("runs"), help="folder of the recordings (default %(default)s)")
+    add("--namespace", default="rsea", help="of the topics (default %(default)s)")
+    add("--joint", default="joint", help="name of the joint (default %(default)s)")
+    add("--axis", default="torque.z", help="actuator axis of the wrench on ft (default %(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Become the node's process."""
+    need_ros()
+    names = ("rig", "host", "port", "command", "limit", "rate", "out", "joint", "axis")
+    given = {name: getattr(args, name) for name in names}
+    words = [w for name, value in given.items() for w in ("-p", f"{name}:={_text(value)}")]
+    namespace = f"__ns:=/{args.namespace.strip('/')}"
+    sys.stdout.flush()
+    module = ["-m", "rsea_ros.nodes.watch", "--ros-args", "-r", namespace, *words]
+    os.execv(sys.executable, [sys.executable, *module])
+
+
+def _text(value: object) -> str:
+    """Return a value as ROS reads it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"'{value}'" if isinstance(value, str | Path) else str(value)

@@ -1,0 +1,159 @@
+"""The program inside an FMU: our own compiled step on the rig that lies beside it in the archive.
+
+pythonfmu3 puts this file into the archive and finds the class by its text. The Python that plays the FMU
+needs rsea_ros. Inputs are held over a communication step, which may be any whole number of steps of STEP.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from pythonfmu3 import (
+    DefaultExperiment,
+    Float64,
+    Fmi3Causality,
+    Fmi3Initial,
+    Fmi3Slave,
+    Fmi3Status,
+    Fmi3StepResult,
+    Fmi3Variability,
+    Unit,
+)
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import build, run
+from rsea_ros.model.step import OUTPUTS
+
+STEP = 1e-4
+"""s, of the compiled step."""
+DURATION = 60.0
+"""s, over which drifts come to their full size."""
+UNITS = {
+    "N m": {"kg": 1, "m": 2, "s": -2},
+    "N m/rad": {"kg": 1, "m": 2, "s": -2, "rad": -1},
+    "N m s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
+    "kg m^2": {"kg": 1, "m": 2},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "s": {"s": 1},
+    "Hz": {"s": -1},
+}
+"""Exponents of the base units; a parameter in another unit has it in its description."""
+
+
+class RseaActuator(Fmi3Slave):  # type: ignore[misc]
+    """One bench. Its parameters are the rig's values and those of its effects."""
+
+    def __init__(self, **kwargs) -> None:  # type: ignore[no-untyped-def]
+        super().__init__(**kwargs)
+        self._rig: Rig = load_rig(Path(self.resources) / "rig.yaml")
+        self.modelName = identifier(self._rig.name)
+        self.description = (Path(self.resources) / "coverage.txt").read_text(encoding="utf-8")
+        self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=10.0, step_size=1e-3)
+        self.register_units([Unit(name, **powers) for name, powers in UNITS.items()])
+        self._command, self._at = 0.0, 0
+        self._out = np.zeros((1, len(OUTPUTS)))
+        clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous}
+        self.register_variable(Float64("time", unit="s", getter=self._time, **clock), nested=False)
+        driven, unit = ("torque_command", "N m") if self._rig.loop is None else ("desired_position", "rad")
+        self._declare(driven, unit, "held over a communication step", Fmi3Causality.input)
+        for at, name in enumerate(OUTPUTS):
+            if self._rig.measures(name):
+                self._declare(name, _unit_of_output(name), "", Fmi3Causality.output, at)
+        self._declare_parameters()
+
+    def _declare(self, name: str, unit: str, about: str, causality: object, at: int = 0) -> None:
+        is_input = causality == Fmi3Causality.input
+        self.register_variable(
+            Float64(
+                name, unit=unit, description=about or None, causality=causality,
+                variability=Fmi3Variability.discrete if is_input else Fmi3Variability.continuous,
+                start=0.0 if is_input else None, initial=None if is_input else Fmi3Initial.calculated,
+                getter=partial(getattr, self, "_command") if is_input else partial(self._output, at),
+                setter=partial(setattr, self, "_command") if is_input else None,
+            ),
+            nested=False,
+        )  # fmt: skip
+
+    def _time(self) -> float:
+        return self._at * STEP
+
+    def _output(self, at: int) -> float:
+        return float(self._out[-1, at])
+
+    def _declare_parameters(self) -> None:
+        for name, quantity in self._rig.quantities.items():
+            if np.isfinite(quantity.value):
+                value, change = partial(self._value, name), partial(self._set, name)
+                self._parameter(name, self._rig.unit(name), value, change)
+        for setting in self._rig.effects:
+            for p in effect_named(setting.name).parameters:
+                key = setting.name, p.name
+                if np.isfinite(self._effect_value(*key)):
+                    size, change = partial(self._effect_value, *key), partial(self._set_effect, *key)
+                    self._parameter(".".join(key), p.unit, size, change)
+
+    def _parameter(
+        self, name: str, unit: str, getter: Callable[[], float], setter: Callable[[float], None]
+    ) -> None:
+        known = {"unit": unit} if unit in UNITS else {"description": unit}
+        self.register_variable(
+            Float64(
+                name, causality=Fmi3Causality.parameter, variability=Fmi3Variability.fixed,
+                getter=getter, setter=setter, **known,
+            ),
+            nested=False,
+        )  # fmt: skip
+
+    def _value(self, name: str) -> float:
+        return self._rig[name]
+
+    def _set(self, name: str, value: float) -> None:
+        self._rig = self._rig.with_values({name: value})
+
+    def _effect_value(self, effect: str, name: str) -> float:
+        setting = next(one for one in self._rig.effects if one.name == effect)
+        return effect_named(effect).complete(setting.parameters)[name]
+
+    def _set_effect(self, effect: str, name: str, value: float) -> None:
+        settings = [
+            replace(one, parameters={**one.parameters, name: value}) if one.name == effect else one
+            for one in self._rig.effects
+        ]
+        self._rig = self._rig.with_effects(*settings)
+
+    def exit_initialization_mode(self) -> None:
+        """Make the machine of the parameters that were set."""
+        self._machine = build(self._rig, STEP, DURATION, in_loop=self._rig.loop is not None)
+        self._machine.begin()
+
+    def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
+        """Hold the input to the end of the communication step."""
+        stop = round((current_time + step_size) / STEP)
+        if stop > self._at:
+            steps = np.full(stop - self._at, self._command)
+            self._out = np.empty((len(steps), len(OUTPUTS)))
+            zeros = np.zeros(len(steps))
+            is_torque = self._rig.loop is None
+            run(
+                self._machine, steps if is_torque else zeros, self._out, start=self._at * STEP,
+                **({} if is_torque else {"reference": steps}),
+            )  # fmt: skip
+            self._at = stop
+        return Fmi3StepResult(status=Fmi3Status.ok)
+
+
+def _unit_of_output(name: str) -> str:
+    return {"position": "rad", "velocity": "rad/s", "deflection": "rad"}.get(name, "N m")
+
+
+def identifier(name: str) -> str:
+    """Return a name as FMI wants that of a model: letters, digits and underscores, a letter first."""
+    plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
+    return plain if plain[:1].isalpha() else f"rig_{plain}"

@@ -1,0 +1,107 @@
+"""A rig's friction as parameters of BAM, the servo models M1 to M6, in the JSON that its `load_model` reads.
+
+    loss = base + stribeck exp(-|w / dtheta_stribeck|^alpha) + load parts,   damping = viscous
+
+M1 Coulomb and viscous, M2 with Stribeck, M3 with load, M4 with both, M5 load by direction, M6 quadratic.
+BAM's external torque is minus that in the spring; M3 and M4 take |external - motor|, which at slow speed
+is twice the load, so their coefficients are half of ours. Source: Duclusaud, Passault, Padois, Ly, Extended
+friction models for the physics simulation of servo actuators, 2024; the parameters' names: bam/model.py.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+from rsea_ros.exports.coverage import Export, Said, Unsaid
+from rsea_ros.exports.others import unsaid_effects, unsaid_parts
+from rsea_ros.model.rig import Rig
+
+ALPHA = 2.0
+"""Of the Stribeck curve of our effects."""
+ANY_SPEED = 1e9
+"""rad/s, as Stribeck velocity: M6 fades its quadratic part with speed, ours does not."""
+
+
+def export_bam(rig: Rig, actuator: str = "") -> Export:
+    """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
+    effects = {one.name: one.parameters for one in rig.effects}
+    said = [
+        Said("rotor.reflected_inertia", "armature"),
+        Said("rotor.reflected_damping", "friction_viscous"),
+    ]
+    values: dict[str, object] = {
+        "armature": rig["rotor.reflected_inertia"],
+        "q_offset": 0.0,
+        "friction_viscous": rig["rotor.reflected_damping"],
+    }
+    values |= _dry(effects, said) | _load(effects, said)
+    model = _model(effects)
+    values |= {"model": model, "actuator": actuator}
+    unsaid = [Unsaid("kt, R", "the rig has no voltage; from the data sheet, or from bam.fit")]
+    if not actuator:
+        unsaid.append(Unsaid("actuator", "BAM's name of the servo, with its control law (--actuator)"))
+    unsaid += unsaid_parts(rig, "a BAM joint is rigid")
+    unsaid += unsaid_effects(rig, said, f"no parameter of {model.upper()}")
+    values["rsea"] = {
+        "rig": rig.name,
+        "says": {one.name: one.how for one in said},
+        "leaves_out": {one.name: one.why for one in unsaid},
+    }
+    return Export("bam", ".json", json.dumps(values, indent=2) + "\n", tuple(said), tuple(unsaid))
+
+
+def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the smallest model that says the rig's friction."""
+    by_direction = effects.get("directional_load_friction")
+    if by_direction is not None:
+        return "m6" if by_direction.get("quadratic", 0.0) else "m5"
+    has_stribeck = bool(effects.keys() & {"stribeck_friction", "lugre_friction"})
+    if "load_dependent_friction" in effects:
+        return "m4" if has_stribeck else "m3"
+    return "m2" if has_stribeck else "m1"
+
+
+def _dry(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+    """Return what does not depend on the load."""
+    base = effects.get("coulomb_friction", {}).get("torque", 0.0)
+    if base:
+        said.append(Said("coulomb_friction", "friction_base"))
+    stribeck, speed = 0.0, 1.0
+    for name in ("stribeck_friction", "lugre_friction"):
+        if name in effects:
+            p = effects[name]
+            base, stribeck, speed = base + p["coulomb_torque"], p["stribeck_torque"], p["stribeck_velocity"]
+            left = ", its bristles left out" if name == "lugre_friction" else ""
+            said.append(Said(name, f"friction_base, friction_stribeck, dtheta_stribeck, alpha 2{left}"))
+    if _model(effects) in ("m1", "m3"):
+        return {"friction_base": base}
+    return {
+        "friction_base": base, "friction_stribeck": stribeck, "dtheta_stribeck": speed, "alpha": ALPHA,
+    }  # fmt: skip
+
+
+def _load(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
+    """Return what depends on the load."""
+    model, name = _model(effects), "directional_load_friction"
+    if model in ("m3", "m4"):
+        said.append(Said("load_dependent_friction", "load_friction_base, half of the coefficient"))
+        half = 0.5 * effects["load_dependent_friction"]["coefficient"]
+        return {"load_friction_base": half, **({"load_friction_stribeck": 0.0} if model == "m4" else {})}
+    if model not in ("m5", "m6"):
+        return {}
+    p = effects[name]
+    quad = ", and their quad" if model == "m6" else ""
+    said.append(Said(name, f"load_friction_motor, load_friction_external{quad}"))
+    values = {
+        "load_friction_motor": p["motor_coefficient"],
+        "load_friction_external": p["load_coefficient"],
+        "load_friction_motor_stribeck": 0.0,
+        "load_friction_external_stribeck": 0.0,
+    }
+    if model == "m6":
+        quadratic = p["quadratic"]
+        values |= {"load_friction_motor_quad": quadratic, "load_friction_external_quad": quadratic}
+        if not effects.keys() & {"stribeck_friction", "lugre_friction"}:
+            values["dtheta_stribeck"] = ANY_SPEED
+    return values

@@ -1,0 +1,59 @@
+"""How far a played export is from our own simulation of the same rig, in times the sensor's noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import simulate
+from rsea_ros.signals import UNITS, Channel, FloatArray, Record
+
+RATE = 250.0
+"""Hz, of the commands that are played."""
+CHANNELS = ("ft", "position", "velocity", "deflection")
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Of a channel: rms of the difference and of the channel itself, and the sensor's noise, in `unit`."""
+
+    channel: str
+    unit: str
+    rms: float
+    signal: float
+    noise: float
+
+    @property
+    def times_noise(self) -> float:
+        """Return the difference over the noise."""
+        return self.rms / self.noise
+
+
+def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
+    """Return what our simulation of a rig measures at the begin of each command's hold.
+
+    command: N m, or target rad of a rig with a position loop. rate: Hz.
+    """
+    t = np.arange(len(command)) / rate
+    driven = "command" if rig.loop is None else "reference"
+    names = [name for name in CHANNELS if rig.measures(name)]
+    asked = {name: Channel(t, np.zeros(len(t))) for name in names}
+    return simulate(rig, Record({driven: Channel(t, command), **asked}))
+
+
+def differences(
+    rig: Rig, mine: Mapping[str, FloatArray], theirs: Mapping[str, FloatArray]
+) -> tuple[Difference, ...]:
+    """Return the difference of each channel whose noise the rig states, N samples against N."""
+    found = []
+    for name in CHANNELS:
+        noise = rig.sensors[name].noise if name in rig.sensors else 0.0
+        if noise > 0.0 and name in mine and name in theirs:
+            apart = float(np.sqrt(np.mean((theirs[name] - mine[name]) ** 2)))
+            apart = apart if math.isfinite(apart) else math.inf
+            found.append(Difference(name, UNITS[name], apart, float(np.std(mine[name])), noise))
+    return tuple(found)

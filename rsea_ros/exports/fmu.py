@@ -1,0 +1,36 @@
+"""A rig as an FMU for co-simulation, FMI 3: our own step in an archive that other programs play.
+
+Source: FMI 3.0.2 specification, section 4 (co-simulation); pythonfmu3 builds the archive.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
+from rsea_ros.files import write_new
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import rig_text
+
+SLAVE = Path(__file__).with_name("_fmu_slave.py")
+
+
+def export_fmu(rig: Rig) -> Export:
+    """Return the archive of a rig. Raises ParameterError without pythonfmu3."""
+    try:
+        from pythonfmu3 import FmuBuilder
+    except ImportError:
+        raise ParameterError(
+            "--fmu needs the package pythonfmu3, which is not installed: pip install pythonfmu3"
+        ) from None
+    said = [Said("bench", "our own compiled step, co-simulation; the Python that plays it needs rsea_ros")]
+    said += [Said(one.name, "in the step; its sizes are parameters") for one in rig.effects]
+    unsaid = [Unsaid("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
+    with tempfile.TemporaryDirectory() as folder:
+        files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(said, unsaid))}
+        for name, text in files.items():
+            write_new(Path(folder, name), text)
+        made = FmuBuilder.build_FMU(SLAVE, dest=folder, project_files=[Path(folder, name) for name in files])
+        return Export("fmu", ".fmu", Path(made).read_bytes(), tuple(said), tuple(unsaid))

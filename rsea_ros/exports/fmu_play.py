@@ -1,0 +1,39 @@
+"""An excitation played in an FMU, by FMPy."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.exports.difference import CHANNELS, RATE
+from rsea_ros.files import write_new
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+
+def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
+    """Return what the exported rig measures at the begin of each command's hold.
+
+    command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without FMPy.
+    """
+    try:
+        from fmpy import simulate_fmu
+    except ImportError:
+        raise ParameterError(
+            "playing the FMU needs the package fmpy, which is not installed: pip install fmpy, or --no-play"
+        ) from None
+    driven = "torque_command" if rig.loop is None else "desired_position"
+    t = np.arange(len(command)) / RATE
+    given = np.array(list(zip(t, command, strict=True)), dtype=[("time", "f8"), (driven, "f8")])
+    names = [name for name in CHANNELS if rig.measures(name)]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "rig.fmu"
+        write_new(file, archive)
+        result = simulate_fmu(
+            str(file), stop_time=float(t[-1]), step_size=1.0 / RATE, output_interval=1.0 / RATE,
+            input=given, output=names, validate=True,
+        )  # fmt: skip
+    return {name: np.asarray(result[name], np.float64) for name in names}

@@ -1,0 +1,53 @@
+"""A rig with its effects for MuJoCo 4: the bodies of design/mjcf.py, and each effect in MuJoCo's own terms.
+
+Source: MuJoCo 4.0 XML reference (actuator delay, filterexact, dcmotor; tendon stiffness and damping as
+polynomials, springlength, springyield, frictionloss).
+"""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as xml
+
+from rsea_ros.design.mjcf import model_element, text
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports.coverage import CannotSay, Export, Said, Unsaid, coverage_lines
+from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
+from rsea_ros.exports.mjcf_loop import say_loop
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.structure import structured
+
+
+def export_mjcf(rig: Rig) -> Export:
+    """Return the model of a rig. Raises RigError for what no MJCF can be made of (see design/mjcf.py)."""
+    root = model_element(structured(rig), play_of(rig))
+    said: list[Said] = []
+    unsaid: list[Unsaid] = []
+    for one in say_loop(rig, root):
+        (said if isinstance(one, Said) else unsaid).append(one)  # type: ignore[arg-type]
+    for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
+        parameters = effect_named(setting.name).complete(setting.parameters)
+        try:
+            if setting.name in STRUCTURES:
+                said.append(Said(setting.name, STRUCTURES[setting.name]))
+            elif setting.name in EFFECTS:
+                said.append(Said(setting.name, EFFECTS[setting.name](root, rig, parameters)))
+            else:
+                raise CannotSay("MuJoCo has no element for it")
+        except CannotSay as reason:
+            unsaid.append(Unsaid(setting.name, str(reason)))
+    unsaid += unsaid_of(rig)
+    lines = coverage_lines(said, unsaid)
+    root.insert(0, xml.Comment(" " + "\n       ".join(["rsea export", *lines]).replace("--", "- -") + " "))
+    return Export("mjcf", ".xml", text(root), tuple(said), tuple(unsaid))
+
+
+def play_of(rig: Rig) -> float:
+    """Return the play between gear output and chassis that the model has, rad."""
+    gaps = [one.parameters["gap"] for one in rig.effects if one.name == "backlash"]
+    return float(gaps[0]) if gaps else 0.0
+
+
+def unsaid_of(rig: Rig) -> list[Unsaid]:
+    """Return what of the rig itself, without its effects, the model leaves out."""
+    noise = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
+    return [Unsaid("sensor noise", noise)] if rig.sensors else []

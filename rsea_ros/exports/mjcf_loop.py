@@ -1,0 +1,54 @@
+"""The position loop of a rig as MuJoCo's `pid` actuator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from xml.etree import ElementTree as xml
+
+from rsea_ros.exports.coverage import Said, Unsaid
+from rsea_ros.exports.mjcf_effects import motor
+from rsea_ros.model.rig import Rig
+
+
+def say_loop(rig: Rig, root: xml.Element) -> Iterator[Said | Unsaid]:
+    """Turn the motor into the loop's actuator; yield what it says and what it leaves out."""
+    if rig.loop is None:
+        yield Said("motor", "motor on the tendon output - housing")
+        return
+    gains = _gains(rig)
+    first = motor(root)
+    first.tag = "pid"
+    del first.attrib["gainprm"]
+    first.set("input", "pos")
+    for name, value in gains.items():
+        first.set(name, repr(value))
+    limit = rig["controller.torque_limit"]
+    if math.isfinite(limit):
+        first.set("forcerange", f"{-limit!r} {limit!r}")
+    yield Said(f"{rig.loop} loop", "pid actuator, " + ", ".join(f"{k} {v:g}" for k, v in gains.items()))
+    yield from _left_out(rig)
+
+
+def _gains(rig: Rig) -> dict[str, float]:
+    if rig.loop == "pd":
+        named = {"kp": rig["controller.k_p"], "ki": rig["controller.k_i"], "kv": rig["controller.k_d"]}
+    else:
+        k_v = rig["controller.k_v"]
+        named = {"kp": rig["controller.k_pos"] * k_v, "kv": k_v}
+    return {name: value for name, value in named.items() if value}
+
+
+def _left_out(rig: Rig) -> Iterator[Unsaid]:
+    if rig.encoder_end == "spring_end":
+        why = "an actuator's loop closes over its own tendon, that of the gear output"
+        yield Unsaid("encoder at the spring's end", why)
+    for name, why in (
+        ("sample_time", "the loop runs at the model's step"),
+        ("velocity_limit", "slewmax limits the target, not what the loop asks"),
+        ("k_f", "the setpoint has no feed-forward of its rate"),
+        ("k_vi", "the integral is of the position's error"),
+    ):
+        value = rig.values().get(f"controller.{name}", 0.0)
+        if value and math.isfinite(value):
+            yield Unsaid(f"controller.{name}", why)

@@ -1,0 +1,153 @@
+"""One recording of one joint: read, checked, identified, diagnosed where that is asked for."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rsea_ros import strict_yaml
+from rsea_ros.checks.carried import with_faults
+from rsea_ros.checks.check import check_record
+from rsea_ros.checks.faults import check
+from rsea_ros.checks.signal_findings import band
+from rsea_ros.checks.usable import check_diagnosable, require_motion
+from rsea_ros.errors import RseaError
+from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.reading import Run, read_run
+from rsea_ros.fleet.row import Row
+from rsea_ros.identification.identify import identify
+from rsea_ros.identification.result import Identification, ParameterEstimate
+from rsea_ros.model.extent import bounded
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_document import rig_from_document
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.report.identification_json import identification_json
+from rsea_ros.report.results import json_text
+from rsea_ros.signals import UNITS, Fault, Record
+
+_MAIN = ("ft", "deflection", "position", "velocity")
+"""Channels that judge a fit, the first one there speaks for the row."""
+
+
+def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
+    """Fill a row from a recording, and return the artefacts by file name.
+
+    What is known before an error stands in the row. Raises RseaError for a recording that cannot be used.
+    """
+    rig = rig_from_document(strict_yaml.parse(joint.rig).content, default_name=joint.name)
+    run = read_run(path, url, joint)
+    record = run.lenient
+    row |= {"time": run.time, "temperature": run.temperature, "duration": float(record.stop - record.start)}
+    row |= {"excitation": excitation(record), "faults": faults(record.faults)}
+    require_motion(record)
+    found = check_record(bounded(record), rig, joint.topics.axis)
+    row["faults"] = faults(found.faults)
+    result = identify([with_faults(_fit_for_fit(run, rig), found, masks=False)], rig)
+    row |= identified(result)
+    files = {
+        "identification.json": json_text(identification_json(result)),
+        "model.yaml": rig_text(result.rig),
+    }
+    if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
+        files |= _diagnosed(row, with_faults(record, found, masks=True), rig)
+    return files
+
+
+def _fit_for_fit(run: Run, rig: Rig) -> Record:
+    """Return the run without the samples that the checks mask; strictly read where none are."""
+    checked = check(bounded(run.lenient), rig)
+    measured = [n for n in checked.record.channels if n not in ("command", "reference")]
+    if not any(checked.masked[n].any() for n in measured if n in checked.masked):
+        return run.strict()
+    kept = {n: c if n not in measured else replace(c, t=c.t[~checked.masked[n]], y=c.y[~checked.masked[n]])
+            for n, c in checked.record.channels.items()}  # fmt: skip
+    return replace(checked.record, channels=kept)
+
+
+def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
+    """Fill in the diagnosis, and return its artefacts. One that cannot be made leaves its reason."""
+    from rsea_ros.diagnosis.diagnose import diagnose
+    from rsea_ros.report.diagnosis_json import diagnosis_json
+
+    try:
+        check_diagnosable(record)
+        result = diagnose([record], rig)
+    except RseaError as error:
+        row["reason"] = f"no diagnosis: {error}"
+        return {}
+    row |= {"diagnosis": result.verdict, "causes": [_cause(c) for c in result.causes]}
+    return {
+        "diagnosis.json": json_text(diagnosis_json(result)),
+        "extended.yaml": rig_text(result.extended_rig),
+    }
+
+
+def identified(result: Identification) -> dict[str, Any]:
+    """Return what an identification says, as columns of the row."""
+    times = result.times_noise
+    main = next((n for n in _MAIN if n in times), next(iter(times), ""))
+    return {
+        "verdict": result.verdict,
+        "residual": _finite(times.get(main, math.nan)),
+        "parameters": [_parameter(p) for p in result.parameters],
+    }
+
+
+def _parameter(p: ParameterEstimate) -> dict[str, Any]:
+    low, high = map(_finite, p.ci95)
+    identifiable = p.is_told
+    return {"name": p.name, "value": _finite(p.value), "low": low, "high": high, "unit": p.unit,
+            "identifiable": identifiable}  # fmt: skip
+
+
+def _cause(cause: Any) -> dict[str, Any]:
+    sizes = [
+        {"name": name, "value": _finite(e.value), "low": _finite(e.ci95[0]), "high": _finite(e.ci95[1]),
+         "unit": e.unit}
+        for name, e in cause.parameters.items()
+    ]  # fmt: skip
+    return {"name": cause.name, "status": cause.status, "probability": _finite(cause.probability),
+            "gain": _finite(cause.gain_holdout), "sizes": sizes}  # fmt: skip
+
+
+def excitation(record: Record) -> list[dict[str, Any]]:
+    """Return how much the run moved: size and band of what drove it, and the travel of the output."""
+    figures: list[tuple[str, float, str]] = []
+    name = next((n for n in ("command", "reference") if n in record), "")
+    if name:
+        y = record[name].y[np.isfinite(record[name].y)]
+        if len(y):
+            unit = UNITS[name]
+            figures += [("rms", float(np.std(y)), unit), ("peak", float(np.max(np.abs(y))), unit)]
+        if name == "command" and len(y) == len(record[name]) > 2 and np.all(np.diff(record[name].t) > 0.0):
+            low, high = band(record)
+            figures += [("band_low", low, "Hz"), ("band_high", high, "Hz")]
+    for channel, unit in (("position", "rad"), ("ft", "N m")):
+        if channel in record and np.isfinite(record[channel].y).any():
+            span = float(np.nanmax(record[channel].y) - np.nanmin(record[channel].y))
+            figures.append((f"{channel}_span", span, unit))
+    return [{"name": n, "value": _finite(v), "unit": u} for n, v, u in figures]
+
+
+def faults(found: Iterable[Fault]) -> list[dict[str, Any]]:
+    """Return faults of the data by kind, with how many of them and the first one's place."""
+    every = list(dict.fromkeys(found))
+    counts = Counter(f.kind for f in every)
+    first: Mapping[str, Fault] = {f.kind: f for f in reversed(every)}
+    return [{"kind": kind, "count": n, "detail": _place(first[kind])} for kind, n in sorted(counts.items())]
+
+
+def _place(fault: Fault) -> str:
+    share = f"{100.0 * fault.share:.3g} %" if math.isfinite(fault.share) else ""
+    size = f"{fault.size:.4g} {fault.unit}".strip() if fault.size is not None else ""
+    return ": ".join(filter(None, (fault.channel, ", ".join(filter(None, (share, size, fault.detail))))))
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,140 @@
+"""Dask's workers: a cluster on this machine, or one that runs already.
+
+A worker is a process with one thread. Spilling is off: a task that takes more memory than its worker may have
+ends that worker, and the engine counts how often. Only `rsea fleet run` imports this module.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import queue
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import dask
+import distributed
+from distributed.scheduler import KilledWorker
+
+from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.executor import Done, Job, WorkerLost
+
+SETTINGS: Mapping[str, Any] = {
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.work-stealing": False,
+    "distributed.deploy.lost-worker-timeout": "5s",
+}
+"""Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more."""
+PER_WORKER = 3
+"""Tasks in flight for each worker: one that runs, and some that wait at the scheduler."""
+CONNECT = "30s"
+COUNTED_EVERY = 10.0
+"""s, after which the workers are counted anew: those of another cluster come and go."""
+
+
+class OnDask:
+    """Runs jobs on a cluster; at most PER_WORKER for each worker are in flight.
+
+    refill: starts workers anew in the place of those that nobody restarts, killed before they were up.
+    """
+
+    def __init__(self, client: Any, refill: Callable[[], object] = lambda: None) -> None:
+        self._client, self._refill = client, refill
+        self._done: queue.Queue[Any] = queue.Queue()
+        self._jobs: dict[str, tuple[Job, Any]] = {}
+        self._places, self._counted = 0, -math.inf
+
+    @property
+    def places(self) -> int:
+        """How many jobs may be in flight at once."""
+        if time.monotonic() - self._counted > COUNTED_EVERY:
+            self._counted = time.monotonic()
+            self._refill()
+            self._places = PER_WORKER * max(1, self._client.scheduler_info(n_workers=0)["n_workers"])
+        return self._places
+
+    def submit(self, job: Job) -> None:
+        """Send a job to the scheduler."""
+        future = self._client.submit(job.function, job.argument, pure=False)
+        self._jobs[future.key] = job, future
+        future.add_done_callback(self._done.put)
+
+    def next(self, timeout: float | None) -> Done | None:
+        """Wait for a job that is done. Raises FleetError where the scheduler is lost."""
+        try:
+            future = self._done.get(timeout=timeout)
+        except queue.Empty:
+            self._check()
+            return None
+        job, _ = self._jobs.pop(future.key)
+        if future.status in ("cancelled", "lost"):
+            raise self._lost()
+        try:
+            return Done(job, future.result())
+        except KilledWorker as error:
+            return Done(job, error=WorkerLost(str(error)))
+        except Exception as error:
+            self._check()
+            return Done(job, error=error)
+        finally:
+            future.release()
+
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise self._lost()
+
+    def _lost(self) -> FleetError:
+        return FleetError("the scheduler is lost: what was done is in the store, run again to go on")
+
+
+@contextmanager
+def on_scheduler(address: str) -> Iterator[OnDask]:
+    """Give an executor on a cluster that runs already. Raises FleetError where nobody answers."""
+    try:
+        client = distributed.Client(  # type: ignore[no-untyped-call]
+            address, timeout=CONNECT, set_as_default=False
+        )
+    except (OSError, ValueError, TimeoutError) as error:
+        expected = "expected the address of a Dask scheduler that runs"
+        raise FleetError(f"--scheduler {address}: {error}, {expected}") from None
+    with client:
+        yield OnDask(client)
+
+
+@contextmanager
+def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple[OnDask, str]]:
+    """Give an executor on worker processes of this machine, and the address of Dask's dashboard.
+
+    memory: bytes that each worker may have. dashboard: host and port, port 0 for any.
+    """
+    with dask.config.set(SETTINGS):
+        cluster = distributed.LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=memory,
+            host="127.0.0.1",
+            dashboard_address=dashboard,
+            silence_logs=logging.CRITICAL,
+        )
+        client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
+        with cluster, client:
+            yield OnDask(client, lambda: cluster.scale(workers)), cluster.dashboard_link
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def memory_for(workers: int) -> int:
+    """Return the bytes that each of some workers may have: what Dask takes for this machine's, shared."""
+    return int(0.9 * distributed.system.MEMORY_LIMIT / workers)

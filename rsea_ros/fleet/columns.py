@@ -1,0 +1,67 @@
+"""A store as columns: what reports and trends are made from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from rsea_ros.fleet.query import connected
+from rsea_ros.fleet.store import open_store
+
+Columns = dict[str, npt.NDArray[Any]]
+_HISTORY = """
+SELECT joint, parameter, unit, epoch(time) AS time_s, value, low, high, identifiable, temperature, recording,
+       artefacts
+FROM parameters ORDER BY joint, parameter, time, recording
+"""
+_RECORDINGS = """
+SELECT joint, recording, bag, epoch(time) AS time_s, duration, temperature, outcome, reason,
+       CASE WHEN diagnosis = '' THEN verdict ELSE diagnosis END AS verdict, residual, artefacts, seconds,
+       peak_memory::DOUBLE AS peak_memory, faults, causes
+FROM recordings ORDER BY joint, time, recording
+"""
+
+
+def history(store: str | Path) -> Columns:
+    """Return every parameter of every recording that is done, sorted by joint, parameter and time.
+
+    Columns, shape (n,): joint, parameter, unit, recording, artefacts (text); time_s (s since 1970, NaN where
+    unknown), value, low, high (in unit), temperature (°C, NaN where unknown); identifiable (bool).
+    Raises FleetError for what is no store.
+    """
+    return _columns(store, _HISTORY)
+
+
+def recordings(store: str | Path) -> Columns:
+    """Return every recording with its outcome, sorted by joint and time.
+
+    Columns, shape (n,): those of the row that are one value (text, float; time_s as in history; verdict: of
+    the diagnosis where there is one); faults and causes: a list of dicts each, as in the row.
+    Raises FleetError for what is no store.
+    """
+    return _columns(store, _RECORDINGS)
+
+
+def _columns(store: str | Path, query: str) -> Columns:
+    with connected(open_store(store)) as database:
+        table = database.sql(query).to_arrow_table()
+    return {name: _plain(table[name].combine_chunks()) for name in table.column_names}
+
+
+def _plain(column: pa.Array) -> npt.NDArray[Any]:
+    """Return a column as numpy has it: NaN, false or empty text where the store has no value."""
+    if pa.types.is_floating(column.type):
+        return np.asarray(column.fill_null(np.nan), np.float64)
+    if pa.types.is_boolean(column.type):
+        return np.asarray(column.fill_null(False), np.bool_)
+    values = np.empty(len(column), object)
+    values[:] = [item or "" for item in column.to_pylist()] if pa.types.is_string(column.type) else _lists(column)
+    return values
+
+
+def _lists(column: pa.Array) -> list[list[dict[str, Any]]]:
+    return [item or [] for item in column.to_pylist()]

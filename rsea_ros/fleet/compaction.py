@@ -1,0 +1,80 @@
+"""Many files of one row become one file of many rows.
+
+The new file names those that it replaces; it gets its name first, then they go. Killed in between, it leaves
+rows twice, which every reader of this package counts once, until the next run takes the rest away.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from rsea_ros.fleet.keys import metadata, read
+from rsea_ros.fleet.row import write_table
+from rsea_ros.new_files import NewFiles, Place
+
+_PART = "part-"
+_REPLACES = b"rsea.replaces"
+_KEY = ("recording", "model_version", "settings")
+
+
+def compact(folder: Path) -> None:
+    """Make one file of a partition's rows, those twice there counted once. Raises OSError."""
+    files = sorted(folder.glob("*.parquet"))
+    if len(files) > 1:
+        _replace(folder, files, _once(pa.concat_tables([read(file) for file in files])))
+
+
+def take_out(rows: Path, outcomes: Collection[str]) -> None:
+    """Take the rows with some outcomes out of all files. Raises OSError."""
+    wanted = pa.array(sorted(outcomes), pa.string())
+    for file in sorted(rows.glob("joint=*/month=*/*.parquet")):
+        table = read(file)
+        kept = table.filter(pc.invert(pc.is_in(table["outcome"], wanted)))
+        if kept.num_rows == 0:
+            file.unlink()
+        elif kept.num_rows < table.num_rows:
+            plain = kept.replace_schema_metadata(
+                {key: value for key, value in (kept.schema.metadata or {}).items() if key != _REPLACES}
+            )  # the row that comes in a removed one's place may have the name of a file that is replaced
+            with NewFiles(Place(file.parent, force=True)) as new:
+                write_table(plain, new.staged(file.name))
+
+
+def finish(rows: Path) -> None:
+    """Take away what compactions that were killed have replaced but not removed. Raises OSError."""
+    for folder in rows.glob("joint=*/month=*"):
+        for part in folder.glob(f"{_PART}*.parquet"):
+            _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))
+
+
+def _replace(folder: Path, files: Sequence[Path], table: pa.Table) -> None:
+    """Give a table the place of some files."""
+    names = [file.name for file in files]
+    digest = hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
+    marked = table.replace_schema_metadata({**(table.schema.metadata or {}), _REPLACES: json.dumps(names)})
+    with NewFiles(folder) as new:
+        write_table(marked, new.staged(f"{_PART}{digest}.parquet"))
+    _remove(folder, names)
+
+
+def _remove(folder: Path, names: Sequence[str]) -> None:
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _once(table: pa.Table) -> pa.Table:
+    """Return the rows by time, of those with one key the newest only."""
+    seen: set[tuple[str, ...]] = set()
+    kept = []
+    keys = list(zip(*(table[name].to_pylist() for name in _KEY), strict=True))
+    for place in pc.sort_indices(table, [("written", "descending")]).to_pylist():
+        if keys[place] not in seen:
+            seen.add(keys[place])
+            kept.append(place)
+    return table.take(pa.array(kept, pa.int64())).sort_by([("time", "ascending"), ("recording", "ascending")])

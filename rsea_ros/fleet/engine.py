@@ -1,0 +1,179 @@
+"""The engine: which recordings are new, what is in flight, what is tried again, what is written.
+
+One loop in one process: it alone writes to the store. A recording that the store does not know by path, bytes
+and stamp is fingerprinted first; its content says whether it is new.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+from rsea_ros.errors import RseaError
+from rsea_ros.fleet.executor import Done, Executor, Job, WorkerLost
+from rsea_ros.fleet.plan import Held
+from rsea_ros.fleet.rate import Rate
+from rsea_ros.fleet.sources import Bag
+from rsea_ros.fleet.store import Outcome, Store
+from rsea_ros.fleet.summary import Summary
+from rsea_ros.fleet.task import Changed, Task, read_fingerprint, reason
+from rsea_ros.progress import Progress
+from rsea_ros.version import version
+
+ATTEMPTS = 5
+"""Of a task whose worker is lost each time, before it counts as poison."""
+BASE, FACTOR = 350e6, 12.0
+"""Bytes that a worker takes beside a recording, and for each byte of it (bench/fleet.py memory)."""
+_TURN = 1.0
+"""s that the loop waits at most before it looks at its clock and at the scheduler."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """memory: bytes that a worker may have, None for no limit.
+
+    back_off: s before the second attempt of a task whose worker was lost; twice as long before each further.
+    """
+
+    memory: int | None = None
+    back_off: float = 0.5
+
+
+class Engine:
+    """One run over some recordings. work: what a task does, on whatever process the executor has."""
+
+    def __init__(
+        self,
+        store: Store,
+        executor: Executor,
+        work: Callable[[Task], Outcome],
+        tell: Progress,
+        limits: Limits | None = None,
+    ) -> None:
+        self._store, self._executor, self._work = store, executor, work
+        self._keys, self._recordings = store.known()
+        self._limits, self._tell = limits or Limits(), tell
+        self._ready: deque[Job] = deque()
+        self._later: list[tuple[float, int, Job]] = []
+        self._order, self._in_flight = count(), 0
+        self._summary = Summary()
+
+    def run(self, held: Sequence[Held]) -> Summary:
+        """Work through recordings with the joints that they hold; return what came of it.
+
+        Raises FleetError where the scheduler is lost, OSError where the store cannot be written.
+        """
+        self._joints = {bag.url: joints for bag, joints in held}
+        self._summary.unmapped = sum(not joints for _, joints in held)
+        self._rate = Rate(sum(len(joints) for _, joints in held), self._tell)
+        unseen = iter([bag for bag, joints in held if joints])
+        while True:
+            self._fill(unseen)
+            if not self._in_flight and not self._later:
+                break
+            if (done := self._wait()) is not None:
+                self._in_flight -= 1
+                self._take(done)
+        self._store.compact()
+        return self._summary
+
+    def _fill(self, unseen: Iterator[Bag]) -> None:
+        """Put jobs in flight while the executor has places: those due again, those ready, then new ones."""
+        while self._in_flight < self._executor.places:
+            if self._later and self._later[0][0] <= time.monotonic():
+                job = heapq.heappop(self._later)[2]
+            elif self._ready:
+                job = self._ready.popleft()
+            elif (bag := next(unseen, None)) is not None:
+                self._look_at(bag)
+                continue
+            else:
+                return
+            self._executor.submit(job)
+            self._in_flight += 1
+
+    def _wait(self) -> Done | None:
+        """Return a job that is done; None when it is time to look whether one is due again."""
+        until_due = max(0.0, self._later[0][0] - time.monotonic()) if self._later else _TURN
+        if self._in_flight:
+            return self._executor.next(min(until_due, _TURN))
+        time.sleep(min(until_due, _TURN))
+        return None
+
+    def _look_at(self, bag: Bag) -> None:
+        """Plan the tasks of a recording that the store knows; of any other, ask for its fingerprint."""
+        recording = self._recordings.get((bag.url, bag.size, bag.stamp))
+        if recording is None:
+            self._ready.append(Job(read_fingerprint, bag))
+        else:
+            self._plan(bag, recording)
+
+    def _plan(self, bag: Bag, recording: str) -> None:
+        """Make the tasks of a recording that are new; one too large for any worker is a row at once."""
+        for joint in self._joints[bag.url]:
+            task = Task(bag, joint, recording, version())
+            if task.key in self._keys:
+                self._summary.before += 1
+                self._rate.over(1, worked=False)
+                continue
+            self._keys.add(task.key)
+            if why := self._too_large(bag):
+                self._quarantine(task, why)
+            else:
+                self._ready.append(Job(self._work, task))
+
+    def _too_large(self, bag: Bag) -> str:
+        """Return why a recording is too large for a worker, empty where it is not."""
+        need, limit = BASE + FACTOR * bag.size, self._limits.memory
+        if limit is None or need <= limit:
+            return ""
+        size = f"{bag.size / 1e6:.4g} MB would take about {need / 1e9:.3g} GB"
+        return f"{size}, a worker may have {limit / 1e9:.3g} GB: fewer workers or --memory, then --again"
+
+    def _take(self, done: Done) -> None:
+        """Write what a task has left, plan what a fingerprint tells, or try again."""
+        job = done.job
+        if isinstance(done.error, WorkerLost) and job.attempt + 1 < ATTEMPTS:
+            due = time.monotonic() + self._limits.back_off * 2.0**job.attempt
+            heapq.heappush(self._later, (due, next(self._order), replace(job, attempt=job.attempt + 1)))
+        elif isinstance(job.argument, Task):
+            self._take_task(job.argument, done)
+        elif done.error is None:
+            self._plan(*done.value)
+        else:
+            self._give_up(job.argument, done.error, len(self._joints[job.argument.url]))
+
+    def _take_task(self, task: Task, done: Done) -> None:
+        if done.error is None:
+            self._put(done.value)
+        elif isinstance(done.error, Changed):
+            self._keys.discard(task.key)
+            self._give_up(task.bag, done.error, 1)
+        elif isinstance(done.error, WorkerLost):
+            self._quarantine(task, f"its worker was lost all {ATTEMPTS} times (out of memory, or killed)")
+        else:
+            self._quarantine(task, f"{type(done.error).__name__}: {done.error}")
+
+    def _give_up(self, bag: Bag, error: BaseException, tasks: int) -> None:
+        """Leave a recording without a row to the next run."""
+        self._rate.over(tasks, worked=False)
+        if isinstance(error, Changed):
+            self._summary.changed.append(bag.url)
+        else:
+            what = "" if isinstance(error, RseaError) else f"{bag.url}: {type(error).__name__}: "
+            self._summary.unreadable.append(reason(f"{what}{error}"))
+
+    def _quarantine(self, task: Task, why: str) -> None:
+        self._put(Outcome(task.row(outcome="quarantined", reason=reason(why))))
+
+    def _put(self, outcome: Outcome) -> None:
+        row = outcome.row
+        self._store.put(outcome)
+        self._summary.outcomes[row["outcome"]] += 1
+        if row["outcome"] == "quarantined":
+            self._summary.quarantined.append((row["joint"], row["bag"], row["reason"]))
+        self._rate.over(1)

@@ -1,0 +1,13 @@
+"""What can go wrong with a fleet as a whole; what is wrong with one bag is a row of the store."""
+
+from __future__ import annotations
+
+from rsea_ros.errors import FieldError, RseaError
+
+
+class FleetError(RseaError, ValueError):
+    """A source, a store or a cluster that cannot be used as asked."""
+
+
+class JointMapError(FieldError):
+    """A joint map with a missing, unknown or impossible value."""

@@ -1,0 +1,17 @@
+"""Packages of the extra `fleet`: all there before anything begins."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from rsea_ros.fleet.errors import FleetError
+
+PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
+
+
+def need_extra() -> None:
+    """Refuse to begin where a package of the extra `fleet` is not installed. Raises FleetError."""
+    missing = [name for name in PACKAGES if find_spec(name) is None]
+    if missing:
+        install = "pip install 'rsea_ros[fleet]'"
+        raise FleetError(f"{', '.join(missing)}: not installed, expected for rsea fleet: {install}")

@@ -1,0 +1,164 @@
+"""joints.yaml: which joint has which rig, where its recordings are, and how they are read."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
+
+from msg_adapters.tables import ImportMap, load_map
+from msg_adapters.topics import TopicMap
+from rsea_ros import strict_yaml
+from rsea_ros.checked import mapping, only_keys, text
+from rsea_ros.errors import FieldError, RseaError
+from rsea_ros.fleet.errors import JointMapError
+from rsea_ros.fleet.joint_keys import JOINT, MAP, TOPIC
+from rsea_ros.keys import names
+from rsea_ros.model.rig_file import load_rig, rig_folders, rig_text
+from rsea_ros.wording import shown
+
+Diagnose = Literal["misfit", "always", "never"]
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
+_DIGITS = 16
+"""Hexadecimal digits of a hash in the store."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint as its map states it, with all that a worker on another machine needs.
+
+    rig: the text of the rig's file. bags: patterns of paths, none for every bag. temperature: a topic, or
+    empty. date: a pattern of strptime, or empty. table: the import map where the sources are no bags.
+    """
+
+    name: str
+    rig: str
+    topics: TopicMap = field(default_factory=TopicMap)
+    bags: tuple[str, ...] = ()
+    temperature: str = ""
+    date: str = ""
+    table: ImportMap | None = None
+    index: int | None = None
+    diagnose: Diagnose = "misfit"
+
+    def is_in(self, path: str) -> bool:
+        """Tell whether a recording holds this joint, by its path."""
+        return not self.bags or any(fnmatchcase(path, p) or fnmatchcase(path, f"*/{p}") for p in self.bags)
+
+    @property
+    def settings(self) -> str:
+        """The hash of everything here that changes a row: 16 hexadecimal digits."""
+        table = self.table and replace(self.table, path=Path(self.table.path.name))
+        parts = (self.rig, sorted(asdict(self.topics).items(), key=lambda item: item[0]), self.temperature,
+                 self.date, table, self.index, self.diagnose)  # fmt: skip
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:_DIGITS]
+
+
+def load_joints(path: str | Path) -> tuple[Joint, ...]:
+    """Read a joint map. Raises JointMapError with file, line, field, value and what was expected."""
+    path = Path(path)
+    try:
+        document = strict_yaml.read(path)
+    except OSError as error:
+        raise JointMapError(f"{path}: {error.strerror}, expected a joint map in YAML") from None
+    except FieldError as error:
+        raise JointMapError(f"{path}: {error}") from None
+    try:
+        return _joints(document.content, path.parent)
+    except FieldError as error:
+        raise JointMapError(f"{path}: {document.where(error.field)}{error}", error.field) from None
+
+
+def _joints(content: Any, folder: Path) -> tuple[Joint, ...]:
+    body = mapping(content, "map", "a mapping with the key joints")
+    only_keys(body, names(MAP), "map")
+    defaults = mapping(body.get("defaults") or {}, "defaults")
+    only_keys(defaults, names(JOINT), "defaults")
+    joints = mapping(body.get("joints"), "joints", "a mapping of joints by name")
+    if not joints:
+        raise FieldError("joints: empty, expected one joint or more", "joints")
+    return tuple(_joint(name, joints[name], defaults, folder) for name in joints)
+
+
+def _joint(name: Any, given: Any, defaults: Mapping[str, Any], folder: Path) -> Joint:
+    where = f"joints.{name}"
+    if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        expected = "a name of up to 64 letters, digits and _ - . that begins with a letter, a digit or _"
+        raise FieldError(f"joint {shown(name)}: expected {expected}", where)
+    stated = mapping(given or {}, where)
+    only_keys(stated, names(JOINT), where)
+    body = {**defaults, **stated}
+    at = {key: f"{where if key in stated else 'defaults'}.{key}" for key in names(JOINT)}
+    if "rig" not in body:
+        raise FieldError(f"{where}: no rig, expected the name or the file of one", where)
+    texts = {key: text(body[key], at[key]) for key in ("temperature", "date") if key in body}
+    return Joint(
+        name,
+        _rig(text(body["rig"], at["rig"]), at["rig"], folder),
+        _topics(body, at),
+        _patterns(body.get("bags", []), at["bags"]),
+        table=_table(body, at["import"], folder),
+        index=_index(body.get("index"), at["index"]),
+        diagnose=_diagnose(body.get("diagnose", "misfit"), at["diagnose"]),
+        **texts,
+    )
+
+
+def _rig(name: str, field: str, folder: Path) -> str:
+    """Return the text of a rig by name, or by its path from the map's folder."""
+    beside = folder / name
+    try:
+        return rig_text(load_rig(beside if beside.is_file() else name))
+    except RseaError as error:
+        raise FieldError(f"{field}: {error}", field) from None
+
+
+def _table(body: Mapping[str, Any], field: str, folder: Path) -> ImportMap | None:
+    """Return the import map of a joint whose recordings are tables."""
+    if "import" not in body:
+        return None
+    name = text(body["import"], field)
+    if "bags" not in body:
+        raise FieldError(f"{field} = {shown(name)}: expected bags too, which tables hold this joint", field)
+    shipped = [place.parent / "imports" / f"{name}.yaml" for place in rig_folders()]
+    file = next((path for path in (folder / name, *shipped) if path.is_file()), None)
+    if file is None:
+        raise FieldError(f"{field} = {shown(name)}, expected a map of config/imports or a file", field)
+    try:
+        return load_map(file)
+    except RseaError as error:
+        raise FieldError(f"{field}: {error}", field) from None
+
+
+def _topics(body: Mapping[str, Any], at: Mapping[str, str]) -> TopicMap:
+    renamed = mapping(body.get("topics") or {}, at["topics"])
+    only_keys(renamed, names(TOPIC), at["topics"])
+    stated = {role: text(topic, f"{at['topics']}.{role}") for role, topic in renamed.items()}
+    stated |= {key: text(body[key], at[key]) for key in ("namespace", "joint", "axis") if key in body}
+    try:
+        return TopicMap(**stated)
+    except RseaError as error:
+        field = at["axis"] if "axis" in str(error) else at["topics"]
+        raise FieldError(f"{field}: {error}", field) from None
+
+
+def _patterns(value: Any, field: str) -> tuple[str, ...]:
+    if isinstance(value, list):
+        return tuple(text(pattern, f"{field}[{k}]") for k, pattern in enumerate(value))
+    return (text(value, field),)
+
+
+def _index(value: Any, field: str) -> int | None:
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < 0):
+        raise FieldError(f"{field} = {shown(value)}, expected a whole number, 0 or more", field)
+    return value
+
+
+def _diagnose(value: Any, field: str) -> Diagnose:
+    if value not in get_args(Diagnose):
+        raise FieldError(f"{field} = {shown(value)}, expected one of {', '.join(get_args(Diagnose))}", field)
+    return cast(Diagnose, value)

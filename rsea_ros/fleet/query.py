@@ -1,0 +1,91 @@
+"""A store as tables of DuckDB, to be read and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import duckdb
+
+from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.store import Store
+
+_ANALYSES = """
+CREATE VIEW analyses AS SELECT * FROM read_parquet('{pattern}', hive_partitioning = true,
+    union_by_name = true, hive_types = {{'joint': VARCHAR, 'month': VARCHAR}})
+QUALIFY row_number() OVER (PARTITION BY joint, recording, model_version, settings ORDER BY written DESC) = 1
+"""
+_VIEWS = (
+    """
+CREATE VIEW recordings AS SELECT * FROM analyses
+QUALIFY row_number() OVER (PARTITION BY joint, recording ORDER BY written DESC) = 1
+""",
+    """
+CREATE VIEW parameters AS SELECT joint, recording, time, temperature, bag, verdict, artefacts,
+    p.name AS parameter, p.value AS value, p.low AS low, p.high AS high, p.unit AS unit,
+    p.identifiable AS identifiable
+FROM (SELECT *, UNNEST(parameters) AS p FROM recordings)
+""",
+    """
+CREATE VIEW causes AS SELECT joint, recording, time, bag, artefacts, c.name AS cause, c.status AS status,
+    c.probability AS probability, c.gain AS gain, s.name AS size, s.value AS value, s.low AS low,
+    s.high AS high, s.unit AS unit
+FROM (SELECT *, UNNEST(c.sizes) AS s FROM (SELECT *, UNNEST(causes) AS c FROM recordings))
+""",
+    """
+CREATE VIEW faults AS SELECT joint, recording, time, bag, f.kind AS kind, f.count AS count, f.detail AS detail
+FROM (SELECT *, UNNEST(faults) AS f FROM recordings)
+""",
+)
+VIEWS = ("recordings", "parameters", "causes", "faults", "analyses")
+_EMPTY = "No files found that match"
+
+
+@contextmanager
+def connected(store: Store) -> Iterator[Any]:
+    """Give a connection to DuckDB with the views of a store, that can read the store and write nowhere.
+
+    Raises FleetError for a store without rows.
+    """
+    rows = str(store.rows.resolve())
+    pattern = f"{_quoted(rows)}/joint=*/month=*/*.parquet"
+    with duckdb.connect(":memory:") as database:
+        try:
+            database.execute(_ANALYSES.format(pattern=pattern))
+        except duckdb.IOException as error:
+            if _EMPTY in str(error):
+                raise FleetError(f"{store.path}: no row, expected one: rsea fleet run makes it") from None
+            raise
+        for view in _VIEWS:
+            database.execute(view)
+        database.execute("SET TimeZone = 'UTC'")
+        database.execute(f"SET allowed_directories = ['{_quoted(rows)}']")
+        database.execute("SET enable_external_access = false")
+        database.execute("SET lock_configuration = true")
+        yield database
+
+
+def answer(store: Store, query: str) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """Return column names and rows of a query. Raises FleetError for one that fails or does not just read."""
+    with connected(store) as database:
+        try:
+            _check_reads(duckdb.extract_statements(query))
+            table = database.sql(query).to_arrow_table()
+        except duckdb.Error as error:
+            text = " ".join(str(error).split())
+            raise FleetError(f"{text} (views: {', '.join(VIEWS)})") from None
+    columns = [column.to_pylist() for column in table.columns]
+    return table.column_names, list(zip(*columns, strict=True))
+
+
+def _check_reads(statements: Sequence[Any]) -> None:
+    """Refuse more than one statement, and one that does more than read."""
+    reading = (duckdb.StatementType.SELECT, duckdb.StatementType.EXPLAIN)
+    if len(statements) != 1 or statements[0].type not in reading:
+        raise FleetError("expected one SELECT: only rsea fleet run changes a store")
+
+
+def _quoted(path: str) -> str:
+    """Return a path as it stands between quotes in SQL."""
+    return path.replace("'", "''")

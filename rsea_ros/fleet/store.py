@@ -1,0 +1,151 @@
+"""The store of a fleet: a folder of Parquet files, with the artefacts beside them.
+
+    store.json                                   what this folder is
+    rows/joint=NAME/month=YYYY-MM/*.parquet      one row a file, or many after compaction
+    artefacts/NAME/RECORDING-ANALYSIS/           identification.json, diagnosis.json, …
+    alarms/                                      what `rsea fleet watch` has told of
+
+One run at a time writes (see locked); whoever reads needs no lock. A file gets its name when it is complete.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+
+from rsea_ros.files import make_folder
+from rsea_ros.fleet.compaction import compact, finish, take_out
+from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.keys import known_rows
+from rsea_ros.fleet.row import SCHEMA, Row, analysis_of, month_of, write
+from rsea_ros.new_files import NewFiles, Place, write_text
+
+MARK = "store.json"
+LOCK = ".lock"
+LOOSE = 64
+"""Files of one row in a partition from which they become one file: each costs a reader a millisecond."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a task leaves: its row, and the texts of its artefacts by file name."""
+
+    row: Row
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Store:
+    """A store that this process may write to while it holds the lock."""
+
+    path: Path
+    _loose: Counter[Path] = field(default_factory=Counter)
+
+    @property
+    def rows(self) -> Path:
+        """The folder of the Parquet files."""
+        return self.path / "rows"
+
+    def known(self) -> tuple[set[str], dict[tuple[str, int, str], str]]:
+        """Return the keys of all rows, and the recording of every bag by path, bytes and stamp."""
+        return known_rows(self.rows)
+
+    def put(self, outcome: Outcome) -> None:
+        """Write artefacts, then the row: a killed writer leaves artefacts without a row, never the reverse.
+
+        Raises OSError, and OutputError for a row that the store has.
+        """
+        row = {**outcome.row, "written": datetime.now(timezone.utc)}
+        analysis = analysis_of(row["model_version"], row["settings"])
+        name = f"{row['recording']}-{analysis}"
+        if outcome.files:
+            row["artefacts"] = f"artefacts/{row['joint']}/{name}"
+            with NewFiles(Place(self.path / row["artefacts"], force=True)) as new:
+                for file, content in outcome.files.items():
+                    new.write(file, content)
+        folder = self.rows / f"joint={row['joint']}" / f"month={month_of(row['time'])}"
+        with NewFiles(folder) as new:
+            write([row], new.staged(f"{name}.parquet"))
+        self._loose[folder] += 1
+        if self._loose[folder] >= LOOSE:
+            self._loose[folder] = 0
+            compact(folder)
+
+    def finish(self) -> None:
+        """Finish what a writer that was killed has left."""
+        finish(self.rows)
+
+    def take_out(self, outcomes: Collection[str]) -> None:
+        """Take the rows with some outcomes out, so that their recordings count as new."""
+        take_out(self.rows, outcomes)
+
+    def compact(self) -> None:
+        """Make one file of each partition's rows."""
+        for folder in sorted(self.rows.glob("joint=*/month=*")):
+            compact(folder)
+
+
+def open_store(path: str | Path, *, create: bool = False) -> Store:
+    """Return a store. create: make it where nothing is.
+
+    Raises FleetError for a folder that is none, or whose schema is not known here.
+    """
+    store = Store(Path(path))
+    mark = store.path / MARK
+    if create and not mark.exists():
+        if store.path.exists() and (not store.path.is_dir() or any(store.path.iterdir())):
+            raise FleetError(f"{path}: not empty and no store, expected a store or a new name")
+        make_folder(store.path)
+        _write_mark(mark)
+    try:
+        schema = json.loads(mark.read_text(encoding="utf-8"))["schema"]
+    except OSError:
+        raise FleetError(f"{path}: no {MARK} in it, expected a store that rsea fleet run has made") from None
+    except (ValueError, KeyError, TypeError):
+        raise FleetError(f"{mark}: cannot be read, expected the mark of a store") from None
+    if not isinstance(schema, int) or schema > SCHEMA:
+        raise FleetError(f"{mark}: schema {schema}, expected {SCHEMA}: a later version made this store")
+    make_folder(store.rows)
+    return store
+
+
+def _write_mark(mark: Path) -> None:
+    """Write the mark, unless another run has done so in the meantime."""
+    try:
+        write_text(mark, json.dumps({"about": "rsea fleet", "schema": SCHEMA}) + "\n")
+    except FileExistsError:
+        return
+    except OSError:
+        if not mark.exists():
+            raise
+
+
+@contextmanager
+def locked(store: Store, waiting: Callable[[str], None] | None) -> Iterator[None]:
+    """Hold the store's lock; the system lets go of it when this process ends, however it ends.
+
+    waiting: is told once who holds it, and the block begins when that run has ended; None: do not wait.
+    Raises FleetError where another run holds it and nobody waits.
+    """
+    lock = os.open(store.path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            holder = os.pread(lock, 200, 0).decode(errors="replace").strip() or "another run"
+            if waiting is None:
+                raise FleetError(f"{store.path}: {holder} writes to it, expected one run at a time") from None
+            waiting(holder)
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        os.ftruncate(lock, 0)
+        os.pwrite(lock, f"process {os.getpid()} on {os.uname().nodename}\n".encode(), 0)
+        yield
+    finally:
+        os.close(lock)

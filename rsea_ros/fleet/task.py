@@ -1,0 +1,126 @@
+"""A task: one recording of one joint, worked through on whatever machine a worker runs on.
+
+It needs the recording and nothing else: rig and topics come along, the row and the artefacts go back.
+"""
+
+from __future__ import annotations
+
+import resource
+import time
+import traceback
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from rsea_ros.errors import RseaError
+from rsea_ros.fleet.joints import Joint
+from rsea_ros.fleet.row import Row, analysis_of, empty
+from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relisted
+from rsea_ros.fleet.store import Outcome
+from rsea_ros.identification.workers import on_cores
+from rsea_ros.wording import brief
+
+_LONGEST = 500
+"""Characters of a reason."""
+
+
+class Changed(Exception):
+    """A recording that another program wrote to while it was read: it is left for the next run."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A recording of one joint. recording: the hash of its content. model_version: of this software."""
+
+    bag: Bag
+    joint: Joint
+    recording: str
+    model_version: str
+
+    @property
+    def key(self) -> str:
+        """What no two rows of a store share."""
+        analysis = analysis_of(self.model_version, self.joint.settings)
+        return f"{self.joint.name}/{self.recording}-{analysis}"
+
+    def row(self, **stated: object) -> Row:
+        """Return the row, of which only what is stated and what the task is are known."""
+        return empty(
+            self.joint.name,
+            recording=self.recording,
+            bag=self.bag.url,
+            bytes=self.bag.size,
+            stamp=self.bag.stamp,
+            model_version=self.model_version,
+            settings=self.joint.settings,
+            **stated,
+        )
+
+
+def read_fingerprint(bag: Bag) -> tuple[Bag, str]:
+    """Return a recording as it is listed now, and the hash of its content.
+
+    Raises Changed where it was written to meanwhile, FleetError where it cannot be read.
+    """
+    before = relisted(bag)
+    digest = fingerprint(before)
+    if relisted(bag) != before:
+        raise Changed(bag.url)
+    return before, digest
+
+
+def work(task: Task) -> Outcome:
+    """Read, check, identify and, where that is asked for, diagnose; return row and artefacts.
+
+    Whatever is wrong with the recording is the row's outcome and reason. Raises Changed as read_fingerprint.
+    """
+    from rsea_ros.fleet.analysis import analyse  # a second of numerics that the client never needs
+
+    row, files = task.row(), {}
+    begin = time.perf_counter()
+    _forget_peak()
+    with on_cores(1):
+        try:
+            with local_copy(task.bag) as path:
+                files = analyse(row, path, task.bag.url, task.joint)
+            row["outcome"] = "done"
+        except RseaError as error:
+            row |= {"outcome": "refused", "reason": reason(str(error))}
+        except Exception as error:
+            row |= {"outcome": "quarantined", "reason": reason(_fault(error))}
+    if _now(task.bag) != task.bag:
+        raise Changed(task.bag.url)
+    return Outcome(row | {"seconds": time.perf_counter() - begin, "peak_memory": _peak()}, files)
+
+
+def reason(text: str) -> str:
+    """Return the text of an error as one line of a row."""
+    return brief(" ".join(text.split()), _LONGEST)
+
+
+def _now(bag: Bag) -> Bag | None:
+    with suppress(RseaError):
+        return relisted(bag)
+    return None
+
+
+def _fault(error: Exception) -> str:
+    """Return one line about an error that nobody expected."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    kind = type(error).__name__
+    return f"a fault of rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"
+
+
+def _forget_peak() -> None:
+    """Let the system count this process's peak of memory anew, where it can."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+
+
+def _peak() -> int:
+    """Return the peak of this process's memory, bytes, since _forget_peak where the system can tell."""
+    with suppress(OSError):
+        lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
+        return next(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+

@@ -1,0 +1,56 @@
+"""A motor of a line: its goal and its sample go through the line's exchange, all else it does by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rsea_ros.errors import DeviceError
+from rsea_ros.hardware.device import PortLost
+from rsea_ros.hardware.dynamixel.bus import ALERT
+from rsea_ros.hardware.dynamixel.line import Line
+from rsea_ros.hardware.dynamixel.motor import Motor
+from rsea_ros.hardware.dynamixel.sample import Sample
+from rsea_ros.hardware.dynamixel.settings import Settings
+
+
+class LineMotor(Motor):
+    """As Motor. The exchange comes between `write` and `read`; without one `read` asks the motor alone."""
+
+    def __init__(self, settings: Settings, line: Line) -> None:
+        super().__init__(settings, line.port)
+        self._line, self._id = line, settings.identity
+
+    def open(self) -> None:
+        """Join the line and be set up, torque off. Raises DeviceError, also for a motor of another series."""
+        self._line.join(self._id, self.close)
+        super().open()
+        self._line.admit(self._id, self.known, self.bus.return_delay)
+
+    def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
+        """Return what the exchange has brought, or a reading alone. Raises NoReply, PortLost, Refused."""
+        if not self._line.asked(self._id):
+            return super().read(meanwhile)
+        if meanwhile is not None:
+            meanwhile()
+        answer = self._line.answer(self._id)
+        self.bus.alert = bool(answer.error & ALERT)
+        return self.sample(answer.data, answer.instant)
+
+    def write(self, torque: float) -> None:
+        """Set the goal (N m) that the next exchange writes. Raises PortLost."""
+        self._line.set_goal(self._id, self.counts(torque))
+
+    def recover(self) -> None:
+        """Connect again; where the port was lost, every motor of the line must be recovered."""
+        try:
+            self.bus.patiently(self.bus.ping)
+        except PortLost:
+            self._line.give_up()
+        except DeviceError:
+            pass  # what is wrong with this motor alone is seen to below
+        super().recover()
+
+    def close(self) -> None:
+        """Zero torque, off; the last motor of the line closes the port."""
+        super().close()
+        self._line.leave(self._id)

@@ -1,0 +1,49 @@
+"""One cycle of several joints, some of which share a bus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Protocol
+
+from rsea_ros.hardware.device import State
+
+if TYPE_CHECKING:
+    from rsea_ros.hardware.guarded import Guarded
+
+
+class Shared(Protocol):
+    """A bus whose devices are written and read in one transaction."""
+
+    def exchange(self) -> None:
+        """Send what was written, and fetch what will be read."""
+
+    def send(self) -> None:
+        """Send what was written."""
+
+
+def cycle(
+    joints: Sequence[Guarded], wanted: Sequence[tuple[float, float | None]], buses: Sequence[Shared] = ()
+) -> list[State | None]:
+    """Write the torques of all joints, then read all; return the reading of each, None of one without.
+
+    wanted: torque (N m) and age of its command (s) of each, see Guarded. A reading that trips a fault zeroes
+    that joint's torque at once. The write comes first, so that a command takes effect as near to the start of
+    its cycle as can be. A joint whose device is being switched, cleared or rebooted is left out, and
+    holds up no other.
+    """
+    with ExitStack() as kept:
+        here = [joint.taken(kept) for joint in joints]
+        before = [joint.fault for joint in joints]
+        for joint, there, (torque, age) in zip(joints, here, wanted, strict=True):
+            if there:
+                joint.write(torque, age)
+        for bus in buses:
+            bus.exchange()
+        states = [joint.read() if there else None for joint, there in zip(joints, here, strict=True)]
+        for joint, there, fault, (_, age) in zip(joints, here, before, wanted, strict=True):
+            if there and joint.fault is not fault:
+                joint.write(0.0, age)
+        for bus in buses:
+            bus.send()
+        return states

@@ -1,0 +1,181 @@
+"""Changes of a joint against its model: alarms, the cause of each, and the model as the joint is now.
+
+A cause that is sure becomes part of the model, so that a second change is compared with the joint as it is. One
+that is not sure is said with its probability, and asked for again when more has been seen: play on one flank is
+a shifted zero until the torque changes its sign.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.health.bank import CHANNELS, Bank, Evidence
+from rsea_ros.health.cusum import Cusum, threshold
+from rsea_ros.health.estimates import Estimates
+from rsea_ros.health.finding import UNEXPLAINED, Finding, unexplained
+from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.look import SETTLE, Look
+from rsea_ros.health.scatter import Scatter
+from rsea_ros.health.settings import Settings
+from rsea_ros.health.single_cause import Cause, Fitter
+from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.rig import Rig
+
+SURE = 0.95
+"""Probability from which a cause is taken over into the model."""
+EXPLAINED = 0.5
+"""Part of the excess that a cause must explain to be named."""
+SIMPLER = 5.0
+"""Cost by which one cause in place of the last may be worse than that and another one beside it."""
+LOUD, LOUDER = 2.0, 5.0
+"""Standard deviations of a look's loudness: up to the first it is usual, from the second on it is a change."""
+REMEMBERED = 64
+
+
+@dataclass(frozen=True)
+class _Base:
+    """A joint as it is compared with, and since when (s) it is so."""
+
+    rig: Rig
+    hypotheses: tuple[Hypothesis, ...]
+    since: float = -math.inf
+    last: str = ""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Causes beside the model as it is, and in place of the last one that was taken over."""
+
+    beside: Sequence[Cause]
+    instead: Sequence[Cause]
+
+
+Job = Callable[[], Answer]
+
+
+class Changes:
+    """Give looks with `take`; when `job` is there, run it and give its result to `conclude`."""
+
+    def __init__(
+        self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], scatter: Scatter, settings: Settings
+    ) -> None:
+        self._noise, self._scatter, self._settings = noise, scatter, settings
+        self._models = {h.name: h.value for h in hypotheses}
+        self._looks: deque[Look] = deque(maxlen=REMEMBERED)
+        self._before: _Base | None = None
+        self.found: dict[str, Finding] = {}
+        self.job: Job | None = None
+        self._begin(_Base(rig, tuple(hypotheses)))
+
+    def _begin(self, base: _Base) -> None:
+        """Begin to look for changes from a base."""
+        self._base = base
+        self.bank = Bank(base.rig, self._noise, base.hypotheses, self._settings.hold)
+        inner, outer = (np.array([getattr(h, n) for h in base.hypotheses]) for n in ("inner", "outer"))
+        loud = np.full(len(CHANNELS), 1.0)
+        h = threshold(self._settings.rate, 2 * len(inner) + len(CHANNELS), self._settings.every)
+        self._cusum = Cusum(np.append(inner, LOUD * loud), np.append(outer, LOUDER * loud), h)
+        self.estimates = Estimates(base.hypotheses)
+        self._wait = self._patience = 0
+
+    @property
+    def suspects(self) -> bool:
+        """Whether more should be looked at."""
+        return self._cusum.suspects
+
+    def take(self, look: Look, evidence: Evidence) -> None:
+        """Take in a look that something moved."""
+        self._looks.append(look)
+        score, information = evidence.scaled(self._scatter.scale)
+        self.estimates.take(score, information, self._scatter.phi)
+        loud = np.maximum(0.0, self._scatter.excess(evidence))
+        one = np.ones(len(loud))
+        alarm = self._cusum.take(
+            np.append(score, loud), np.append(np.diag(information), one), np.append(self._scatter.phi, one)
+        )
+        self._wait = max(0, self._wait - 1)
+        if alarm and self.job is None and not self._wait:
+            self._ask(score / np.maximum(np.diag(information), 1e-300))
+
+    def _ask(self, starts: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+        """Ask for a fit of each cause: to the newest looks, and to the first ones of this change."""
+        since = min(max(self._cusum.since, 1), len(self._looks))
+        recent = list(self._looks)[-since:]
+        self._began = recent[0].t[0] + SETTLE
+        first = [k for k in self._looks if self._before is not None and k.t[0] >= self._base.since]
+        looks = list({look.end: look for look in (*first[:2], *_spread(recent, self._settings.fitted))}.values())
+        base, before, scale = self._base, self._before, self._scatter.scale
+
+        def fit() -> Answer:
+            def causes(of: _Base) -> Sequence[Cause]:
+                fitter = Fitter(of.rig, self._noise, self._settings.hold, looks, scale)
+                return fitter.causes(of.hypotheses, starts)
+
+            return Answer(causes(base), causes(before) if before is not None else ())
+
+        self.job = fit
+
+    def conclude(self, answer: Answer) -> Finding | None:
+        """Take the result of the job; return the finding that is new, if one is."""
+        self.job = None
+        best = answer.beside[0]
+        if self._before is not None and answer.instead and answer.instead[0].cost < best.cost + SIMPLER:
+            self.found.pop(self._before.last, None)
+            self._base, self._before = replace(self._before, since=self._base.since), None
+            return self._weigh(answer.instead)
+        return self._weigh(answer.beside)
+
+    def _weigh(self, causes: Sequence[Cause]) -> Finding | None:
+        """Name the best cause, take it over where it is sure, wait for more where it is not."""
+        best, code = causes[0], causes[0].hypothesis.code
+        confidence = sum(c.probability for c in causes if c.hypothesis.code == code)
+        if best.explained < EXPLAINED:
+            return self._later(unexplained(self._began, 1.0 - max(best.explained, 0.0)))
+        self.found.pop(UNEXPLAINED, None)
+        finding = self._finding(best, confidence)
+        if confidence < SURE:
+            return self._later(finding)
+        return self._adopt(best, finding)
+
+    def _finding(self, cause: Cause, confidence: float) -> Finding:
+        h, half = cause.hypothesis, 0.5 * (cause.ci95[1] - cause.ci95[0])
+        size = h.value + cause.change - self._models[h.name]
+        since = self.found[h.name].since if h.name in self.found else self._began
+        return Finding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
+
+    def _later(self, finding: Finding) -> Finding | None:
+        """Say what is not sure, and ask again after as many looks as were waited for before, twice over."""
+        self._patience = min(2 * self._patience + 2, REMEMBERED)
+        self._wait = self._patience
+        for name in [n for n, f in self.found.items() if f.confidence < SURE]:
+            del self.found[name]
+        known = finding.name in self.found
+        self.found[finding.name] = finding
+        return None if known else finding
+
+    def _adopt(self, cause: Cause, finding: Finding) -> Finding | None:
+        """Take a cause over into the model; a change within the doubt in the model is none."""
+        h = cause.hypothesis
+        adopted = replace(h, value=h.value + cause.change)
+        hypotheses = tuple(adopted if other.name == h.name else other for other in self._base.hypotheses)
+        for name in [n for n, f in self.found.items() if f.confidence < SURE]:
+            del self.found[name]
+        self._before = self._base
+        self._before = replace(self._base, last=h.name)
+        self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - SETTLE))
+        if abs(finding.size) <= h.inner + 0.5 * h.least:
+            self.found.pop(h.name, None)
+            return None
+        self.found[h.name] = finding
+        return finding
+
+
+def _spread(looks: Sequence[Look], count: int) -> list[Look]:
+    """Return some of the looks, evenly spread, the newest among them."""
+    at = np.unique(np.linspace(0, len(looks) - 1, min(count, len(looks))).round().astype(int))
+    return [looks[k] for k in at]

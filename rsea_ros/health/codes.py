@@ -1,0 +1,32 @@
+"""The one table of codes that `health` puts on /diagnostics; docs/health.md repeats it, and a test compares.
+
+A code is for ever: fault managers make faults of it. One that is no longer used stays out of use.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Code(NamedTuple):
+    """A code: what it means, and what its size is (unit; empty where it has none)."""
+
+    name: str
+    meaning: str
+    size: str
+
+
+TABLE = (
+    Code("RSEA_STIFFNESS", "stiffness of the spring changed", "change, N m/rad"),
+    Code("RSEA_FRICTION", "viscous or Coulomb friction of the gear changed", "change, N m s/rad or N m"),
+    Code("RSEA_BACKLASH", "play between gear and spring appeared or changed", "change of the gap, rad"),
+    Code("RSEA_DELAY", "commands take effect later, or sooner, than they did", "change, s"),
+    Code("RSEA_FT_GAIN", "calibration of the F/T sensor changed", "change of the gain, 1"),
+    Code("RSEA_FT_BIAS", "zero of the F/T sensor moved", "change, N m"),
+    Code("RSEA_TORQUE_CONSTANT", "the motor makes another torque of its current", "change of the gain, 1"),
+    Code("RSEA_UNEXPLAINED", "the joint changed, and no single cause of this table explains it", ""),
+    Code("RSEA_SENSOR_FROZEN", "a sensor repeats one value while something else moves", ""),
+    Code("RSEA_SENSOR_MISSING", "a sensor that the rig lists has sent nothing for a second", ""),
+    Code("RSEA_BAD_DATA", "values that are no numbers, stamps that go back or jump", ""),
+)  # fmt: skip
+NAMES = tuple(code.name for code in TABLE)

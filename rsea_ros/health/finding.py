@@ -1,0 +1,44 @@
+"""What health says of a joint: a code, what changed by how much, since when, how sure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rsea_ros.health.sensors import Sensors
+
+
+@dataclass(frozen=True)
+class Finding:
+    """code: of codes.TABLE. name: parameter or channel. size, ci95: change against the model, in `unit`; nan
+    where the code has no size. since: s, by the joint's stamps. confidence: probability, 0 to 1.
+    """
+
+    code: str
+    name: str
+    unit: str
+    size: float
+    ci95: tuple[float, float]
+    since: float
+    confidence: float
+
+
+UNEXPLAINED = "RSEA_UNEXPLAINED"
+
+
+def unexplained(since: float, share: float) -> Finding:
+    """Return the finding of a change without a name. share: of it that the best cause does not explain."""
+    return Finding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
+
+
+def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[Finding]:
+    """Return what is wrong with the sensors themselves. jumps: of the stamps. late: samples left out."""
+    found = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
+    found += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
+    counts = {"no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}
+    told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    return [*found, _plain("RSEA_BAD_DATA", told, math.nan)] if told else found
+
+
+def _plain(code: str, name: str, since: float) -> Finding:
+    return Finding(code, name, "", math.nan, (math.nan, math.nan), since, 1.0)

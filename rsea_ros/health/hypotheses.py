@@ -1,0 +1,110 @@
+"""What may change in a joint: for each parameter the model with another value, and what counts as changed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.model.rig import EffectSetting, Rig
+
+SURE = 1.96
+"""Standard deviations on either side of a 95 % interval."""
+EFFECT_DOUBT = 0.1
+"""Relative one-sigma doubt of an effect's parameter in a model.yaml, which states none."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One parameter of the joint. All numbers in its unit.
+
+    value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
+    alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
+    below which the data cannot show it, as a delay within a sample.
+    """
+
+    code: str
+    name: str
+    unit: str
+    value: float
+    doubt: float
+    least: float
+    step: float
+    low: float
+    high: float
+    apply: Callable[[Rig, float], Rig]
+    grain: float = 0.0
+
+    @property
+    def inner(self) -> float:
+        """Largest change that the doubt in the model allows."""
+        return SURE * self.doubt
+
+    @property
+    def outer(self) -> float:
+        """Smallest change that is to be alarmed."""
+        return self.inner + self.least
+
+    def changed(self, rig: Rig, change: float) -> Rig:
+        """Return the rig with the parameter changed, within its bounds."""
+        return self.apply(rig, min(max(self.value + change, self.low), self.high))
+
+
+def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
+    """Return what may change in a joint. period: s, between measurements."""
+    friction = _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5)
+    found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25), friction]
+    delay = _effect(rig, "command_delay", "delay", "RSEA_DELAY", 0.25, 0.5 * period, period)
+    found.append(replace(delay, grain=period))
+    found.append(_effect(rig, "torque_constant_error", "gain", "RSEA_TORQUE_CONSTANT", 0.0, 0.05, 0.05))
+    if not rig.rigid_spring:
+        found.append(_field(rig, "spring.stiffness", "RSEA_STIFFNESS", 0.05))
+        if rig.ft_end == "spring_end":
+            found.append(_effect(rig, "backlash", "gap", "RSEA_BACKLASH", 0.25, 1e-3, 2e-3))
+    if "ft" in rig.sensors and not rig.rigid_spring:
+        sigma = max(rig.sensors["ft"].noise, rig.sensors["ft"].quantum)
+        found.append(_effect(rig, "ft_gain_error", "gain", "RSEA_FT_GAIN", 0.0, 0.03, 0.05))
+        found.append(_effect(rig, "ft_bias", "bias", "RSEA_FT_BIAS", 0.0, 10.0 * sigma, 10.0 * sigma))
+    return tuple(h for h in found if h is not None)
+
+
+def _field(rig: Rig, name: str, code: str, part: float) -> Hypothesis | None:
+    """Return the hypothesis of a rig's value; part of it that is worth an alarm."""
+    value = rig[name]
+    if not value > 0.0 or math.isinf(value):
+        return None
+    return Hypothesis(
+        code, name, rig.unit(name), value, _doubt(rig, name), part * value, part * value, 0.02 * value,
+        50.0 * value, lambda rig, v: rig.with_values({name: v}),
+    )  # fmt: skip
+
+
+def _doubt(rig: Rig, name: str) -> float:
+    quantity = rig.quantities[name]
+    if quantity.ci95 is not None:
+        return (quantity.ci95[1] - quantity.ci95[0]) / (2.0 * SURE)
+    return 0.0 if name in rig.known else 0.5 * quantity.spread * quantity.value
+
+
+def _effect(
+    rig: Rig, name: str, parameter: str, code: str, part: float, least: float, step: float
+) -> Hypothesis:
+    """Return the hypothesis of an effect's parameter. part: of the model's value that is worth an alarm."""
+    effect = effect_named(name)
+    (which,) = (p for p in effect.parameters if p.name == parameter)
+    value = next((e.parameters[parameter] for e in rig.effects if e.name == name), which.null)
+    known = abs(value - which.null)
+    return Hypothesis(
+        code, f"{name}.{parameter}", which.unit, value, EFFECT_DOUBT * known, max(least, part * known),
+        max(step, part * known), which.low, which.high, lambda rig, v: _set(rig, name, parameter, v),
+    )  # fmt: skip
+
+
+def _set(rig: Rig, name: str, parameter: str, value: float) -> Rig:
+    """Return the rig with a parameter of an effect, which is added where the rig does not have it."""
+    others = [e for e in rig.effects if e.name != name]
+    mine = [e for e in rig.effects if e.name == name] or [EffectSetting(name, {})]
+    setting = replace(mine[0], parameters={**mine[0].parameters, parameter: value})
+    order: Sequence[EffectSetting] = [*others, setting]
+    return rig.with_effects(*order)

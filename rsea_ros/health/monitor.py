@@ -1,0 +1,113 @@
+"""The health of one joint from what its topics bring: looks at it, what they say, and its sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from rsea_ros.health.bank import Bank, Evidence
+from rsea_ros.health.changes import Answer, Changes
+from rsea_ros.health.estimates import Estimate
+from rsea_ros.health.finding import Finding, sensor_findings
+from rsea_ros.health.hypotheses import hypotheses_of
+from rsea_ros.health.look import FEWEST, Cutter, Look
+from rsea_ros.health.scatter import scatter_of
+from rsea_ros.health.sensors import Sensors
+from rsea_ros.health.settings import Settings
+from rsea_ros.model.observer.log import STATE
+from rsea_ros.model.observer.noise import Noise
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, IntArray
+
+JUMP = 1.0
+"""s. Stamps that jump so far, either way, are of another run or of a clock that was set: looks begin anew."""
+STILL = 30.0
+"""Standard deviations of the position within which a look moved nothing that could tell of the joint."""
+
+
+class Monitor:
+    """Take in events with `take`; when `job` is there, run it (seconds), then `conclude` with its result.
+
+    looks, still: looks that were judged, and that nothing moved. jumps: of the stamps. late: events left out.
+    """
+
+    def __init__(self, rig: Rig, noise: Noise, settings: Settings | None = None) -> None:
+        self._rig, self._noise, self._settings = rig, noise, settings or Settings()
+        self.sensors = Sensors(rig)
+        self._cutter = Cutter(self._settings.every)
+        self._bank: Bank | None = None
+        self._first: list[tuple[Look, Evidence]] = []
+        self.changes: Changes | None = None
+        self.looks = self.still = self.jumps = self.late = 0
+        self.now = -math.inf
+
+    def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
+        """Take in events (see Look), sorted by stamp; those before what was taken are counted and left out."""
+        if len(t) and math.isfinite(self.now) and abs(t[0] - self.now) > JUMP:
+            self.jumps += 1
+            self._cutter.clear()
+            self.sensors.begin()
+            self.now = -math.inf
+        new = t >= self.now
+        self.late += int(len(t) - new.sum())
+        t, kind, values = t[new], kind[new], values[new]
+        if not len(t):
+            return
+        self.now = float(t[-1])
+        self.sensors.take(t, kind, values)
+        closer = self.changes is None or self.changes.suspects
+        for look in self._cutter.take(t, kind, values, closer=closer):
+            self._judge(look)
+
+    @property
+    def learning(self) -> bool:
+        """Whether it does not know yet how the innovations scatter when all is right."""
+        return self.changes is None
+
+    @property
+    def job(self) -> Callable[[], Answer] | None:
+        """What must be computed before more can be said."""
+        return None if self.changes is None else self.changes.job
+
+    def conclude(self, answer: Answer) -> Finding | None:
+        """Take the result of the job; return the finding that is new, if one is."""
+        assert self.changes is not None
+        return self.changes.conclude(answer)
+
+    def findings(self) -> list[Finding]:
+        """Return what is wrong."""
+        changed = [] if self.changes is None else list(self.changes.found.values())
+        return [*changed, *sensor_findings(self.sensors, self.jumps, self.late)]
+
+    def estimates(self) -> list[Estimate]:
+        """Return all parameters; none while it learns."""
+        return [] if self.changes is None else self.changes.estimates.estimates()
+
+    def _judge(self, look: Look) -> None:
+        self.looks += 1
+        if self.sensors.frozen or look.travel() < STILL * self._noise.position:
+            self.still += 1
+            if self.changes is not None:
+                self.changes.estimates.hold()
+        elif self.changes is not None:
+            self.changes.take(look, self.changes.bank.judge(look))
+        else:
+            self._learn(look)
+
+    def _learn(self, look: Look) -> None:
+        """Gather the first looks; then begin, with what they showed."""
+        if self._bank is None:
+            t = look.t[look.kind == STATE]
+            period = float(np.median(np.diff(t))) if len(t) > FEWEST else 1e-3
+            self._hypotheses = hypotheses_of(self._rig, period)
+            self._bank = Bank(self._rig, self._noise, self._hypotheses, self._settings.hold)
+        self._first.append((look, self._bank.judge(look)))
+        if len(self._first) < self._settings.learn:
+            return
+        scatter = scatter_of([evidence for _, evidence in self._first])
+        self.changes = Changes(self._rig, self._noise, self._hypotheses, scatter, self._settings)
+        for first in self._first:
+            self.changes.take(*first)
+        self._first = []

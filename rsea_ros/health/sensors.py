@@ -1,0 +1,129 @@
+"""Sensors that have stopped, are missing or send what is no number; stamps that go back or jump."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rsea_ros.model.observer.log import COMMAND, FT, STATE
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, IntArray
+
+SAMPLES, TIME = 10, 0.05
+"""Equal values, and s of them, that are no chance while something else moves."""
+MOVED = 12.0
+"""Standard deviations of its own noise by which another sensor must have moved meanwhile."""
+SILENT = 1.0
+"""s without a sample after which a sensor is missing."""
+CHANNELS: Mapping[str, tuple[int, int]] = {"position": (STATE, 0), "motor_torque": (STATE, 1), "ft": (FT, 0)}
+
+WITNESSES: Mapping[str, tuple[str, ...]] = {
+    "position": ("ft", "command"), "motor_torque": ("command",), "ft": ("position", "command"),
+}  # fmt: skip
+"""What cannot move for long while a sensor stands still."""
+
+
+@dataclass
+class _Sensor:
+    last: float = math.nan
+    since: float = math.inf
+    count: int = 0
+    seen: float = -math.inf
+    frozen: float = math.nan
+    """s, since when; nan while it moves."""
+
+
+@dataclass
+class Sensors:
+    """What is wrong with the sensors of a rig just now. bad_values: samples that were no numbers."""
+
+    rig: Rig
+    bad_values: int = 0
+    _state: dict[str, _Sensor] = field(default_factory=dict)
+    _spans: dict[str, list[tuple[float, float, float]]] = field(default_factory=dict)
+    _begin: float = math.inf
+    _now: float = -math.inf
+
+    def __post_init__(self) -> None:
+        self._noise = {n: max(s.noise, s.quantum, 1e-12) for n, s in self.rig.sensors.items()}
+        self._noise["command"] = self._noise.get("motor_torque", self._noise.get("ft", 1e-3))
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was measured."""
+        self._begin, self._now, self._spans = math.inf, -math.inf, {}
+        self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
+
+    def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
+        """Take in events, sorted."""
+        if not len(t):
+            return
+        self._begin, self._now = min(self._begin, float(t[0])), float(t[-1])
+        self._note("command", t[kind == COMMAND], values[kind == COMMAND, 0])
+        for name, (of, column) in CHANNELS.items():
+            self._note(name, t[kind == of], values[kind == of, column])
+        for name, sensor in self._state.items():
+            of, column = CHANNELS[name]
+            self._follow(name, sensor, t[kind == of], values[kind == of, column])
+
+    @property
+    def frozen(self) -> dict[str, float]:
+        """Sensors that have stopped, and since when, s."""
+        return {name: s.frozen for name, s in self._state.items() if not math.isnan(s.frozen)}
+
+    @property
+    def missing(self) -> dict[str, float]:
+        """Sensors that send nothing, and since when, s."""
+        last = {n: max(s.seen, self._begin) for n, s in self._state.items()}
+        return {name: t for name, t in last.items() if self._now - t > SILENT}
+
+    def _note(self, name: str, t: FloatArray, y: FloatArray) -> None:
+        """Keep between which values a signal was, for as long as others may be compared with it."""
+        finite = y[np.isfinite(y)]
+        self.bad_values += len(y) - len(finite) if name in self._state and len(finite) else 0
+        spans = self._spans.setdefault(name, [])
+        if len(finite):
+            spans.append((float(t[0]), float(finite.min()), float(finite.max())))
+            del spans[:-40]
+
+    def _follow(self, name: str, sensor: _Sensor, t: FloatArray, y: FloatArray) -> None:
+        good = np.isfinite(y)
+        t, y = t[good], y[good]
+        if not len(y):
+            return
+        sensor.seen = float(t[-1])
+        changes = np.flatnonzero(np.diff(y, prepend=sensor.last) != 0.0)
+        if len(changes):
+            sensor.since, sensor.count = float(t[changes[-1]]), len(y) - int(changes[-1])
+            sensor.frozen = math.nan
+        else:
+            sensor.count += len(y)
+        sensor.last = float(y[-1])
+        long = sensor.count >= SAMPLES and sensor.seen - sensor.since >= TIME
+        if long and math.isnan(sensor.frozen) and self._others_moved(name, sensor.since):
+            sensor.frozen = sensor.since
+
+    def _others_moved(self, name: str, since: float) -> bool:
+        """Tell whether something else moved by more than its noise since an instant, s."""
+        for other in WITNESSES[name]:
+            later = [span for span in self._spans.get(other, []) if span[0] >= since]
+            moved = max((s[2] for s in later), default=0.0) - min((s[1] for s in later), default=0.0)
+            if moved > self._needed(name, other):
+                return True
+        return False
+
+    def _needed(self, name: str, other: str) -> float:
+        """Return by how much another signal must move so that this one had to, in the other's unit."""
+        beside = MOVED * self._noise.get(other, 0.0)
+        if name == "motor_torque" or other == "position":
+            return beside
+        stiffness = 0.0 if self.rig.rigid_spring else self.rig["spring.stiffness"]
+        torque = MOVED * stiffness * self._noise.get("position", 0.0)
+        return max(beside, torque if other == "ft" else torque + 3.0 * self._friction())
+
+    def _friction(self) -> float:
+        """Return a torque that may not move the joint at all, N m."""
+        return max((e.parameters.get("torque", 0.0) for e in self.rig.effects), default=0.0)

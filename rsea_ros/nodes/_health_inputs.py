@@ -1,0 +1,91 @@
+"""What the health node hears: all topics together, sorted by stamp, once they are complete."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.node import Node
+
+from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
+from rsea_ros.model.observer.log import COMMAND, FT, STATE
+from rsea_ros.nodes._commands import HORIZON
+from rsea_ros.nodes._cycle import SECOND
+from rsea_ros.nodes._mailbox import Mailbox
+from rsea_ros.nodes._qos import RECORD
+from rsea_ros.signals import FloatArray, IntArray
+
+LAG = SECOND // 10
+"""ns that one topic may come later than another and still be put in its place."""
+Events = tuple[FloatArray, IntArray, FloatArray]
+Keep = Callable[[str, str, int, bytes], None]
+
+
+class Inputs:
+    """Best-effort subscriptions that nothing waits for. keep: gets topic, type, arrival (ns) and bytes of all."""
+
+    def __init__(self, node: Node, axis: str, joint: str, keep: Keep) -> None:
+        self._sign, along = sign_and_index(axis)
+        self.epoch: int | None = None
+        self._newest = 0
+        self._waiting: list[tuple[int, int, float, float]] = []
+        self.refused = self.unstamped = 0
+        self.counts = {"torque_command": 0, "joint_states": 0, "ft": 0}
+
+        def mailbox(topic: str, kind: str, *fields: tuple[str, int]) -> Mailbox:
+            box = Mailbox(
+                node, kind, topic, RECORD, self._refuse, *fields, joint="" if topic == "ft" else joint,
+                keep=lambda at, raw: keep(box.subscription.topic_name, kind, at, raw),
+            )  # fmt: skip
+            return box
+
+        self._commands = mailbox("torque_command", JOINT_STATE, ("effort", 0))
+        self._states = mailbox("joint_states", JOINT_STATE, ("position", 0), ("effort", 0))
+        self._fts = mailbox("ft", WRENCH, ("wrench", along))
+
+    def take(self) -> Events:
+        """Return what has come and is complete: t (s since the first stamp), kind and values of a Look."""
+        states = [(t, STATE, q, u) for t, (q, u), _ in self._states.take()]
+        fts = [(t, FT, self._sign * y, math.nan) for t, (y,), _ in self._fts.take()]
+        commands = [(t, COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
+        for name, came in (("torque_command", commands), ("joint_states", states), ("ft", fts)):
+            self.counts[name] += len(came)
+        measured = states + fts
+        if measured:
+            newest = max(row[0] for row in measured)
+            if abs(newest - self._newest) > SECOND:
+                self._waiting.clear()
+            self._newest = newest
+        self._waiting += measured + [row for row in map(self._placed, commands) if row is not None]
+        self._waiting.sort()
+        return self._ready()
+
+    def _ready(self) -> Events:
+        """Return what is old enough, and keep the rest waiting."""
+        limit = self._newest - LAG
+        ready = [row for row in self._waiting if row[0] <= limit]
+        self._waiting = self._waiting[len(ready) :]
+        if ready and self.epoch is None:
+            self.epoch = ready[0][0]
+        stamps = np.array([row[0] - (self.epoch or 0) for row in ready], dtype=np.int64)
+        values = np.array([row[2:] for row in ready], dtype=np.float64).reshape(-1, 2)
+        return stamps / SECOND, np.array([row[1] for row in ready], dtype=np.int64), values
+
+    def stamp(self, t: float) -> int:
+        """Return the stamp of an instant, ns since 1970."""
+        return (self.epoch or 0) + round(t * SECOND)
+
+    def _placed(self, row: tuple[int, int, float, float]) -> tuple[int, int, float, float] | None:
+        """Return a command at the instant from which it counts; None for one that is no number."""
+        stamp, kind, torque, _ = row
+        if not math.isfinite(torque):
+            self._refuse()
+            return None
+        if stamp == 0 or (self._newest and abs(stamp - self._newest) > HORIZON):
+            self.unstamped += 1
+            stamp = self._newest
+        return stamp, kind, torque, math.nan
+
+    def _refuse(self) -> None:
+        self.refused += 1

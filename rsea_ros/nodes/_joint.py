@@ -1,0 +1,184 @@
+"""A joint of the driver: a device behind its limits, with topics, services and diagnostics of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters.ros import Trigger
+from rsea_ros.errors import RseaError
+from rsea_ros.hardware.device import Device, State
+from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.limits import Fault
+from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes._bench import Bench
+from rsea_ros.nodes._cycle import Cycle
+from rsea_ros.nodes._devices import limits_of, spring_of
+from rsea_ros.nodes._drive import Drive
+from rsea_ros.nodes._health import ERROR, OK, Health, Report
+from rsea_ros.nodes._jobs import Jobs
+
+LOST = {"failed_reads": "reads lost", "failed_writes": "writes lost"}
+Work = Callable[[], str]
+
+
+class Joint:
+    """values: parameters of this joint. part: its name beside others, under which all that it has is.
+
+    jobs: threads of services. drive, bench: there while the device is open.
+    """
+
+    def __init__(
+        self, node: Node, jobs: Jobs, part: str, values: Mapping[str, Any], device: Device
+    ) -> None:
+        self._node, self._jobs, self.part, self._values = node, jobs, part, values
+        self.guarded = Guarded(device, limits_of(values), values["rate"], spring_of(values))
+        self.drive: Drive | None = None
+        self.bench: Bench | None = None
+        self._cycle: Cycle | None = None
+        self._ended = ""
+        self._told: tuple[Fault | None, int] = (None, 0)
+        self._health = Health(node, self.report, part=part)
+        for name, work in (
+            ("zero_ft", self._zero_ft), ("clear_fault", self.clear_fault), ("reboot", self._reboot),
+            ("stop", self.stop),
+        ):  # fmt: skip
+            offer(node, jobs, f"{part}/{name}" if part else name, self._guard(work), self._health.publish)
+
+    def open(self, anchor: Anchor) -> None:
+        """Open the device and make its topics. Raises RseaError, OSError; nothing stays open then."""
+        values = self._values
+        self.guarded.open(unprotected=values["allow_no_dead_host_protection"])
+        self._ended = ""
+        self._health.hardware = _hardware(values, self.guarded.device.health())
+        self.bench = Bench(
+            self._node, values, strict=True, every_record=values["ft_all"], part=self.part,
+            deflects=self.guarded.measures_deflection(),
+        )  # fmt: skip
+        self.drive = Drive(self.guarded, self.bench, anchor, values["rate"])
+
+    def runs_in(self, cycle: Cycle) -> None:
+        """Note the cycle, whose times are told with this joint's health."""
+        self._cycle = cycle
+
+    def enable(self) -> None:
+        """Switch the torque on and let commands through, from the next one on. Raises DeviceError."""
+        assert self.drive is not None
+        with self.drive.deaf():
+            self.guarded.enable()
+
+    def close(self) -> None:
+        """Take the topics away; the device is closed already, or not open."""
+        if self.bench is not None:
+            self.bench.close()
+        self._cycle = self.bench = self.drive = None
+
+    def publish(self, state: State) -> None:
+        """Publish a reading."""
+        assert self.bench is not None and self.drive is not None
+        self.bench.publish(state, self.drive.anchor.shift)
+
+    def follow(self) -> None:
+        """Log and publish what has changed: a fault, commands that were cut down."""
+        fault, limited = now = self.guarded.fault, self.guarded.guard.limited
+        before, self._told = self._told, now
+        if fault is not None and fault != before[0]:
+            text = f"fault {fault}; torque zero until clear_fault or reboot"
+            self._node.get_logger().error(self.named(text))
+            self._health.publish()
+        if limited > before[1]:
+            limits = self.guarded.guard.limits
+            text = f"{limited} commands limited to {limits.torque:g} N m and {limits.slew:g} N m/s so far"
+            self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
+
+    def fail(self, error: Exception) -> None:
+        """Log and keep what has ended it."""
+        self._ended = " ".join(str(error).split())
+        self._node.get_logger().error(self.named(self._ended))
+
+    def named(self, text: str) -> str:
+        """Return a line of the log that says which joint it is about, where that is to be said."""
+        return f"{self.part}: {text}" if self.part else text
+
+    def clear_fault(self) -> str:
+        """End a fault whose cause is over. Raises DeviceError."""
+        assert self.drive is not None
+        if self.guarded.fault is None:
+            return "there is no fault; nothing was done"
+        with self.drive.deaf():
+            self.guarded.clear()
+        return "done"
+
+    def stop(self) -> str:
+        """End the torque until clear_fault."""
+        assert self.drive is not None
+        self.drive.stop()
+        return "torque zero until clear_fault"
+
+    def _zero_ft(self) -> str:
+        self.guarded.zero_ft()
+        return "done"
+
+    def _reboot(self) -> str:
+        assert self.drive is not None
+        with self.drive.deaf():
+            self.guarded.reboot()
+        return "done"
+
+    def _guard(self, work: Work) -> Work:
+        """Return work that is refused while there is no open device."""
+
+        def done() -> str:
+            if self.drive is None:
+                raise RseaError("the driver is not configured, expected it to be")
+            return work()
+
+        return done
+
+    def report(self) -> Report:
+        """Return its health."""
+        if self._cycle is None or self.bench is None:
+            return Report(ERROR if self._ended else OK, self._ended or "not configured", {})
+        self._cycle.rest()
+        fault, cycles = self.guarded.fault, self.guarded.cycles
+        lost = {words: cycles[name] for name, words in LOST.items()} if fault is None else {}
+        report = self.bench.report(self._cycle, lost)
+        values = {
+            "active": self.guarded.enabled,
+            "fault": fault or "none",
+            "dead_host_protection": self.guarded.device.protection,
+            "ft_source": self.guarded.ft_source,
+            "limited_commands": self.guarded.guard.limited,
+            **cycles,
+            **report.values,
+            **self.guarded.device.health(),
+        }
+        if fault is None:
+            return Report(report.level, report.summary, values)
+        besides = "" if report.level == OK else f"; {report.summary}"
+        return Report(ERROR, f"fault {fault}{besides}", values)
+
+
+def offer(node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], None]) -> None:
+    """Offer a service ~/NAME that does some work in a thread, and answers with the error where it fails."""
+
+    async def serve(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.success, response.message = True, f"{name}: {await jobs.do(work)}"
+        except RseaError as error:
+            response.success, response.message = False, f"{name}: {' '.join(str(error).split())}"
+        node.get_logger().info(response.message)
+        after()
+        return response
+
+    node.create_service(Trigger, f"~/{name}", serve, callback_group=jobs.group)
+
+
+def _hardware(values: Mapping[str, Any], health: Mapping[str, object]) -> str:
+    """Return what diagnostics are about: which motor where, or which simulation."""
+    if "motor" not in health:
+        return f"{values['device']} {values['rig']}"
+    sensor = f", F/T sensor at {values['ft_host']}" if values["ft_host"] else ""
+    return f"{health['motor']}, ID {values['id']} on {values['port']}{sensor}"

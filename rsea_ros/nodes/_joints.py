@@ -1,0 +1,57 @@
+"""Several joints of one driver: which they are, and the parameters of each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.nodes._parameters import Parameter
+
+JOINTS = Parameter(
+    "joints", [""], "names of several joints, each with topics and services under its name; [\"\"]: one",
+    whole=True,
+)  # fmt: skip
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def joint_table(table: Sequence[Parameter], given: Mapping[str, Any]) -> list[Parameter]:
+    """Return the parameters JOINT.NAME of each joint; what is not given for a joint is as for the node.
+
+    given: parameters of the node by name. Raises ParameterError for joints that cannot be.
+    """
+    if JOINTS not in table:
+        return []
+    return [
+        replace(p, name=f"{joint}.{p.name}", default=p.checked(given.get(p.name, p.default)))
+        for joint in joint_names(JOINTS.checked(given.get(JOINTS.name, JOINTS.default)))
+        for p in table
+        if not p.whole
+    ]
+
+
+def joint_names(joints: object) -> list[str]:
+    """Return the names of several joints; none where the driver has one. Raises ParameterError."""
+    names = [name for name in joints if name] if isinstance(joints, list) else []
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise ParameterError(f"parameter joints: {name!r}, expected letters, digits, _, first a letter")
+        if names.count(name) > 1:
+            raise ParameterError(f"parameter joints: {name} twice, expected each joint once")
+    return names
+
+
+def joint_values(values: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Return name and parameter values of each joint; one without a name where the driver has one."""
+    node = {name: value for name, value in values.items() if "." not in name}
+    names = joint_names(values[JOINTS.name])
+    if not names:
+        return [("", node)]
+    return [
+        (joint, node | {"joint": joint} | {
+            name: values[f"{joint}.{name}"] for name in node if f"{joint}.{name}" in values
+        })
+        for joint in names
+    ]  # fmt: skip

@@ -1,0 +1,138 @@
+"""The page of a joint: what to look at, each parameter over time, causes, the recordings that show it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+
+import numpy as np
+
+from rsea_ros.report.fleet.cause_figure import cause_figure, share_figure
+from rsea_ros.report.fleet.fleet_tables import alarm_table, parameter_rows, rows_of
+from rsea_ros.report.fleet.fleet_words import finding, sentence, short_day
+from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.fleet.parameter_figure import parameter_figure
+from rsea_ros.report.page import Block, folded, key_numbers, page, paragraph, section
+from rsea_ros.report.words import sentence as capital
+from rsea_ros.trends.alarms import Alarm
+from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.series import Table
+from rsea_ros.trends.weeks import Steps
+
+_LATEST = 100
+"""Recordings that the page lists: the latest."""
+_RARE = 0.02
+"""Share of the recordings below which a cause or a fault has no figure, unless it appeared."""
+_USUAL = 0.8
+"""Share from which a cause's size is drawn as a parameter."""
+
+
+def joint_page(
+    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+) -> str:
+    """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
+    rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
+    title = f"{joint}: {sentence(alarms[0])}" if alarms else f"{joint}: {_quiet(found, joint)}"
+    blocks = list(_blocks(joint, found, alarms, recordings, rows, steps, links))
+    footer = ["rsea fleet report. All values in SI, all times UTC."]
+    return page(title, f"Joint {joint} · {len(rows)} recordings", blocks, footer)
+
+
+def _blocks(
+    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray,
+    steps: Steps, links: Links,
+) -> Iterator[Block]:  # fmt: skip
+    trends = [t for (j, _), t in found.trends.items() if j == joint]
+    yield '<p class="next"><a href="index.html">All joints</a></p>'
+    yield key_numbers(_keys(trends, recordings, rows))
+    if alarms:
+        yield section("What to look at", alarm_table(alarms, links, with_joint=False))
+    yield from _pictures(joint, trends, found, steps)
+    yield section("All parameters", parameter_rows(trends))
+    yield folded("The latest recordings", _recordings(recordings, rows, links))
+
+
+def _pictures(joint: str, trends: Sequence[Trend], found: FleetTrends, steps: Steps) -> Iterator[Block]:
+    """Yield what moved and what appeared, then what is steady, what is usual, and what cannot be told."""
+    sized = [t for (j, p), t in found.sizes.items() if j == joint and _is_usual(p, joint, found)]
+    moved = [t for t in (*trends, *sized) if t.state in ("trending", "changed")]
+    yield from (parameter_figure(t, steps) for t in sorted(moved, key=lambda t: -_size(t)))
+    yield from _namings(joint, found, steps, appeared=True)
+    yield from (parameter_figure(t, steps) for t in (*trends, *sized) if t.state == "steady")
+    yield from _namings(joint, found, steps, appeared=False)
+    untold = [t for t in trends if t.state == "untold"]
+    yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in untold)
+
+
+def _size(trend: Trend) -> float:
+    return abs(trend.relative) if trend.relative == trend.relative else 0.0
+
+
+def _is_usual(parameter: str, joint: str, found: FleetTrends) -> bool:
+    """Return whether nearly every recording names a cause: its size is a parameter like any other then."""
+    cause = parameter.partition(".")[0]
+    return any(n.joint == joint and n.about == cause and np.mean(n.named) > _USUAL for n in found.namings)
+
+
+def _namings(joint: str, found: FleetTrends, steps: Steps, appeared: bool) -> Iterator[Block]:
+    appearances = {(a.joint, a.about, a.kind): a for a in found.appearances}
+    for naming in sorted((n for n in found.namings if n.joint == joint), key=lambda n: n.kind):
+        appearance = appearances.get((joint, naming.about, naming.kind))
+        share = np.mean(naming.named)
+        if (appearance is not None) != appeared or (appearance is None and not _RARE <= share <= _USUAL):
+            continue
+        yield (
+            cause_figure(naming, appearance, steps)
+            if _has_size(naming)
+            else share_figure(naming, appearance, steps)
+        )
+
+
+def _has_size(naming: Naming) -> bool:
+    return naming.size is not None and bool(np.any(np.isfinite(naming.size)))
+
+
+def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray) -> list[tuple[str, str]]:
+    told = sum(t.state != "untold" for t in trends)
+    done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
+    faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
+    return [
+        (f"{told} of {len(trends)}", "parameters that the recordings tell"),
+        (str(done), f"recordings used, of {len(rows)}"),
+        (str(faulty), "recordings with faults in the data"),
+    ]
+
+
+def _quiet(found: FleetTrends, joint: str) -> str:
+    trends = [t for (j, _), t in found.trends.items() if j == joint]
+    told = [t for t in trends if t.state != "untold"]
+    return (
+        f"steady in all {len(told)} parameters that its recordings tell"
+        if told
+        else "its recordings tell nothing yet"
+    )
+
+
+def _recordings(recordings: Table, rows: np.ndarray, links: Links) -> str:
+    head = [("Recording", False), ("Date", False), ("Outcome", False), ("Verdict", False), ("Causes", False),
+            ("Faults", False)]  # fmt: skip
+    time_s = np.asarray(recordings["time_s"], float)
+    latest = rows[np.argsort(-np.nan_to_num(time_s[rows]), kind="stable")][:_LATEST]
+    body = [
+        (
+            links.recording(str(recordings["recording"][i]), str(recordings["artefacts"][i])),
+            short_day(time_s[i]) if np.isfinite(time_s[i]) else "unknown",
+            escape(str(recordings["outcome"][i])),
+            escape(str(recordings["verdict"][i]).replace("_", " ")),
+            escape(_names(recordings["causes"][i], "name")) or "–",
+            escape(_names(recordings["faults"][i], "kind")) or "–",
+        )
+        for i in latest
+    ]
+    return rows_of(head, body)
+
+
+def _names(items: object, key: str) -> str:
+    listed = items if isinstance(items, (list, tuple, np.ndarray)) else []
+    return ", ".join(str(i[key] if isinstance(i, dict) else i).replace("_", " ") for i in listed)

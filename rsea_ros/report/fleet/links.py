@@ -1,0 +1,50 @@
+"""Where pages and results lie, seen from a page."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+_RESULTS = ("report.html", "diagnosis.json", "identification.json")
+"""What shows a recording's diagnosis best, in this order."""
+
+
+@dataclass(frozen=True)
+class Links:
+    """out: folder of the pages. store: folder that the paths of artefacts start from. pages: by joint."""
+
+    out: Path
+    store: Path
+    pages: dict[str, str]
+
+    def joint(self, name: str) -> str:
+        """Return a link to a joint's page."""
+        return _link(self.pages[name], name) if name in self.pages else escape(name)
+
+    def recording(self, name: str, artefacts: str) -> str:
+        """Return a link to the results of a recording; its plain name where it left none."""
+        if not artefacts:
+            return escape(name)
+        folder = self.store / artefacts
+        best = next((folder / f for f in _RESULTS if (folder / f).exists()), folder)
+        return _link(Path(os.path.relpath(best, self.out)).as_posix(), name)
+
+
+def _link(target: str, text: str) -> str:
+    return f'<a href="{escape(quote(target))}">{escape(text)}</a>'
+
+
+def page_names(joints: tuple[str, ...]) -> dict[str, str]:
+    """Return the file name of each joint's page: letters, digits, - and _ stay, and no two are alike."""
+    names: dict[str, str] = {}
+    for joint in joints:
+        plain = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in joint)[:80]
+        number, name = 1, f"joint-{plain}.html"
+        while name.lower() in {n.lower() for n in names.values()}:
+            number += 1
+            name = f"joint-{plain}-{number}.html"
+        names[joint] = name
+    return names

@@ -1,0 +1,8 @@
+"""The course of a fleet's joints over months: fleet_trends.py is the door, alarms.py what to act on."""
+
+from rsea_ros.trends.alarms import Alarm, alarms, alarms_of
+from rsea_ros.trends.fleet_trends import fleet_trends
+from rsea_ros.trends.result import FleetTrends
+from rsea_ros.trends.settings import TrendSettings
+
+__all__ = ["Alarm", "FleetTrends", "TrendSettings", "alarms", "alarms_of", "fleet_trends"]

@@ -1,0 +1,115 @@
+"""Alarms: what somebody should look at, each with a key that stays the same from look to look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rsea_ros.trends.fleet_trends import fleet_trends
+from rsea_ros.trends.result import Appearance, Change, FleetTrends, Interval, Outlier, Trend
+from rsea_ros.trends.series import Table
+from rsea_ros.trends.settings import DEFAULT, TrendSettings
+
+Kind = Literal["change", "trend", "outlier", "cause", "fault"]
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """A finding of a joint.
+
+    key: the same at every look at a growing history, for as long as it is the same thing. about: parameter,
+    cause or fault. since_s: POSIX s, with earliest_s and latest_s; NaN for an outlier. size: in `unit`,
+    change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
+    the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
+    the first recording that shows it. share: of the days since then that name a cause or a fault.
+    """
+
+    key: str
+    joint: str
+    about: str
+    kind: Kind
+    since_s: float
+    earliest_s: float
+    latest_s: float
+    size: Interval | None
+    unit: str
+    relative: float
+    confidence: float
+    recording: str
+    artefacts: str
+    share: float = 1.0
+
+
+def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> tuple[Alarm, ...]:
+    """Return the alarms of a fleet, joint by joint, the surest first.
+
+    history, recordings: as of fleet_trends. Raises ParameterError for a table without its columns.
+    """
+    return alarms_of(fleet_trends(history, recordings, settings), recordings)
+
+
+def alarms_of(found: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
+    """Return the alarms of what is known of a fleet's course."""
+    appeared = {(a.joint, a.about) for a in found.appearances if a.kind == "cause"}
+    made = [_of_appearance(a, recordings) for a in found.appearances]
+    for trend in found.trends.values():
+        made += _of_trend(trend)
+    for (joint, name), trend in found.sizes.items():
+        if (joint, name.split(".")[0]) not in appeared:
+            made += _of_trend(trend)
+    changed = {(a.joint, a.about) for a in made}
+    made += [_of_outlier(o) for o in found.outliers if (o.joint, o.parameter) not in changed]
+    return tuple(sorted(made, key=lambda a: (a.joint, -a.confidence, a.key)))
+
+
+def runs(changes: tuple[Change, ...]) -> list[list[Change]]:
+    """Return the changes in runs of one direction: wear that is seen as steps first is a ramp later."""
+    out: list[list[Change]] = []
+    for change in changes:
+        same = out and (out[-1][-1].size.value > 0.0) == (change.size.value > 0.0)
+        out[-1].append(change) if same else out.append([change])
+    return out
+
+
+def _of_trend(trend: Trend) -> Iterator[Alarm]:
+    """Yield one alarm for each run of changes; the last is a trend where it goes on."""
+    s, every = trend.series, runs(trend.changes)
+    level = trend.first.value if trend.first is not None else float("nan")
+    for number, run in enumerate(every, 1):
+        total = _together([c.size for c in run])
+        way = "higher" if total.value > 0.0 else "lower"
+        goes_on = trend.state == "trending" and number == len(every) and run[-1].kind == "ramp"
+        row = run[0].row
+        yield Alarm(
+            f"{s.joint}/{s.parameter}/{way}/{number}", s.joint, s.parameter, "trend" if goes_on else "change",
+            run[0].since_s, run[0].earliest_s, run[0].latest_s, total, s.unit,
+            total.value / abs(level) if level else float("nan"), 1.0 - trend.q,
+            str(s.recording[row]), str(s.artefacts[row]),
+        )  # fmt: skip
+        level += total.value
+
+
+def _together(sizes: list[Interval]) -> Interval:
+    value = sum(s.value for s in sizes)
+    half = 0.5 * float(np.sqrt(sum((s.high - s.low) ** 2 for s in sizes)))
+    return Interval(value, value - half, value + half)
+
+
+def _of_appearance(a: Appearance, recordings: Table) -> Alarm:
+    return Alarm(
+        f"{a.joint}/{a.about}/{a.kind}", a.joint, a.about, a.kind, a.since_s, a.earliest_s, a.latest_s,
+        a.size, a.unit, float("nan"), 1.0 - a.q, str(recordings["recording"][a.row]),
+        str(recordings["artefacts"][a.row]), a.share,
+    )  # fmt: skip
+
+
+def _of_outlier(o: Outlier) -> Alarm:
+    nan = float("nan")
+    size = Interval(*(v - o.fleet for v in o.now))
+    return Alarm(
+        f"{o.joint}/{o.parameter}/outlier", o.joint, o.parameter, "outlier", nan, nan, nan, size, o.unit,
+        size.value / abs(o.fleet) if o.fleet else nan, 1.0 - o.q, "", "",
+    )  # fmt: skip

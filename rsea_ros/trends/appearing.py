@@ -1,0 +1,144 @@
+"""From which day on a cause or a fault is named: a likelihood ratio over all days."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.result import Appearance, Interval
+from rsea_ros.trends.settings import DAY, TrendSettings
+from rsea_ros.trends.significance import adjusted
+
+_MOSTLY, _RARELY = 0.5, 0.25
+"""Share of the days that name what a joint always had, at least, and in its fleet, at most."""
+_SURE = 0.98
+"""Highest share of days that is assumed to name anything: a diagnosis may miss."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The days of a naming: mean time (days since 1970) and whether most recordings name it, shape (n,).
+
+    ratio: log likelihood of `named more often from this day on` over `as often as before`, shape (n,).
+    always: that of `named all the time` over `as often as in the fleet`.
+    """
+
+    naming: Naming
+    t: FloatArray
+    named: FloatArray
+    ratio: FloatArray
+    always: float
+    p: float
+
+
+def appearances(found: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
+    """Return what appeared, or was in one joint from the first and not in the fleet.
+
+    joints: how many the fleet has. p values are bounded by the number of days times exp(-ratio).
+    """
+    usual = _usual(found, joints, settings)
+    scans = [_scan(n, usual[n.kind, n.about], settings) for n in found]
+    q = adjusted(np.array([s.p for s in scans]))
+    sure = [_appeared(s, float(rate), settings) for s, rate in zip(scans, q, strict=True)]
+    return tuple(a for a in sure if a is not None)
+
+
+def _usual(found: Sequence[Naming], joints: int, settings: TrendSettings) -> dict[tuple[str, str], float]:
+    """Return by kind and name the share of recordings that name it in the median joint."""
+    shares: dict[tuple[str, str], list[float]] = {}
+    for n in found:
+        shares.setdefault((n.kind, n.about), []).append(float(np.mean(n.named)))
+    lacking = {key: [0.0] * (joints - len(values)) for key, values in shares.items()}
+    alone = joints < settings.fewest_joints
+    return {
+        key: settings.background
+        if alone
+        else max(settings.background, float(np.median(values + lacking[key])))
+        for key, values in shares.items()
+    }
+
+
+def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
+    day = np.floor(n.time_s / DAY)
+    starts = np.flatnonzero(np.diff(day, prepend=-np.inf))
+    count = np.diff([*starts, len(day)])
+    named = (np.add.reduceat(n.named.astype(float), starts) / count >= 0.5).astype(float)
+    t = np.add.reduceat(n.time_s, starts) / count / DAY
+    ratio = _ratios(named, min(usual, _SURE))
+    later = np.cumsum(named[::-1])[::-1]
+    ratio[later < settings.fewest_named] = 0.0
+    always = _always(named, usual) if np.sum(named) >= settings.fewest_named else 0.0
+    most = max(float(np.max(ratio, initial=0.0)), always)
+    return Scan(n, t, named, ratio, always, float(min(1.0, len(t) * np.exp(-most))))
+
+
+def _always(named: FloatArray, usual: float) -> float:
+    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 if not clear."""
+    share = float(np.mean(named))
+    if share < _MOSTLY or usual > _RARELY:
+        return 0.0
+    return float(
+        _likelihood(np.sum(named), len(named), share) - _likelihood(np.sum(named), len(named), usual)
+    )
+
+
+def _ratios(named: FloatArray, usual: float) -> FloatArray:
+    """Return the log likelihood ratio of more naming from each day on, 0 where it is not more, shape (n,)."""
+    n = len(named)
+    before_n, before = np.arange(n, dtype=float), np.cumsum(named) - named
+    after_n, after = n - before_n, np.sum(named) - before
+    share = np.clip(after / after_n, 1e-9, _SURE)
+    earlier = np.maximum(before / np.maximum(before_n, 1.0), usual)
+    whole = max(float(np.mean(named)), usual) if n else usual
+    split = _likelihood(after, after_n, share) + _likelihood(before, before_n, earlier)
+    ratio: FloatArray = split - _likelihood(float(np.sum(named)), float(n), whole)
+    return np.where(share > earlier, np.maximum(ratio, 0.0), 0.0)
+
+
+def _likelihood(k: FloatArray | float, n: FloatArray | float, p: FloatArray | float) -> FloatArray:
+    """Return the log likelihood of k days of n that name it, each with probability p."""
+    q = np.clip(p, 1e-9, _SURE)
+    value: FloatArray = k * np.log(q) + (n - k) * np.log(1.0 - q)
+    return value
+
+
+def _appeared(scan: Scan, q: float, settings: TrendSettings) -> Appearance | None:
+    if q > settings.false_discovery or not len(scan.t):
+        return None
+    n, t = scan.naming, scan.t
+    from_first = float(np.max(scan.ratio)) < np.log(len(t) / settings.false_discovery)
+    best = 0 if from_first else int(np.argmax(scan.ratio))
+    first = best + int(np.argmax(scan.named[best:] > 0.0))
+    earliest, since, latest = (t[first],) * 3 if from_first else _dates(scan, best, first, settings)
+    row = int(n.row[np.flatnonzero((n.time_s >= np.floor(t[first]) * DAY) & n.named)[0]])
+    return Appearance(
+        n.joint, n.about, n.kind, since * DAY, earliest * DAY, latest * DAY, from_first,
+        float(np.mean(scan.named[first:])), q, row, n.parameter, n.unit, _size_now(n), n.limit, n.status,
+    )  # fmt: skip
+
+
+def _dates(scan: Scan, best: int, first: int, settings: TrendSettings) -> tuple[float, float, float]:
+    """Return the earliest, the likeliest and the latest beginning, days since 1970."""
+    t = scan.t
+    likely = np.flatnonzero(scan.ratio >= scan.ratio[best] - 0.5 * settings.date_doubt)
+    since = 0.5 * float(t[max(0, first - 1)] + t[first])
+    earliest = float(t[max(0, int(likely[0]) - 1)])
+    return min(earliest, since), since, max(float(t[likely[-1]]), since)
+
+
+def _size_now(n: Naming, last: int = 9) -> Interval | None:
+    """Return the median of a cause's last sizes, with the interval of their scatter and their own doubt."""
+    if n.size is None or n.sd is None:
+        return None
+    usable = np.flatnonzero(n.named & np.isfinite(n.size))[-last:]
+    if not len(usable):
+        return None
+    size, sd = n.size[usable], n.sd[usable]
+    middle = float(np.median(size))
+    spread = 1.4826 * float(np.median(np.abs(size - middle)))
+    half = 1.96 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
+    return Interval(middle, middle - half, middle + half)

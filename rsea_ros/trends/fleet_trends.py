@@ -1,0 +1,99 @@
+"""The course of every parameter of every joint, and what of it is more than noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.trends.appearing import appearances
+from rsea_ros.trends.causes import namings, size_series, temperatures
+from rsea_ros.trends.day_effect import DayEffect, day_effect
+from rsea_ros.trends.days import Days, day_means
+from rsea_ros.trends.outliers import outliers
+from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.search import Tested, described, tested
+from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_columns
+from rsea_ros.trends.settings import DEFAULT, TrendSettings
+from rsea_ros.trends.significance import adjusted
+from rsea_ros.trends.temperature import fleet_prior
+from rsea_ros.trends.told import trend_of
+
+Key = tuple[str, str]
+
+
+def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> FleetTrends:
+    """Return what is known of a fleet's course.
+
+    history: a row for each joint, recording and parameter, columns series.HISTORY; recordings: a row for each
+    joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.
+    """
+    check_columns(recordings, RECORDINGS, "recordings")
+    found, own = list(namings(recordings)), list(all_series(history))
+    warm = temperatures(history, recordings)
+    sized = [s for n in found if n.kind == "cause" and (s := size_series(n, recordings, warm)) is not None]
+    trends, priors = _trends([*own, *sized], settings)
+    mine = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in own}
+    others = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
+    joints = len({n.joint for n in found} | {s.joint for s in own})
+    return FleetTrends(
+        mine,
+        others,
+        tuple(found),
+        appearances(found, joints, settings),
+        outliers(mine.values(), settings),
+        settings.false_discovery,
+        sum(t.state != "untold" for t in trends.values()),
+        priors,
+    )
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    series: Series
+    days: Days
+    effect: DayEffect
+
+
+def _trends(
+    all_of: Sequence[Series], settings: TrendSettings
+) -> tuple[dict[Key, Trend], dict[str, tuple[float, float]]]:
+    """Return the trend of each series, and the temperature slope of each parameter over the fleet."""
+    ready, out = [], {}
+    for series in all_of:
+        days = day_means(series, settings)
+        if len(days.t) < settings.fewest_days:
+            out[series.joint, series.parameter] = _untold(series, len(days.t), settings)
+            continue
+        ready.append(_Prepared(series, days, day_effect(days, settings)))
+    priors = {name: fleet_prior([r.effect for r in group]) for name, group in _by_parameter(ready).items()}
+    tests = [tested(r.days, r.effect, priors[r.series.parameter], settings) for r in ready]
+    rates = adjusted(np.array([t.p for t in tests]))
+    for r, test, q in zip(ready, tests, rates, strict=True):
+        out[r.series.joint, r.series.parameter] = _trend(r.series, test, float(q), settings)
+    warm = {n: p for n, p in priors.items() if any(r.days.warmth is not None for r in _of(ready, n))}
+    return out, warm
+
+
+def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> Trend:
+    course = described(test, settings) if q <= settings.false_discovery else test.course
+    return trend_of(series, test, course, q, settings)
+
+
+def _untold(series: Series, days: int, settings: TrendSettings) -> Trend:
+    many = len(series.told)
+    told = f"{int(np.sum(series.told))} of {many} recordings could tell it, on {days} days"
+    reason = f"{told}; {settings.fewest_days} days are needed"
+    return Trend(series, "untold", days, reason=reason)
+
+
+def _by_parameter(ready: Iterable[_Prepared]) -> Mapping[str, list[_Prepared]]:
+    groups: dict[str, list[_Prepared]] = {}
+    for r in ready:
+        groups.setdefault(r.series.parameter, []).append(r)
+    return groups
+
+
+def _of(ready: Iterable[_Prepared], parameter: str) -> list[_Prepared]:
+    return [r for r in ready if r.series.parameter == parameter]

@@ -1,0 +1,171 @@
+"""What is known of a joint's parameter over time, as values; pages and alarms are made from these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+from rsea_ros.trends.causes import Naming
+from rsea_ros.trends.series import Series
+from rsea_ros.trends.settings import DAY
+
+State = Literal["steady", "changed", "trending", "untold"]
+"""untold: the recordings do not excite the parameter enough to say anything of its course."""
+
+
+_MANY, _LONG = 10, 28 * DAY
+"""Recordings, and s, that make silence."""
+
+
+class Interval(NamedTuple):
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def times(self, factor: float) -> Interval:
+        """Return the interval in another unit."""
+        ends = sorted((self.low * factor, self.high * factor))
+        return Interval(float(self.value * factor), float(ends[0]), float(ends[1]))
+
+
+@dataclass(frozen=True)
+class Change:
+    """A step, or a ramp, which changes by `size` from `since_s` until it ends or the recordings do.
+
+    since_s: POSIX s, with the earliest and the latest at which it may have begun. size: in the parameter's
+    unit. open_start: it began before the first recording. recording: place of the first row that shows it.
+    """
+
+    kind: Literal["step", "ramp"]
+    since_s: float
+    earliest_s: float
+    latest_s: float
+    size: Interval
+    open_start: bool = False
+    row: int = 0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What the parameter did, without temperature and day effects: POSIX s and the unit, each shape (n,)."""
+
+    time_s: FloatArray
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+@dataclass(frozen=True)
+class Trend:
+    """A series and what is known of its course. All values in the parameter's unit.
+
+    first, now: level at the first and the last day, at the mean temperature. per_year: slope of the last
+    piece. per_kelvin: of the temperature, relative to the level, per K; None where it is not logged. day_sd:
+    of the day effect. detectable: the least step in mid-series that these recordings would show. q: false
+    discovery rate at which the series is more than noise. by_day: means of the days at the mean temperature,
+    with the recordings' own intervals. to_limit_s: POSIX s at which `limit` is reached.
+    told_days: days with an estimate. reason: of a series that is untold.
+    """
+
+    series: Series
+    state: State
+    told_days: int
+    q: float = 1.0
+    first: Interval | None = None
+    now: Interval | None = None
+    per_year: Interval | None = None
+    per_kelvin: Interval | None = None
+    day_sd: float = 0.0
+    detectable: float = float("nan")
+    changes: tuple[Change, ...] = ()
+    curve: Curve | None = None
+    by_day: Curve | None = None
+    limit: float = float("nan")
+    to_limit_s: Interval | None = None
+    reason: str = ""
+
+    @property
+    def silent_since_s(self) -> float:
+        """Return since when many recordings could not tell the parameter, POSIX s; NaN where they can."""
+        told = self.series.time_s[self.series.told]
+        last = float(told[-1]) if len(told) else -np.inf
+        later = self.series.time_s[self.series.time_s > last]
+        long = len(later) >= _MANY and float(later[-1]) - last > _LONG
+        return last if long and np.isfinite(last) else float("nan")
+
+    @property
+    def relative(self) -> float:
+        """Return the change from the first level to the last, relative to the first; NaN where untold."""
+        if self.first is None or self.now is None or not self.first.value:
+            return float("nan")
+        return self.now.value / self.first.value - 1.0
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """A cause or a fault of the data that a joint's recordings name from some day on, or from the first.
+
+    about: its name. share: of the days since then that name it. size: of the cause by its main parameter.
+    q: false discovery rate. row: place of the first of the recordings that name it. limit: size below which
+    it would not have been named (detection limit), NaN where unknown.
+    """
+
+    joint: str
+    about: str
+    kind: Literal["cause", "fault"]
+    since_s: float
+    earliest_s: float
+    latest_s: float
+    from_first: bool
+    share: float
+    q: float
+    row: int
+    parameter: str = ""
+    unit: str = ""
+    size: Interval | None = None
+    limit: float = float("nan")
+    status: str = ""
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A joint whose parameter is unlike that of the others. score: robust, in standard deviations."""
+
+    joint: str
+    parameter: str
+    unit: str
+    now: Interval
+    fleet: float
+    score: float
+    q: float
+
+
+@dataclass(frozen=True)
+class FleetTrends:
+    """All that is known of a fleet's course.
+
+    trends: by joint and parameter, in the order of the history. sizes: of causes by joint and
+    `cause.parameter`, from the recordings that name them. namings: which recordings name a cause or a fault.
+    false_discovery: rate that the findings keep, over `tests` tests. per_kelvin: mean and sd of each
+    parameter's temperature slope over the joints, relative.
+    """
+
+    trends: Mapping[tuple[str, str], Trend]
+    sizes: Mapping[tuple[str, str], Trend]
+    namings: tuple[Naming, ...]
+    appearances: tuple[Appearance, ...]
+    outliers: tuple[Outlier, ...]
+    false_discovery: float
+    tests: int
+    per_kelvin: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Return the names of the joints, in order."""
+        return tuple(dict.fromkeys(joint for joint, _ in self.trends))

@@ -1,0 +1,86 @@
+"""Series in weeks, or in longer steps where they are long, for pictures of thousands of recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+from rsea_ros.trends.result import Trend
+from rsea_ros.trends.series import BoolArray
+from rsea_ros.trends.settings import DAY
+
+_Z = 1.959964
+_WEEK, _MOST = 7.0, 110
+"""Days; steps of a picture: more are no longer told apart."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Equal steps of time. edges: POSIX s, shape (n + 1,)."""
+
+    edges: FloatArray
+
+    @property
+    def days(self) -> float:
+        """Return how long a step is."""
+        return float(self.edges[1] - self.edges[0]) / DAY
+
+    @property
+    def middle(self) -> FloatArray:
+        """Return the middle of each step, POSIX s, shape (n,)."""
+        return 0.5 * (self.edges[1:] + self.edges[:-1])
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    def place(self, time_s: FloatArray) -> np.ndarray:
+        """Return the step that each time lies in."""
+        places = np.searchsorted(self.edges, time_s, side="right") - 1
+        return np.clip(places, 0, len(self) - 1)
+
+    def count(self, time_s: FloatArray) -> np.ndarray:
+        """Return how many times lie in each step, shape (n,)."""
+        return np.bincount(self.place(time_s), minlength=len(self))
+
+
+@dataclass(frozen=True)
+class Binned:
+    """Means of a parameter by step, NaN where no recording told it, each shape (n,).
+
+    low, high: 95 % interval, day effects included. told, asked: recordings that told it, and all of them.
+    """
+
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+    told: np.ndarray
+    asked: np.ndarray
+
+
+def steps_over(first_s: float, last_s: float) -> Steps:
+    """Return steps of whole weeks, from Monday on, that hold both times; few enough for a picture."""
+    day = np.floor(first_s / DAY)
+    monday = day - (day + 3.0) % _WEEK
+    weeks = max(1, int(np.floor((last_s / DAY - monday) / _WEEK)) + 1)
+    length = -(-weeks // _MOST)
+    count = -(-weeks // length)
+    return Steps((monday + _WEEK * length * np.arange(count + 1)) * DAY)
+
+
+def binned(trend: Trend, steps: Steps) -> Binned:
+    """Return a trend's days at the mean temperature, averaged by step with their weights."""
+    s, n = trend.series, len(steps)
+    told, asked = steps.count(s.time_s[s.told]), steps.count(s.time_s)
+    empty = np.full(n, np.nan)
+    if trend.by_day is None or not len(trend.by_day.time_s):
+        return Binned(empty, empty, empty, told, asked)
+    d, place = trend.by_day, steps.place(trend.by_day.time_s)
+    w = 1.0 / (((d.high - d.low) / (2.0 * _Z)) ** 2 + trend.day_sd**2)
+    total = np.bincount(place, w, n)
+    some: BoolArray = total > 0.0
+    safe = np.where(some, total, 1.0)
+    value = np.where(some, np.bincount(place, w * d.value, n) / safe, np.nan)
+    half = np.where(some, _Z / np.sqrt(safe), np.nan)
+    return Binned(value, value - half, value + half, told, asked)

@@ -1,0 +1,45 @@
+"""What goes over the wire: a frame for each batch of samples."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from rsea_ros.watch.decimation import Samples, extremes
+
+CHANNELS = ("command", "motor", "ft", "proximal", "distal", "disturbance", "deflection")
+"""Torques N m, deflection rad."""
+
+
+class Source(Protocol):
+    """Where the page's numbers come from; asked by one thread, never waited for.
+
+    flag: whether the actuator is a pure torque source, None: unknown.
+    """
+
+    flag: bool | None
+
+    def take(self) -> Mapping[str, Samples]:
+        """Return the samples of CHANNELS that have come since the last call: s since the start, value."""
+
+    def state(self) -> Mapping[str, Any]:
+        """Return what changes seldom: flag, health, rates, limits."""
+
+
+def frame(batch: Mapping[str, Samples], flag: bool | None) -> str | None:
+    """Return a frame as JSON, None when nothing has come.
+
+    {"t0": s, "pure": true, "ft": [ms, value, ms, value], …}: the extremes of each channel, in order.
+    """
+    kept = {name: extremes(samples) for name, samples in batch.items()}
+    firsts = [samples[0][0] for samples in kept.values() if samples]
+    if not firsts:
+        return None
+    begin = min(firsts)
+    rows = {name: _flat(samples, begin) for name, samples in kept.items() if samples}
+    return json.dumps({"t0": round(begin, 4), "pure": flag, **rows}, separators=(",", ":"))
+
+
+def _flat(samples: Samples, begin: float) -> Sequence[float]:
+    return [x for t, v in samples for x in (round(1e3 * (t - begin), 1), float(f"{v:.6g}"))]

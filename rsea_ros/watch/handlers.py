@@ -1,0 +1,137 @@
+"""The addresses of the server: the page, its parts, its socket, and the reports. Each asks for the token."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tornado.web import HTTPError, RequestHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
+
+from rsea_ros.watch.access import HEADERS, PAGE_POLICY, REPORT_POLICY, Access, same_origin
+from rsea_ros.watch.desk import Desk
+from rsea_ros.watch.runs import Runs
+
+PARTS = Path(__file__).parent / "page"
+KINDS = {"watch.css": "text/css", "watch.js": "text/javascript", "plot.js": "text/javascript"}
+
+
+def routes(access: Access, desk: Desk, runs: Runs) -> Sequence[Any]:
+    """Return what an Application serves."""
+    return [
+        (r"/", Front, {"access": access}),
+        (r"/(watch\.css|watch\.js|plot\.js)", Part, {"access": access}),
+        (r"/socket", Socket, {"access": access, "desk": desk}),
+        (r"/report/([\w.-]+)/(\w+)", Report, {"access": access, "runs": runs}),
+    ]
+
+
+class Guarded(RequestHandler):
+    """Answers only who has the token, by cookie."""
+
+    def initialize(self, access: Access, **more: Any) -> None:
+        """Keep what routes() gives."""
+        self.access = access
+        for name, value in more.items():
+            setattr(self, name, value)
+
+    def prepare(self) -> None:
+        """Refuse who has no token. Raises HTTPError 403."""
+        if not self.access.is_token(self.get_cookie(self.access.cookie)):
+            raise HTTPError(403)
+
+    def set_default_headers(self) -> None:
+        """Let nobody keep, frame or sniff it."""
+        self.clear_header("Server")
+        for name, value in {**HEADERS, "Content-Security-Policy": PAGE_POLICY}.items():
+            self.set_header(name, value)
+
+    def write_error(self, status_code: int, **more: Any) -> None:
+        """Say it in a line."""
+        told = "open the address that rsea watch printed: it has the token"
+        self.finish(f"{status_code}: {told if status_code == 403 else self._reason}\n")
+
+
+class Front(Guarded):
+    """The page; the first visit brings the token in its address, which becomes a cookie.
+
+    No redirection: a browser that came from another site would not send a strict cookie along.
+    """
+
+    def prepare(self) -> None:
+        """Take a token in the address for a cookie."""
+        given = self.get_query_argument("token", None)
+        if given is None:
+            super().prepare()
+        elif self.access.is_token(given):
+            self.set_cookie(self.access.cookie, given, httponly=True, samesite="Strict")
+        else:
+            raise HTTPError(403)
+
+    def get(self) -> None:
+        """Send the page."""
+        self.finish((PARTS / "index.html").read_bytes())
+
+
+class Part(Guarded):
+    """Style and scripts of the page."""
+
+    def get(self, name: str) -> None:
+        """Send a part."""
+        self.set_header("Content-Type", f"{KINDS[name]}; charset=utf-8")
+        self.finish((PARTS / name).read_bytes())
+
+
+class Report(Guarded):
+    """A report that was made of a recording."""
+
+    runs: Runs
+
+    def get(self, recording: str, verb: str) -> None:
+        """Send it."""
+        page = self.runs.report(recording, verb)
+        if page is None:
+            raise HTTPError(404)
+        self.set_header("Content-Security-Policy", REPORT_POLICY)
+        self.finish(page.read_bytes())
+
+
+class Socket(Guarded, WebSocketHandler):
+    """The socket of a page: frames and state out, wishes in. When it closes, what the page held is let go."""
+
+    desk: Desk
+    waiting = 0
+
+    def check_origin(self, origin: str) -> bool:
+        """Let in only the page itself."""
+        return same_origin(origin, self.request.host)
+
+    def open(self, *args: str, **more: str) -> None:
+        """Enter."""
+        self.set_nodelay(True)
+        if not self.desk.enter(self):
+            self.close(1013, "too many pages are open")
+
+    def on_message(self, message: str | bytes) -> None:
+        """Do what the page asks for."""
+        self.desk.act(self, message)
+
+    def on_close(self) -> None:
+        """Leave."""
+        self.desk.leave(self)
+
+    def send(self, text: str) -> None:
+        """Send a text; `waiting` counts those that are not out yet."""
+        try:
+            sending = asyncio.ensure_future(self.write_message(text))
+        except WebSocketClosedError:
+            return
+        self.waiting += 1
+        sending.add_done_callback(self._sent)
+
+    def _sent(self, sending: asyncio.Future[Any]) -> None:
+        self.waiting -= 1
+        if not sending.cancelled():
+            sending.exception()

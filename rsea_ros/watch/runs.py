@@ -1,0 +1,157 @@
+"""Recordings that the page starts and stops, and what is made of them: each in a process of its own."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.new_files import unused
+from rsea_ros.processes import start, stop
+
+VERBS = ("identify", "diagnose")
+REPORT = "report.html"
+_TAIL = 4000
+"""Bytes of a process's words that are looked at."""
+
+
+@dataclass
+class Job:
+    """A verb on a recording. state: running, done or failed; words: the last line that it said."""
+
+    verb: str
+    folder: Path
+    process: subprocess.Popen[bytes]
+    log: IO[bytes]
+    state: str = "running"
+    words: str = ""
+
+    def look(self) -> None:
+        """See whether it has ended, and what it said."""
+        if self.state != "running":
+            return
+        status = self.process.poll()
+        self.words = _first_line(self.log) if status == 0 else _last_line(self.log)
+        if status is not None:
+            self.state = "done" if status == 0 and (self.folder / REPORT).is_file() else "failed"
+            self.log.close()
+
+
+@dataclass
+class Recording:
+    """A bag that is or was written. seconds: its length so far or in the end."""
+
+    bag: Path
+    process: subprocess.Popen[bytes] | None
+    log: IO[bytes]
+    began: float
+    seconds: float = 0.0
+    words: str = ""
+    jobs: dict[str, Job] = field(default_factory=dict)
+
+
+class Runs:
+    """The recordings of this start. folder: where they go.
+
+    record_options: ROS arguments of the node that records. verb_options: of identify and diagnose.
+    """
+
+    def __init__(
+        self, folder: Path, record_options: Sequence[str] = (), verb_options: Sequence[str] = ()
+    ) -> None:
+        self._folder, self._record_options, self._verb_options = folder, record_options, verb_options
+        self._recordings: dict[str, Recording] = {}
+
+    def record(self) -> None:
+        """Start a recording. Raises ParameterError while one runs."""
+        if any(r.process is not None for r in self._recordings.values()):
+            raise ParameterError("a recording runs already")
+        bag = unused(self._folder / time.strftime("%Y%m%d-%H%M%S"))
+        words = ["-m", "rsea_ros.nodes.record", "--ros-args", *self._record_options, "-p", f"out:={bag}"]
+        process, log = _python(words)
+        self._recordings[bag.name] = Recording(bag, process, log, time.monotonic())
+
+    def stop(self) -> None:
+        """End the recording that runs: its bag is completed."""
+        for each in self._recordings.values():
+            if each.process is not None:
+                each.process.send_signal(signal.SIGTERM)
+
+    def evaluate(self, name: str, verb: str) -> None:
+        """Do a verb with a recording. Raises ParameterError where it is not complete, and while one runs."""
+        each = self._recordings.get(name)
+        if each is None or each.process is not None or each.words:
+            raise ParameterError(f"recording {name!r}, expected one that is complete")
+        if verb not in VERBS:
+            raise ParameterError(f"{verb!r}, expected one of {', '.join(VERBS)}")
+        if any(job.state == "running" for r in self._recordings.values() for job in r.jobs.values()):
+            raise ParameterError("another recording is being evaluated, expected one at a time")
+        folder = unused(each.bag.with_name(f"{each.bag.name}-{verb}"))
+        words = ["-m", "rsea_ros", verb, str(each.bag), "--out", str(folder), *self._verb_options]
+        each.jobs[verb] = Job(verb, folder, *_python(words))
+
+    def report(self, name: str, verb: str) -> Path | None:
+        """Return the page that was made of a recording, None where there is none."""
+        job = self._recordings[name].jobs.get(verb) if name in self._recordings else None
+        return job.folder / REPORT if job is not None and job.state == "done" else None
+
+    def look(self) -> Sequence[Mapping[str, Any]]:
+        """See what has ended, and return all recordings for the page, the newest first."""
+        for each in self._recordings.values():
+            _see_to(each)
+            for job in each.jobs.values():
+                job.look()
+        return [_shown(name, each) for name, each in reversed(self._recordings.items())]
+
+    def close(self) -> None:
+        """Complete the recording that runs, and end what evaluates."""
+        self.stop()
+        jobs = [job.process for r in self._recordings.values() for job in r.jobs.values()]
+        stop([*jobs, *(r.process for r in self._recordings.values() if r.process is not None)])
+
+
+def _see_to(recording: Recording) -> None:
+    if recording.process is None:
+        return
+    recording.seconds = time.monotonic() - recording.began
+    status = recording.process.poll()
+    if status is not None:
+        recording.process = None
+        complete = status == 0 and recording.bag.exists()
+        recording.words = "" if complete else _last_line(recording.log) or "failed"
+        recording.log.close()
+
+
+def _shown(name: str, r: Recording) -> Mapping[str, Any]:
+    jobs = {verb: {"state": job.state, "words": job.words} for verb, job in r.jobs.items()}
+    return {"name": name, "running": r.process is not None, "seconds": round(r.seconds, 1), "words": r.words,
+            "jobs": jobs}  # fmt: skip
+
+
+def _python(words: Sequence[str]) -> tuple[subprocess.Popen[bytes], IO[bytes]]:
+    """Start a program of Python; return its process, and the file that its words go to."""
+    log = tempfile.TemporaryFile()  # noqa: SIM115  it is read until the process has ended
+    return start([sys.executable, *words], stdout=log, stderr=subprocess.STDOUT), log
+
+
+def _lines(log: IO[bytes], first: bool) -> Sequence[str]:
+    log.seek(0, 2)
+    size = log.tell()
+    log.seek(0 if first else max(0, size - _TAIL))
+    text = log.read(_TAIL).decode(errors="replace")
+    return [line.strip() for line in text.splitlines() if line.strip()]
+
+
+def _first_line(log: IO[bytes]) -> str:
+    return next(iter(_lines(log, first=True)), "")
+
+
+def _last_line(log: IO[bytes]) -> str:
+    return next(iter(reversed(_lines(log, first=False))), "")

@@ -1,0 +1,110 @@
+"""The server of the page, in a thread of its own: HTTP and WebSocket by tornado, frames at 30 Hz."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tornado.httpserver import HTTPServer
+from tornado.ioloop import IOLoop, PeriodicCallback
+from tornado.web import Application
+
+from rsea_ros.errors import RseaError
+from rsea_ros.watch.access import Access, addresses
+from rsea_ros.watch.command import Commander
+from rsea_ros.watch.desk import Desk
+from rsea_ros.watch.frames import Source, frame
+from rsea_ros.watch.handlers import routes
+from rsea_ros.watch.runs import Runs
+
+FRAME, STATE = 1.0 / 30.0, 0.5
+"""s between frames, and between looks at everything else."""
+_LARGEST = 16_384
+"""Bytes of a request; those of the page have a thousand."""
+_SETTINGS: Mapping[str, Any] = {
+    "log_function": lambda handler: None,
+    "websocket_ping_interval": 10.0,
+    "websocket_max_message_size": 4096,
+}
+
+
+class Server:
+    """Serves the page from `start` to `stop`. access: the token. addresses: what to open.
+
+    Raises RseaError when nothing can listen there.
+    """
+
+    def __init__(
+        self, source: Source, runs: Runs, commander: Commander | None, host: str = "localhost", port: int = 0
+    ) -> None:
+        self._source, self._runs = source, runs
+        self.desk = Desk(commander, runs)
+        self._socket = _listening(host, port)
+        self.port: int = self._socket.getsockname()[1]
+        self.access = Access(f"rsea_watch_{self.port}")  # a cookie belongs to a host, not to a port
+        self.addresses: Sequence[str] = addresses(host, self.port, self.access.token)
+        self.error: Exception | None = None
+        self._loop: IOLoop | None = None
+        self._ready = threading.Event()
+        self._state_due = 0.0
+        self.thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self.thread.start()
+        self._ready.wait()
+
+    def stop(self) -> None:
+        """End: sockets closed, so that nobody holds the command."""
+        if self._loop is not None and self.thread.is_alive():
+            self._loop.add_callback(self._loop.stop)
+            self.thread.join()
+        self._socket.close()
+        self._runs.close()
+
+    def running(self) -> bool:
+        """Tell whether it serves. Raises what went wrong."""
+        if self.error is not None:
+            raise self.error
+        return self.thread.is_alive()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(asyncio.new_event_loop())
+        try:
+            self._loop = IOLoop.current()
+            web = Application(routes(self.access, self.desk, self._runs), **_SETTINGS)
+            http = HTTPServer(web, max_body_size=_LARGEST, max_header_size=_LARGEST)
+            http.add_socket(self._socket)
+            PeriodicCallback(self._tick, 1e3 * FRAME).start()
+            self._loop.add_callback(self._ready.set)
+            self._loop.start()
+            http.stop()
+        except Exception as error:  # handed to the main thread by `running`
+            self.error = error
+        finally:
+            self.desk.leave_all()
+            self._ready.set()
+
+    def _tick(self) -> None:
+        """Send what has come to who looks at it."""
+        if not self.desk.count:
+            return
+        state, now = None, time.monotonic()
+        if now >= self._state_due:
+            self._state_due, state = now + STATE, self.desk.state(self._source.state())
+        self.desk.send(frame(self._source.take(), self._source.flag), state)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens. Raises RseaError where it cannot."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        made = socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise RseaError(f"page on {host}, port {port}: {error.strerror or error}") from None
+    made.setblocking(False)
+    return made

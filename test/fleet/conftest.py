@@ -1,0 +1,27 @@
+"""A new store, files that pass for bags, and `fleet_stubs` importable."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.fleet.store import Store, open_store
+
+sys.path.append(str(Path(__file__).parent))
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Store:
+    return open_store(tmp_path / "store", create=True)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Give a folder of five files that pass for bags."""
+    folder = tmp_path / "bags"
+    folder.mkdir()
+    for number in range(5):
+        (folder / f"run{number}.mcap").write_bytes(bytes([number]) * 1000)
+    return folder

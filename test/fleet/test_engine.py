@@ -1,0 +1,225 @@
+"""The engine: new recordings only, nothing lost, nothing double, whatever is killed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from fleet_stubs import HIP, KNEE, stub_work
+
+from rsea_ros.fleet import engine as engines
+from rsea_ros.fleet.engine import ATTEMPTS, Engine, Limits
+from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
+from rsea_ros.fleet.plan import is_anything_new
+from rsea_ros.fleet.query import answer
+from rsea_ros.fleet.sources import bags_of
+from rsea_ros.fleet.store import Outcome, locked, open_store
+from rsea_ros.fleet.task import Changed, Task
+
+
+def played(store, folder, joints=(KNEE,), executor=None, work=stub_work, limits=None):
+    held = bags_of([str(folder)], joints)
+    return Engine(store, executor or Serial(), work, lambda step, share: None, limits).run(held)
+
+
+def count(store, outcome="done"):
+    return answer(store, f"SELECT count(*) FROM analyses WHERE outcome = '{outcome}'")[1][0][0]
+
+
+class Unlucky(Serial):
+    """Loses the worker of some tasks so many times; has several jobs in flight, the newest done first."""
+
+    places = 3
+
+    def __init__(self, losses: dict[str, int]) -> None:
+        super().__init__()
+        self.losses = losses
+
+    def next(self, timeout: float | None) -> Done | None:
+        self._jobs = deque(reversed(self._jobs))
+        job = self._jobs[0]
+        name = Path(getattr(job.argument, "bag", job.argument).url).name
+        if isinstance(job.argument, Task) and job.attempt < self.losses.get(name, 0):
+            self._jobs.popleft()
+            return Done(job, error=WorkerLost("killed"))
+        return super().next(timeout)
+
+
+def test_a_second_run_finds_nothing_new(store, folder):
+    assert played(store, folder).outcomes == {"done": 5}
+    assert not is_anything_new(store, bags_of([str(folder)], [KNEE]))
+    again = played(store, folder, work=lambda task: pytest.fail("worked on a known recording"))
+    assert (again.rows, again.before) == (0, 5)
+    assert count(store) == 5
+
+
+def test_a_bag_that_moved_is_known_by_its_content(store, folder, tmp_path):
+    played(store, folder)
+    moved = folder.rename(tmp_path / "elsewhere")
+    assert is_anything_new(store, bags_of([str(moved)], [KNEE]))
+    summary = played(store, moved)
+    assert (summary.rows, summary.before) == (0, 5)
+
+
+def test_a_copy_in_the_same_run_counts_once(store, folder):
+    (folder / "copy.mcap").write_bytes((folder / "run0.mcap").read_bytes())
+    summary = played(store, folder)
+    assert (summary.rows, summary.before) == (5, 1)
+
+
+def test_other_settings_and_another_joint_are_new(store, folder):
+    played(store, folder)
+    assert played(store, folder, [KNEE, HIP]).outcomes == {"done": 5}
+    assert played(store, folder, [replace(KNEE, diagnose="always")]).outcomes == {"done": 5}
+    assert count(store) == 15
+    assert answer(store, "SELECT count(*) FROM recordings")[1] == [(10,)], "the newest analysis of each"
+
+
+def test_a_lost_worker_is_forgiven_and_poison_is_quarantined(store, folder):
+    losses = {"run1.mcap": 2, "run3.mcap": 1000}
+    summary = played(store, folder, executor=Unlucky(losses), limits=Limits(back_off=0.001))
+    assert summary.outcomes == {"done": 4, "quarantined": 1}
+    ((joint, bag, why),) = summary.quarantined
+    assert joint == "knee" and bag.endswith("run3.mcap") and f"all {ATTEMPTS} times" in why
+    assert played(store, folder).rows == 0, "poison is not tried again by itself"
+    store.take_out({"quarantined"})
+    assert played(store, folder).outcomes == {"done": 1}
+    assert (count(store), count(store, "quarantined")) == (5, 0)
+
+
+def test_an_error_of_the_cluster_is_a_row_and_not_the_end(store, folder):
+    def work(task: Task):
+        if task.bag.url.endswith("run2.mcap"):
+            raise TypeError("cannot pickle it")
+        return stub_work(task)
+
+    assert played(store, folder, work=work).outcomes == {"done": 4, "quarantined": 1}
+    assert answer(store, "SELECT reason FROM recordings WHERE outcome = 'quarantined'")[1] == [
+        ("TypeError: cannot pickle it",)
+    ]
+
+
+def test_a_bag_too_large_for_a_worker_never_reaches_one(store, folder):
+    with (folder / "run4.mcap").open("ab") as file:
+        file.truncate(4_000_000_000)  # of which the disk holds nothing
+    limit = Limits(memory=int(engines.BASE + engines.FACTOR * 1e6))
+    held = [(bag, joints) for bag, joints in bags_of([str(folder)], [KNEE])]
+    engine = Engine(store, Serial(), stub_work, lambda step, share: None, limit)
+    engine._recordings = {(bag.url, bag.size, bag.stamp): f"{k:016x}" for k, (bag, _) in enumerate(held)}
+    summary = engine.run(held)
+    assert summary.outcomes == {"done": 4, "quarantined": 1}
+    assert "4000 MB" in summary.quarantined[0][2] and "--memory" in summary.quarantined[0][2]
+
+
+def test_a_bag_that_is_being_written_is_left_for_the_next_run(store, folder):
+    def work(task: Task):
+        if task.bag.url.endswith("run2.mcap"):
+            raise Changed(task.bag.url)
+        return stub_work(task)
+
+    summary = played(store, folder, work=work)
+    assert (summary.rows, len(summary.changed)) == (4, 1)
+    assert played(store, folder).outcomes == {"done": 1}
+    assert count(store) == 5
+
+
+def test_a_full_disk_ends_the_run_and_loses_no_row(store, folder, monkeypatch):
+    """The engine says so; what was written stays, and the next run writes the rest."""
+    written = []
+    put = type(store).put
+
+    def full(self, outcome):
+        if len(written) == 2:
+            raise OSError(28, "No space left on device")
+        written.append(outcome)
+        put(self, outcome)
+
+    monkeypatch.setattr(type(store), "put", full)
+    with pytest.raises(OSError, match="No space left"):
+        played(store, folder)
+    monkeypatch.undo()
+    assert count(store) == 2
+    assert played(store, folder).outcomes == {"done": 3}
+    assert count(store) == 5
+
+
+def test_many_rows_become_one_file_and_stay_all_there(store, folder, monkeypatch):
+    monkeypatch.setattr("rsea_ros.fleet.store.LOOSE", 2)
+    played(store, folder)
+    files = list(store.rows.rglob("*.parquet"))
+    assert [file.parent.name for file in files] == ["month=2026-03"]
+    assert count(store) == 5 and played(store, folder).before == 5
+
+
+def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeypatch):
+    monkeypatch.setattr("rsea_ros.fleet.compaction._remove", lambda folder, names: None)
+    played(store, folder)
+    monkeypatch.undo()
+    assert len(list(store.rows.rglob("*.parquet"))) == 6
+    assert count(store) == 5, "who reads counts them once"
+    store.finish()
+    assert len(list(store.rows.rglob("*.parquet"))) == 1
+    assert count(store) == 5
+
+
+def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folder, monkeypatch):
+    """The compacted file replaced one of that name: finishing that must not take the new one."""
+
+    def work(task: Task):
+        poison = {"outcome": "quarantined"} if task.bag.url.endswith("run2.mcap") else {}
+        return Outcome(stub_work(task).row | poison)
+
+    played(store, folder, work=work)
+    store.take_out({"quarantined"})
+    monkeypatch.setattr(type(store), "compact", lambda self: None)  # killed before it
+    played(store, folder)
+    store.finish()
+    assert count(store) == 5
+
+
+def test_two_runs_take_turns(store):
+    """Another process holds the lock: a run that does not wait says who, one that waits begins after it."""
+    code = f"""
+import time
+from rsea_ros.fleet.store import Outcome, locked, open_store
+with locked(open_store({str(store.path)!r}), None):
+    print("held", flush=True)
+    time.sleep(30)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        with pytest.raises(FleetError, match=f"process {other.pid} on "), locked(store, None):
+            pass
+        begin, heard = time.monotonic(), []
+
+        def waiting(holder: str) -> None:
+            heard.append(holder)
+            os.kill(other.pid, 9)
+
+        with locked(store, waiting):
+            assert heard and time.monotonic() - begin < 10.0
+
+
+def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
+    for path, create in ((folder, True), (tmp_path / "nothing", False)):
+        with pytest.raises(FleetError, match="expected a store"):
+            open_store(path, create=create)
+    (tmp_path / "later").mkdir()
+    (tmp_path / "later" / "store.json").write_text('{"schema": 99}')
+    with pytest.raises(FleetError, match="schema 99, expected 1"):
+        open_store(tmp_path / "later")
+
+
+def test_jobs_that_wait_to_be_tried_again_do_not_hold_the_others_up(store, folder):
+    """While one is due later, the others are worked through."""
+    begin = time.monotonic()
+    summary = played(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=Limits(back_off=0.3))
+    assert summary.outcomes == {"done": 5} and time.monotonic() - begin < 5.0
+    assert Job(stub_work, None).attempt == 0

@@ -1,0 +1,105 @@
+"""joints.yaml: strictly read, with the line, field and value of what is wrong."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+from rsea_ros.fleet.errors import JointMapError
+from rsea_ros.fleet.joints import Joint, load_joints
+
+GOOD = """
+defaults:
+  rig: paper_high_impedance
+  axis: -torque.z
+joints:
+  left_knee:
+    bags: left/*.mcap
+    namespace: /left/knee
+    topics: {ft: /ati/wrench}
+    joint: knee
+    temperature: /left/knee/temperature
+  right_knee:
+    rig: my_rig.yaml
+    bags: [right/a*, right/b*]
+    diagnose: never
+  servo: {import: so101, index: 2, bags: so101/chirp_sweep, rig: so101_joint}
+"""
+
+
+def joints(folder: Path, text: str) -> tuple[Joint, ...]:
+    (folder / "joints.yaml").write_text(text, encoding="utf-8")
+    return load_joints(folder / "joints.yaml")
+
+
+@pytest.fixture
+def mapped(tmp_path: Path) -> tuple[Joint, ...]:
+    rig = Path(__file__).parents[2] / "config/rigs/prototype_knee.yaml"
+    (tmp_path / "my_rig.yaml").write_text(rig.read_text(encoding="utf-8"), encoding="utf-8")
+    return joints(tmp_path, GOOD)
+
+
+def test_a_joint_has_its_rig_topics_and_options(mapped):
+    left, right, servo = mapped
+    assert left.name == "left_knee" and left.rig.startswith("name: paper_high_impedance")
+    assert left.topics.topic("ft") == "/ati/wrench"
+    assert left.topics.topic("joint_states") == "/left/knee/joint_states"
+    assert (left.topics.joint, left.topics.axis, left.diagnose) == ("knee", "-torque.z", "misfit")
+    assert right.rig.startswith("name: prototype_knee") and right.diagnose == "never"
+    assert servo.table is not None and servo.index == 2
+
+
+def test_a_pattern_names_the_end_of_a_path(mapped):
+    left, right, _ = mapped
+    assert left.is_in("/data/2026/left/run.mcap") and left.is_in("s3://lab/left/week/run.mcap")
+    assert not left.is_in("/data/left.mcap") and not left.is_in("/data/right/a1")
+    assert right.is_in("/data/right/a1") and right.is_in("right/b")
+
+
+def test_settings_change_with_what_changes_a_row_and_with_nothing_else(mapped, tmp_path):
+    left, _, servo = mapped
+    assert len({joint.settings for joint in mapped}) == 3
+    other = joints(tmp_path, GOOD.replace("left_knee", "renamed").replace("left/*.mcap", "left"))[0]
+    assert other.settings == left.settings
+    assert joints(tmp_path, GOOD.replace("-torque.z", "torque.z"))[0].settings != left.settings
+    assert joints(tmp_path, GOOD.replace("index: 2", "index: 3"))[2].settings != servo.settings
+
+
+def test_a_joint_travels_to_another_process(mapped):
+    for joint in mapped:
+        again = pickle.loads(pickle.dumps(joint))
+        assert again == joint and again.settings == joint.settings
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("namespace:", "namespaces:"), ("line 8", "unknown key 'namespaces'", "did you mean namespace?")),
+        (("-torque.z", "torque.w"), ("line 4", "axis", "'torque.w'")),
+        (("rig: my_rig.yaml", "rig: my_rigg.yaml"), ("line 13", "joints.right_knee.rig", "my_rigg.yaml")),
+        (("diagnose: never", "diagnose: no"), ("line 15", "diagnose = False", "misfit, always, never")),
+        (("index: 2", "index: -1"), ("line 16", "index = -1", "0 or more")),
+        (("import: so101", "import: so102"), ("line 16", "import = 'so102'")),
+        (("bags: left/*.mcap", "bags: 3"), ("line 7", "bags = 3", "expected text")),
+        (("topics: {ft:", "topics: {force:"), ("line 9", "'force'", "torque_command")),
+        (("  left_knee:", "  left knee:"), ("line 6", "'left knee'", "letters")),
+        (("  rig: paper_high_impedance\n", ""), ("line 5", "joints.left_knee", "no rig")),
+        (("joints:", "joint:"), ("unknown key 'joint'", "did you mean joints?")),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_line(mapped, tmp_path, change, said):
+    assert change[0] in GOOD
+    with pytest.raises(JointMapError) as caught:
+        joints(tmp_path, GOOD.replace(*change, 1))
+    assert str(caught.value).startswith(str(tmp_path / "joints.yaml"))
+    for word in said:
+        assert word in str(caught.value)
+
+
+def test_the_tables_of_the_docs_are_those_of_the_keys():
+    from rsea_ros.fleet.joint_keys import tables
+
+    page = (Path(__file__).parents[2] / "docs/fleet.md").read_text(encoding="utf-8")
+    assert tables() in page

@@ -1,0 +1,131 @@
+"""Expressions in a map: numbers by hand, and what must never be evaluated."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from msg_adapters.tables import load_map
+from msg_adapters.tables.expression import FUNCTIONS, parse
+from msg_adapters.tables.importing import import_record
+from rsea_ros.errors import ImportMapError
+
+T = np.linspace(0.0, 1.0, 101)
+COLUMNS = {"a": T**2, "b": np.sin(9.0 * T), "tau [Nm]": 2.0 * T}
+
+
+def value(text):
+    return parse(text).values(COLUMNS, T)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a + 2 * b", T**2 + 2.0 * np.sin(9.0 * T)),
+        ("-a ** 2 / 4", -(T**4) / 4.0),
+        ("a * b", T**2 * np.sin(9.0 * T)),
+        ('column("tau [Nm]") * 3', 6.0 * T),
+        ("clip(b, -0.5, 0.5)", np.clip(np.sin(9.0 * T), -0.5, 0.5)),
+        ("maximum(a, b) - minimum(a, b)", np.abs(T**2 - np.sin(9.0 * T))),
+        ("a - first(a) + mean(a)", T**2 + np.mean(T**2)),
+        ("atan2(b, sqrt(1 - b ** 2))", np.arcsin(np.clip(np.sin(9.0 * T), -1, 1))),
+    ],
+)
+def test_values(text, expected):
+    np.testing.assert_allclose(value(text), expected, atol=1e-9)
+
+
+def test_derivative_and_integral_are_by_the_stamps():
+    np.testing.assert_allclose(value("derivative(a)")[1:-1], 2.0 * T[1:-1], atol=1e-12)
+    np.testing.assert_allclose(value("integral(a)"), T**3 / 3.0, atol=1e-4)
+
+
+def test_a_hole_stays_a_hole():
+    columns = {**COLUMNS, "a": np.where(T == 0.5, np.nan, COLUMNS["a"])}
+    assert np.isnan(parse("2 * a + b").values(columns, T)).sum() == 1
+
+
+HOSTILE = [
+    "__import__('os').system('true')", "a.__class__", "a.tofile('x')", "open('/etc/passwd')", "(lambda: a)()",
+    "[x for x in a]", "{a}", "a[0]", "a if b else a", "a and b", "a < b", "f'{a}'", "a := 3", "print(a)",
+    "eval('a')", "getattr(a, 'dtype')", "globals()", "a.T", "*a", "abs(*a)", "abs(x=a)", "abs(abs)",
+    "clip(a)", "column(a)", "column('a', 'b')", "column('a').x", "a @ b", "a // b", "a % b", "a << 3", "~a",
+    "not a", "a;b", "import os", "a = 3", "'a' * 999", "b'a' + a", "1j * a", "True + a", "None", "...", "3",
+    "1e999 * a", "", "a" * 2000, "+".join(["a"] * 150), "(" * 300 + "a" + ")" * 300, "-" * 900 + "a", "a(b)",
+    "column", "sin",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+def test_what_is_no_arithmetic_is_refused_before_it_is_evaluated(text):
+    with pytest.raises(ValueError, match=r"^(has|is|calls) ") as error:
+        parse(text)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+@pytest.mark.parametrize(
+    "text", ["a * 9**9**9", "9999**9999**9999 * a", "a / 0", "exp(exp(exp(10 * a + 9)))", "a ** 20000"]
+)
+def test_powers_without_end_are_doubles(text):
+    began = time.process_time()
+    with pytest.raises(ValueError, match=r"cannot be computed|expected a finite number"):
+        value(text)
+    assert time.process_time() - began < 1.0
+
+
+def test_random_texts_are_refused_or_computed():
+    """What a generator of hostile texts makes of the allowed words ends in numbers or in one line."""
+    rng = np.random.default_rng(0)
+    words = [*FUNCTIONS, *COLUMNS, "(", ")", ",", "+", "*", "**", "1e9", "-", ".", "[", "]", "__", "'", "0"]
+    computed = 0
+    for _ in range(1500):
+        text = "".join(rng.choice(words, rng.integers(1, 9)))
+        try:
+            computed += value(text).shape == T.shape
+        except KeyError:
+            assert set(parse(text).columns) - set(COLUMNS)  # import reads the columns first
+        except ValueError as error:
+            assert "\n" not in str(error)
+    assert computed >= 10
+
+
+MAP = """
+time: {{expression: "s + 1e-9 * ns", unit: s}}
+channels:
+  velocity: {{expression: "{}", unit: deg/s}}
+  command: {{column: i, unit: N m}}
+"""
+
+
+@pytest.fixture
+def imported(tmp_path):
+    def run(text):
+        rows = "".join(f"{k // 4},{k % 4 * 250_000_000},{k * k},{k}\n" for k in range(9))
+        (tmp_path / "run.csv").write_text(f"s,ns,phi,i\n{rows}")
+        (tmp_path / "map.yaml").write_text(MAP.format(text))
+        return import_record(tmp_path / "run.csv", load_map(tmp_path / "map.yaml"))
+
+    return run
+
+
+def test_a_map_with_expressions(imported):
+    record = imported("derivative(phi)")
+    assert np.allclose(record["command"].t, np.arange(9) * 0.25)
+    assert np.allclose(record["velocity"].y[1:-1], np.radians(8.0 * np.arange(1, 8)))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("derivative(psi)", "run.csv: no column 'psi', expected one of s, ns, phi, i"),
+        ("derivation(phi)", "line 4: channels.velocity.expression calls derivation, .* mean derivative"),
+        ("phi.real", "channels.velocity.expression has 'phi.real', expected columns"),
+        ("1 / (i - i)", "run.csv: '1 / .i - i.' is inf at sample 1, expected a finite number"),
+    ],
+)
+def test_mistakes_name_file_and_field(imported, text, message):
+    with pytest.raises(ImportMapError, match=message):
+        imported(text)

@@ -1,0 +1,224 @@
+"""The same measurement in every format that is read, and what each refuses."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import savemat
+
+from msg_adapters.tables import json_file, npz_file, parquet_file
+from msg_adapters.tables.files import read_columns
+from rsea_ros.errors import ImportMapError
+
+T = np.arange(6) * 0.01
+Q = np.arange(18.0).reshape(6, 3)  # a sample a row, a joint a column
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Return a function that writes T and Q in a format and returns the file."""
+
+    def to(suffix):
+        file = tmp_path / f"run{suffix}"
+        if suffix == ".mat":
+            savemat(file, {"t": T, "log": {"q": Q, "t": T}, "q": Q, "side": Q.T})
+        elif suffix == ".npz":
+            np.savez_compressed(file, t=T, q=Q, side=Q.T)
+        elif suffix == ".parquet":
+            table = {"t": T, "q": pa.FixedSizeListArray.from_arrays(pa.array(Q.ravel()), 3)}
+            pq.write_table(pa.table(table), file, row_group_size=4)
+        elif suffix == ".json":
+            file.write_text(json.dumps({"t": T.tolist(), "q": Q.tolist(), "side": Q.T.tolist()}))
+        elif suffix == ".jsonl":
+            samples = zip(T, Q.tolist(), strict=True)
+            file.write_text("\n".join(json.dumps({"t": t, "q": q}) for t, q in samples))
+        else:
+            np.savetxt(file, np.column_stack([T, Q]), delimiter=",")
+        return file
+
+    return to
+
+
+@pytest.mark.parametrize(
+    ("suffix", "columns"),
+    [
+        (".csv", ("1", "4")),
+        (".mat", ("t", "q(:,3)")),
+        (".mat", ("t", "side(3, :)")),
+        (".mat", ("log.t", "log.q[2]")),
+        (".npz", ("t", "q[:,2]")),
+        (".npz", ("t", "side[2,:]")),
+        (".parquet", ("t", "q[2]")),
+        (".json", ("t", "q[2]")),
+        (".json", ("t", "side[2,:]")),
+        (".jsonl", ("t", "q[2]")),
+    ],
+)
+def test_the_same_numbers_out_of_every_format(write, suffix, columns):
+    table = read_columns(write(suffix), columns)
+    assert np.allclose(table[columns[0]], T)
+    assert table[columns[1]].tolist() == Q[:, 2].tolist()
+
+
+def refused(file, column, text):
+    with pytest.raises(ImportMapError, match=text) as error:
+        read_columns(file, ["t", column] if file.suffix not in (".csv", ".npy") else [column])
+    assert str(file) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "column", "text"),
+    [
+        (".csv", "5", "no column '5', expected one of 1, 2, 3, 4"),
+        (".mat", "q", r"variable 'q' is double \(6, 3\), .* a column of the matrix, q\(:,1\) to q\(:,3\)"),
+        (".mat", "q(:,4)", r"variable 'q\(:,4\)' is double \(6, 3\)"),
+        (".mat", "log.w", "no column 'log.w', expected one of log.q, log.t"),
+        (".mat", "log", r"variable 'log' is struct \(1, 1\), expected a vector"),
+        (".mat", "q.x", "'q.x'"),
+        (".npz", "w", "no column 'w', expected one of t, q, side"),
+        (".npz", "q", r"array 'q' is float64 \(6, 3\), expected a vector .* q\[0\]"),
+        (".npz", "q[3]", r"array 'q' is float64 \(6, 3\), no 'q\[3\]'"),
+        (".npz", "t[0]", r"array 't\[0\]' is float64 \(6,\), expected a matrix"),
+        (".parquet", "w", "no column 'w', expected one of t, q"),
+        (".parquet", "q", r"column 'q' is fixed_size_list.*expected one number of it: q\[0\]"),
+        (".parquet", "q[3]", r"column 'q\[3\]' has a list of 3 numbers, expected more than 3"),
+        (".parquet", "t[0]", r"column 't\[0\]' is double, expected lists"),
+        (".json", "w", "no column 'w', expected one of t, q, side"),
+        (".json", "q", r"sample 1, column 'q' is \[0.0, 1.0, 2.0\], expected a finite number: q\[0\]"),
+        (".json", "q[3]", r"sample 1, column 'q\[3\]' is .* expected a list of more than 3"),
+        (".jsonl", "w", "no column 'w', expected one of t, q"),
+    ],
+)
+def test_what_is_no_column_is_named(write, suffix, column, text):
+    refused(write(suffix), column, text)
+
+
+def test_records_below_other_keys(tmp_path):
+    file = tmp_path / "run.json"
+    samples = [{"t": 0.0, "motor": {"i": 1}}, {"t": 0.1, "motor": {"i": None}}, {"t": 0.2}]
+    file.write_text(json.dumps({"robot": "arm", "log": {"samples": samples}}))
+    table = read_columns(file, ["log.samples.t", "log.samples.motor.i"])
+    assert table["log.samples.t"].tolist() == [0.0, 0.1, 0.2]
+    assert np.isnan(table["log.samples.motor.i"]).tolist() == [False, True, True]
+    with pytest.raises(ImportMapError, match=r"expected one of robot, log.samples.t, log.samples.motor.i"):
+        read_columns(file, ["t"])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"t": [0, 1], "t": [2, 3]}', "key 't' stands twice"),
+        ('{"t": [0, 1e999]}', "sample 2, column 't' is inf, expected a finite number"),
+        ('{"t": [0, Infinity]}', "sample 2, column 't' is inf"),
+        ('{"t": [0, "1"]}', "sample 2, column 't' is '1', expected a finite number"),
+        ('{"t": [0, ' + "9" * 5000 + "]}", "digits"),
+        ('{"t": [0, 1]', "line 1, column 13: expecting ',' delimiter, expected JSON"),
+        ("[" * 100_000, "too many levels"),
+        ('{"t": 3}', "column 't' is 3, expected a list of numbers"),
+        ("[]", "no column 't'"),
+        ("", "line 1, column 1: expecting value, expected JSON"),
+    ],
+)
+def test_json_that_is_no_table(tmp_path, text, message):
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(ImportMapError, match=message):
+        read_columns(tmp_path / "run.json", ["t"])
+
+
+def test_json_is_not_read_beyond_a_size(tmp_path, monkeypatch):
+    (tmp_path / "run.json").write_text(json.dumps({"t": T.tolist()}))
+    monkeypatch.setattr(json_file, "LARGEST_FILE", 20)
+    with pytest.raises(ImportMapError, match="bytes of JSON, expected fewer than 20"):
+        read_columns(tmp_path / "run.json", ["t"])
+
+
+def test_no_pickle_is_opened(tmp_path):
+    np.savez(tmp_path / "run.npz", t=T, q=np.array([{}, print], dtype=object))
+    refused(tmp_path / "run.npz", "q", "array 'q' holds Python objects, expected numbers")
+
+
+def test_the_size_of_an_array_comes_first(tmp_path, monkeypatch):
+    np.savez(tmp_path / "run.npz", t=T, q=Q)
+    monkeypatch.setattr(npz_file, "LARGEST", 10)
+    refused(tmp_path / "run.npz", "q[0]", r"array 'q' is float64 \(6, 3\), expected fewer than 10 numbers")
+
+
+def test_an_array_that_promises_more_than_the_file_holds(tmp_path):
+    np.savez(tmp_path / "run.npz", t=T)
+    data = (tmp_path / "run.npz").read_bytes()
+    with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
+        start = data.index(b"\x93NUMPY")
+        held = data[start : start + 128 + T.nbytes].replace(b"(6,), }  ", b"(600,), }")
+        archive.writestr("t.npy", held)
+    with pytest.raises(ImportMapError, match=r"array 't' is float64 \(600,\), more than its 176 bytes"):
+        read_columns(tmp_path / "run.npz", ["t"])
+
+
+@pytest.mark.parametrize("header", [b"{'descr': '<f8', 'shape': (6,), ", b"{'descr': ((((((", b"\x00\xff('"])
+def test_a_header_that_is_no_header_is_one_line(tmp_path, header):
+    """Damaged files in bench/inputs.py brought an error of the tokenizer that nobody had thought of."""
+    with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
+        text = header.ljust(117) + b"\n"
+        archive.writestr("t.npy", b"\x93NUMPY\x01\x00v\x00" + text + T.tobytes())
+    with pytest.raises(ImportMapError, match=r"run.npz: array 't' has no header that can be read"):
+        read_columns(tmp_path / "run.npz", ["t"])
+
+
+def test_npy_of_one_matrix_and_of_fields(tmp_path):
+    np.save(tmp_path / "run.npy", Q)
+    assert read_columns(tmp_path / "run.npy", ["2"])["2"].tolist() == Q[:, 1].tolist()
+    refused(tmp_path / "run.npy", "4", "no column '4', expected one of 1, 2, 3")
+    np.save(tmp_path / "fields.npy", np.array([(0.0, 1), (0.1, 2)], [("t", "f8"), ("n", "i4")]))
+    assert read_columns(tmp_path / "fields.npy", ["n"])["n"].tolist() == [1.0, 2.0]
+
+
+def test_stamps_holes_and_fields_of_parquet(tmp_path):
+    stamps = pa.array([0, 5_000_000, None], pa.timestamp("ns"))
+    pose = pa.array([{"x": 1.0}, {"x": None}, None], pa.struct([("x", pa.float32())]))
+    pq.write_table(pa.table({"t": stamps, "pose": pose, "word": ["a", "b", "c"]}), tmp_path / "run.parquet")
+    table = read_columns(tmp_path / "run.parquet", ["t", "pose.x"])
+    assert table["t"][:2].tolist() == [0.0, 0.005]
+    assert [np.isnan(column).sum() for column in table.columns.values()] == [1, 2]
+    refused(tmp_path / "run.parquet", "word", "column 'word' is string, expected numbers")
+    refused(tmp_path / "run.parquet", "pose.y", "pose is struct.*, expected a struct with y")
+
+
+def test_a_missing_reader_of_parquet_is_one_line(write, monkeypatch):
+    monkeypatch.setattr(parquet_file, "find_spec", lambda name: None)
+    refused(write(".parquet"), "q[0]", r"needs the package pyarrow, which is not installed: pip install")
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".npy", ".parquet", ".json"])
+@pytest.mark.parametrize("content", [b"", b"PAR1 and no", b"PK\x03\x04 cut", b"\x93NUMPY\x01\x00\xff\xff{"])
+def test_files_that_are_none(tmp_path, suffix, content):
+    (tmp_path / f"run{suffix}").write_bytes(content)
+    with pytest.raises(ImportMapError, match=r"run\."):
+        read_columns(tmp_path / f"run{suffix}", ["t"])
+
+
+def test_structs_in_an_array_are_numbered(tmp_path):
+    runs = np.zeros((2,), dtype=[("t", object)])
+    runs["t"] = [T, T + 1.0]
+    savemat(tmp_path / "run.mat", {"runs": runs})
+    assert read_columns(tmp_path / "run.mat", ["runs(2).t"])["runs(2).t"].tolist() == (T + 1.0).tolist()
+    with pytest.raises(ImportMapError, match=r"runs is an array of 2 structs, expected which: runs\(1\)"):
+        read_columns(tmp_path / "run.mat", ["runs.t"])
+
+
+@pytest.mark.parametrize("header", [None, False])
+def test_a_first_line_with_a_hole_is_data_where_the_map_says_so(tmp_path, header):
+    """Without `header` a first line with `nan` in it passes for names."""
+    (tmp_path / "run.csv").write_text("0.0,nan\n0.1,5\n0.2,6\n")
+    table = read_columns(tmp_path / "run.csv", ["1", "2"], header=header)
+    assert len(table["2"]) == (2 if header is None else 3)
+
+
+def test_the_second_of_two_columns_of_a_name(tmp_path):
+    (tmp_path / "run.csv").write_text("t,q,q\n0,1,2\n1,3,4\n")
+    assert read_columns(tmp_path / "run.csv", ["t", "3"])["3"].tolist() == [2.0, 4.0]

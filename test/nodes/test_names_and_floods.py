@@ -1,0 +1,140 @@
+"""Names and quality of service by parameter, floods of commands, services that take long."""
+
+import threading
+import time
+
+import pytest
+from rclpy.lifecycle import LifecycleNode
+from rclpy.parameter import Parameter
+from rclpy.qos import ReliabilityPolicy
+
+from msg_adapters.ros import JointState, Trigger, WrenchStamped, stamp_of, torque_command_message
+from rsea_ros.hardware.device import NoReply
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._anchor import Anchor
+from rsea_ros.nodes._bench import MOST, NAMES, Bench
+from rsea_ros.nodes._flags import Flags
+from rsea_ros.nodes._qos import COMMAND, LATCHED, MEASUREMENT
+from test.nodes.test_driver import Spy
+
+VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
+    "rate": 200.0, "autostart": True, "command_timeout": 5.0, "effort_limit": 0.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def drive(listener):
+    """A function that makes a driver in this process; what it made is closed in the end."""
+    made = []
+
+    def make(name, overrides=(), **values):
+        node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
+        made.append((driver.Driver(node, VALUES | values), node))
+        listener._executor.add_node(node)
+        return made[-1]
+
+    yield make
+    for program, node in made:
+        program.close()
+        listener._executor.remove_node(node)
+        node.destroy_node()
+
+
+def test_joint_and_frames_are_parameters_and_quality_of_service_too(drive, listener):
+    best_effort = Parameter("qos_overrides./named/ft.publisher.reliability", value="best_effort")
+    drive("named", [best_effort], joint="left_knee", frame="thigh", ft_frame="shank")
+    states = listener.hear(JointState, "/named/joint_states", MEASUREMENT)
+    wrenches = listener.hear(WrenchStamped, "/named/ft", MEASUREMENT)
+    listener.until(lambda: states and wrenches)
+    assert (states[0].name, states[0].header.frame_id) == (["left_knee"], "thigh")
+    assert wrenches[0].header.frame_id == "shank"
+    kinds = {
+        name: listener.node.get_publishers_info_by_topic(f"/named/{name}")[0].qos_profile.reliability
+        for name in ("ft", "joint_states")
+    }
+    assert kinds == {"ft": ReliabilityPolicy.BEST_EFFORT, "joint_states": ReliabilityPolicy.RELIABLE}
+
+
+def test_of_a_flood_a_cycle_takes_a_bounded_number_and_the_newest_acts(listener, monkeypatch):
+    """20 kHz of commands stopped the cycle for as long as they lasted."""
+    names = {parameter.name: parameter.default for parameter in NAMES}
+    bench, anchor = Bench(listener.node, names, strict=True), Anchor()
+    publisher = listener.node.create_publisher(JointState, "torque_command", COMMAND)
+    listener.until(publisher.get_subscription_count)
+    for k in range(1000):
+        publisher.publish(torque_command_message(time.time_ns(), float(k)))
+    taken, add = [], bench.commands.add
+    monkeypatch.setattr(bench.commands, "add", lambda *command: (taken.append(command[1]), add(*command)))
+    counts = []
+
+    def polled():
+        before = len(taken)
+        bench.poll(anchor)
+        counts.append(len(taken) - before)
+        return taken and taken[-1] == 999.0
+
+    listener.until(polled)
+    assert max(counts) <= MOST
+    bench.commands.take(anchor.now())
+    assert bench.commands.torque == 999.0
+    bench.close()
+    listener.node.destroy_publisher(publisher)
+
+
+def test_the_flag_has_a_stamped_companion(listener):
+    flags = Flags(listener.node)
+    heard = listener.hear(JointState, "pure_torque_stamped", LATCHED)
+    flags.show(5 * 10**9 + 7, True)
+    listener.until(lambda: heard and heard[-1].effort[0] == 1.0)
+    assert stamp_of(heard[-1].header.stamp) == 5 * 10**9 + 7
+
+
+class Slow(Spy):
+    """A device that takes its time to recover, and loses a reply where that is asked for."""
+
+    def __init__(self):
+        super().__init__()
+        self.asked, self.go, self.losing, self.reads = threading.Event(), threading.Event(), False, 0
+
+    def read(self):
+        self.reads += 1
+        if self.losing:
+            self.losing = False
+            raise NoReply("no reply to read")
+        return super().read()
+
+    def recover(self):
+        self.asked.set()
+        assert self.go.wait(20.0)
+
+
+@pytest.fixture
+def slow(drive, monkeypatch):
+    """An active driver of such a device."""
+    device = Slow()
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: device})
+    yield device, *drive("slow")
+    device.go.set()
+
+
+def test_a_deactivation_gets_through_while_a_service_takes_long(slow, listener):
+    device, program, node = slow
+    program.joints[0].stop()
+    client = listener.node.create_client(Trigger, "/slow/slow/clear_fault")
+    listener.until(client.service_is_ready)
+    future = client.call_async(Trigger.Request())
+    listener.until(device.asked.is_set)
+    node.trigger_deactivate()
+    assert node._state_machine.current_state[1] == "inactive" and not future.done()
+    device.go.set()
+    listener.until(future.done)
+    assert future.result().success and not device.on and not program.joints[0].guarded.enabled
+
+
+def test_a_lost_reply_raises_the_level_and_is_named(slow, listener):
+    device, program, _ = slow
+    program.joints[0].report()
+    device.losing = True
+    listener.until(lambda: program.joints[0].guarded.cycles["failed_reads"] == 1)
+    report = program.joints[0].report()
+    assert "1 reads lost" in report.summary and report.level == b"\x01"

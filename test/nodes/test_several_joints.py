@@ -1,0 +1,179 @@
+"""Several joints of one bus in one driver: each with commands, limits, faults and services of its own."""
+
+import time
+
+import pytest
+from rclpy.lifecycle import LifecycleNode
+
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, stamp_of, torque_command_message
+from rsea_ros.errors import ParameterError
+from rsea_ros.hardware.peer.remote import RemoteBench
+from rsea_ros.nodes import driver
+from rsea_ros.nodes._joints import joint_table
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.test_driver import Spy
+
+JOINTS = ("hip", "knee", "ankle")
+X = {
+    "torque_limit": 3.0, "current_limit": 3.2, "voltage_limit": 10.0, "effort_limit": 0.0, "ft_limit": 0.0,
+    "power_limit": 20.0, "deflection_limit": 0.0, "ft_host": "", "rig": "bare_drive",
+}  # fmt: skip
+"""Of small motors of the X series without a spring."""
+
+
+def values_of(**given):
+    """The values of a driver node with parameters, as `declare` makes them."""
+    table = [*driver.TABLE, *joint_table(driver.TABLE, given)]
+    return {p.name: p.checked(given.get(p.name, p.default)) for p in table}
+
+
+def test_what_is_not_given_for_a_joint_is_as_for_the_node():
+    values = values_of(joints=["hip", "knee"], torque_limit=20.0, **{"knee.torque_limit": 5})
+    assert (values["hip.torque_limit"], values["knee.torque_limit"]) == (20.0, 5.0)
+    assert "hip.rate" not in values and "hip.joint" not in values
+
+
+BUS = {"device": "dynamixel_netft", "ft_host": "", "deflection_limit": 0.0, "ft_limit": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"joints": ["hip", "hip"]}, "hip twice, expected each joint once"),
+        ({"joints": ["left knee"]}, "'left knee', expected letters"),
+        ({"joints": "hip"}, "joints = 'hip', expected a list of texts"),
+        ({"joints": ["hip"], "hip.torque_limit": -1.0}, "hip.torque_limit = -1.0, expected a number"),
+        ({**BUS, "joints": ["hip", "knee"]}, "knee.id = 1, expected another than hip's"),
+        (
+            {**BUS, "joints": ["hip", "knee"], "knee.id": 2, "knee.baud": 57600},
+            "knee.baud = 57600, expected 1000000 as hip's on /dev/ttyUSB0",
+        ),
+        (
+            {"device": "dynamixel_netft", "joints": ["hip", "knee"], "knee.id": 2},
+            "knee.ft_host = 192.168.1.1, expected another than hip's",
+        ),
+    ],
+)  # fmt: skip
+def test_joints_that_cannot_be_are_refused(listener, given, told):
+    node = LifecycleNode("refused", namespace="refused")
+    with pytest.raises(ParameterError, match=told):
+        driver.Driver(node, values_of(**given))
+    node.destroy_node()
+
+
+class Leg:
+    """The driver process of three motors on one line."""
+
+    def __init__(self, bench, start, listener):
+        self.bench, self.listener = bench, listener
+        ids = {f"{joint}.id": k + 1 for k, joint in enumerate(JOINTS)}
+        known = {**bench.parameters(), **X, "baud": 4_000_000, "autostart": True, "joints": list(JOINTS)}
+        patient = {
+            "rate": 100.0, "latency": 0.05, "command_timeout": 5.0, "ft_timeout": 0.5, "watchdog": 2.0,
+            "lost_cycles": 20,
+        }  # fmt: skip
+        sensor = {"hip.ft_host": "127.0.0.1"}
+        self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
+        self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
+        self.commands = {
+            j: listener.node.create_publisher(JointState, f"/leg/{j}/torque_command", COMMAND) for j in JOINTS
+        }
+
+    def push(self, torques, condition):
+        """Command torques until the condition holds."""
+
+        def pushed():
+            assert self.process.running(), self.process.output[-5:]
+            for joint, torque in torques.items():
+                self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
+            return condition()
+
+        self.listener.until(pushed)
+
+    def together(self):
+        """The stamps of the hip (ns) that the other joints have too, to 50 us."""
+        hip, *others = ([stamp_of(m.header.stamp) for m in self.states[j][-200:]] for j in JOINTS)
+        return [at for at in hip if all(min(abs(at - t) for t in other) < 50_000 for other in others)]
+
+    def goals(self):
+        """The goals in counts, zero where the torque is off."""
+        return [goal if on else 0 for goal, on in (self.bench.torque(place) for place in range(3))]
+
+    def value(self, joint, key):
+        """The newest value that a joint's diagnostics have."""
+        for message in reversed(self.health):
+            if message.status[0].name == f"/leg/driver/{joint}":
+                return {pair.key: pair.value for pair in message.status[0].values}.get(key)
+        return None
+
+    def call(self, service):
+        """Call a service of the driver; return its answer."""
+        client = self.listener.node.create_client(Trigger, f"/leg/driver/{service}")
+        self.listener.until(client.service_is_ready)
+        future = client.call_async(Trigger.Request())
+        self.listener.until(future.done)
+        return future.result()
+
+
+@pytest.fixture(scope="module")
+def leg(tmp_path_factory, start, listener):
+    with RemoteBench(tmp_path_factory.mktemp("leg") / "tty", "--model", 1020, 1120, 1170) as bench:
+        yield Leg(bench, start, listener)
+
+
+TORQUES = {"hip": 0.5, "knee": -1.0, "ankle": 2.0}
+
+
+def test_each_follows_its_commands_in_one_exchange_a_cycle(leg):
+    leg.push(TORQUES, lambda: all(
+        leg.states[j] and abs(leg.states[j][-1].effort[0] - TORQUES[j]) < 0.3 for j in JOINTS
+    ))  # fmt: skip
+    assert [list(leg.states[j][-1].name) for j in JOINTS] == [[j] for j in JOINTS]
+    leg.push(TORQUES, lambda: len(leg.together()) > 20)  # never, where each had a transaction of its own
+    leg.push(TORQUES, lambda: leg.value("knee", "active") == "True")
+    leg.push(TORQUES, lambda: leg.value("ankle", "motor") == "XW540-T260")
+
+
+def test_a_fault_of_one_is_its_alone_and_ends_by_its_service(leg):
+    leg.bench.ask("set", motor=1, temperature=90)
+    leg.push(TORQUES, lambda: (leg.value("knee", "fault") or "").startswith("temperature"))
+    goals = leg.goals()
+    assert goals[1] == 0 and goals[0] > 0 and goals[2] > 0
+    refused = leg.call("knee/clear_fault")
+    assert not refused.success and "is still there" in refused.message
+    leg.bench.ask("set", motor=1, temperature=30)
+    assert leg.call("knee/clear_fault").success
+    leg.push(TORQUES, lambda: leg.goals()[1] < 0)
+    assert leg.value("hip", "fault") == leg.value("ankle", "fault") == "none"
+
+
+def test_stop_is_for_all_and_so_is_clear_fault(leg):
+    assert leg.call("stop").success
+    leg.push(TORQUES, lambda: leg.goals() == [0, 0, 0])
+    answer = leg.call("clear_fault")
+    assert answer.success and answer.message == "clear_fault: hip done, knee done, ankle done"
+    leg.push(TORQUES, lambda: all(leg.goals()))
+
+
+def test_all_are_zero_before_the_first_is_closed(listener, monkeypatch):
+    """A motor that does not answer takes its time to be closed; the others held their torque meanwhile."""
+    order, spies = [], {"hip": Spy(), "knee": Spy()}
+    for name, spy in spies.items():
+        monkeypatch.setattr(spy, "write", lambda torque, name=name: order.append((name, torque)))
+        monkeypatch.setattr(spy, "close", lambda name=name: order.append((name, "closed")))
+    monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"]]})
+    node = LifecycleNode("ended", namespace="ended")
+    program = driver.Driver(node, values_of(joints=["hip", "knee"], autostart=True))
+    program._cycle.stop()
+    order.clear()
+    program.close()
+    node.destroy_node()
+    assert order[:2] == [("hip", 0.0), ("knee", 0.0)]
+    assert set(order[2:]) == {("hip", "closed"), ("knee", "closed")}
+
+
+def test_its_end_is_the_end_of_all_torques(leg):
+    leg.push(TORQUES, lambda: all(leg.goals()))
+    assert leg.process.stop() == 0
+    assert leg.goals() == [0, 0, 0]

@@ -1,0 +1,79 @@
+"""The page in a real browser: it draws, says nothing wrong, asks nobody else, and lets go of the command."""
+
+import time
+
+import pytest
+
+from rsea_ros.watch.command import PATIENCE, RELEASE
+from test.watch.browser import CHROMIUM, Browser
+
+HIDDEN = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true});" \
+    "document.dispatchEvent(new Event('visibilitychange'))"  # fmt: skip
+INK = """(() => { const c = document.getElementById('%s'); const d = c.getContext('2d')
+  .getImageData(0, 0, c.width, c.height).data; let n = 0; for (let k = 3; k < d.length; k += 4) n += d[k] > 0;
+  return n / (c.width * c.height); })()"""
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    if CHROMIUM is None:
+        pytest.skip("chromium not installed: apt-get install chromium")
+    made = Browser(tmp_path_factory.mktemp("profile"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def page(server, browser):
+    """The page, live."""
+    browser.errors.clear()
+    browser.requests.clear()
+    browser.open(*server.addresses)
+    browser.until("typeof now === 'number' && now > 0.3")
+    return browser
+
+
+def text(page, name):
+    return page.value(f"document.getElementById('{name}').innerText")
+
+
+def held(commander):
+    deadline = time.monotonic() + 5.0
+    while (torque := commander.torque(time.monotonic())) is None or torque < 0.5:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_it_draws_without_an_error_and_asks_only_its_server(page, server):
+    page.until("document.querySelector('#health b')")
+    assert page.value(INK % "torque") > 0.01 and page.value(INK % "flag") > 0.2
+    assert text(page, "pure") == "pure torque" and "<b>plant" in text(page, "health")
+    assert page.value("location.href") == f"http://localhost:{server.port}/", "the token left the address"
+    for width in (1400, 400):
+        page.size(width, 900)
+        assert page.value("document.documentElement.scrollWidth") <= width
+    assert all(address.startswith(f"http://localhost:{server.port}/") for address in page.requests)
+    assert page.errors == []
+
+
+@pytest.mark.parametrize(
+    "leave",
+    [HIDDEN % "true", "socket.close()", "document.getElementById('go').click()", "location = 'about:blank'"],
+)
+def test_the_torque_is_zero_when_the_page_is_left(page, commander, leave):
+    page.until("!document.getElementById('go').disabled && !document.getElementById('command').hidden")
+    page.value("document.getElementById('go').click()")
+    held(commander)
+    page.value(leave)
+    left = time.monotonic()
+    while commander.holder is not None:
+        assert time.monotonic() < left + PATIENCE
+        time.sleep(0.002)
+    time.sleep(RELEASE)
+    assert commander.torque(time.monotonic() + RELEASE) in (0.0, None)
+
+
+def test_more_than_the_limit_is_not_even_asked_for(page, commander):
+    page.until("document.getElementById('amplitude').max === '10'")
+    page.value("document.getElementById('amplitude').value = '10.5'; document.getElementById('go').click()")
+    assert text(page, "go") == "Start" and not commander.active
