@@ -21,6 +21,8 @@ from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000
 """Of the missing torque that are drawn."""
+LAW = "law"
+"""What a law of a past is drawn over: its own value, for no variable of the moment tells it."""
 _FIRST = ("theta", "h", "d", "w", "u", "T", "q", "t", "share")
 _NO_PROVENANCE = Provenance("an unknown date", "0", {"unknown": "0"}, "")
 
@@ -85,6 +87,8 @@ def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, flo
     inside = np.linspace(0.02, 0.98, min(_POINTS, len(t))) * (len(t) - 1)
     k = np.unique(inside.astype(np.int64))
     course = law.values(bench.variables) * (values.get("size", 1.0))
+    if law.parts and law.parts[0].term.memory:
+        over, letters = LAW, {**letters, LAW: course}
     return Shown(
         t=t[k], x=np.interp(t[k], at, letters[over]), values=bench.missing.torque[k],
         law=np.interp(t[k], at, course), over=over, sd=bench.missing.sd,
