@@ -29,7 +29,7 @@ from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.refinement import Refined, acting, effect_from, refine
 from rsea_ros.laws.result import LawResult, Tried, WrittenLaw
-from rsea_ros.laws.selection import Model, paths, simplest, standard_error
+from rsea_ros.laws.selection import MOST_TERMS, Model, paths, simplest, standard_error
 from rsea_ros.laws.writing import Provenance
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
@@ -164,7 +164,11 @@ def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
     best = simplest(models, gram)
     if not surely_helps(gram, none, best.left, best.columns, ()):
         return Choice(tuple(models))
-    more = paths(gram, search.candidates, best.columns, most=3)
+    more = [
+        m
+        for m in paths(gram, search.candidates, best.columns, most=3)
+        if m.place != best.place or len(best.columns) + len(m.columns) <= MOST_TERMS
+    ]
     second = simplest([Model(best.place, (), best.left), *more], gram)
     helps = second.columns and surely_helps(gram, best.left, second.left, second.columns, best.columns)
     taken = (best, second) if helps else (best,)

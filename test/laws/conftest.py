@@ -14,7 +14,7 @@ from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import load_rig
 
 sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "effects")]
-SECONDS = 12.0
+SECONDS = 8.0
 
 
 @cache
