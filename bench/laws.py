@@ -30,7 +30,8 @@ from rsea_ros.diagnosis.score import Score, score
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.identification.identify import fit
 from rsea_ros.identification.problem import simulated
-from rsea_ros.laws.learn import gain_of, learn
+from rsea_ros.laws.fitting import gain_of
+from rsea_ros.laws.learn import learn
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.model.rig_file import load_rig
