@@ -57,11 +57,12 @@ def real() -> bool:
                 run_real(warm, make_fleet(root / "warmers", 4), workers)
                 took[count] = timed(partial(run_real, stores[count], bags, workers))
         equal = content(stores[0]) == content(stores[1]) == content(stores[2])
-        good = line("rows serial, 1, 2 workers", "equal bit for bit", "equal" if equal else "DIFFERENT", equal)
+        good = line("rows serial, 1, 2 workers", "bit for bit", "equal" if equal else "DIFFERENT", equal)
         faster = took[1] / took[2]
         said = f"{took[0]:.1f} s serial, {took[1]:.1f} s on one, {took[2]:.1f} s on two: {faster:.2f} ×"
         good &= line("1 → 2 workers", "≥ 1.8 ×", said, faster >= 1.8)
-        work = sum(read(f, ["seconds"])["seconds"].to_numpy().sum() for f in stores[0].rows.rglob("*.parquet"))
+        files = stores[0].rows.rglob("*.parquet")
+        work = sum(read(file, ["seconds"])["seconds"].to_numpy().sum() for file in files)
         return good & overhead("overhead, serial", took[0], work)
 
 
@@ -79,7 +80,7 @@ def timed(work: Callable[[], object]) -> float:
 
 
 def scheduler(count: int = 10_000) -> bool:
-    """Send stub tasks through an embedded cluster; watch the memory of the process that schedules and writes."""
+    """Send stub tasks through an embedded cluster; watch the memory of the process that schedules."""
     count = int(os.environ.get("BENCH_TASKS", count))
     os.environ[stub.TAKES] = "0"
     with tempfile.TemporaryDirectory(prefix="rsea-bench-") as folder:
@@ -169,7 +170,7 @@ def memory() -> bool:
     for size, peak in found:
         line("memory of a task", "–", f"{peak / MEGA:.0f} MB for a recording of {size / MEGA:.1f} MB")
     slope, base = np.polyfit(*np.array(found, float).T, 1)
-    return line("memory of a task", "BASE and FACTOR of engine.py above", f"{base / MEGA:.0f} MB + {slope:.1f} × bytes")
+    return line("memory of a task", "BASE, FACTOR", f"{base / MEGA:.0f} MB + {slope:.1f} × bytes")
 
 
 def million() -> bool:
