@@ -1,4 +1,4 @@
-"""Real small recordings and the real work on them, to measure the whole; workers import it."""
+"""Small recordings and the real work on them, for measurements of the whole. Workers import this."""
 
 from __future__ import annotations
 
