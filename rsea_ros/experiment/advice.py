@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rsea_ros.experiment.apart import Apart, measurements_apart
 from rsea_ros.experiment.bound import Bound, bound
@@ -26,12 +26,16 @@ class Proof:
 
 @dataclass(frozen=True)
 class Advice:
-    """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates."""
+    """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates.
+
+    excluded: causes that the records so far speak against, with their probability.
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     asked: Asked
     proposal: Proposal | None
     proofs: tuple[Proof, ...]
+    excluded: Mapping[str, float] = field(default_factory=dict)
 
 
 _WORTH = 0.02

@@ -22,6 +22,7 @@ def advice_json(advice: Advice) -> dict[str, Any]:
         "schema": SCHEMA,
         "sentence": verdict(advice),
         "causes": {h.name: h.probability for h in advice.hypotheses},
+        "excluded": dict(advice.excluded),
         "limits": advice.asked.limits.stated(),
         "limits_hold_with_probability": LEVEL,
         "run": None if p is None else proposal_json(p),

@@ -60,6 +60,7 @@ def _keys(p: Proposal) -> list[tuple[str, str]]:
 
 def _causes(advice: Advice) -> str:
     rows = [(plain_name(h.name), f"{h.probability:.3f}") for h in advice.hypotheses]
+    rows += [(f"{plain_name(n)} (excluded by the records)", f"{p:.1g}") for n, p in advice.excluded.items()]
     return section("Still possible", table(("cause", "probability"), rows, {1}))
 
 
