@@ -57,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
-    from rsea_ros.experiment.design import Asked
     from rsea_ros.experiment.limits import limits_from
+    from rsea_ros.experiment.proposal import Asked
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.design import Proposal
 from rsea_ros.experiment.margins import LEVEL
+from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment_words import proof_words, verdict
 from rsea_ros.report.identification_json import strict
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.experiment.advice import Advice
-from rsea_ros.experiment.design import Proposal
+from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment_words import (
     LEVEL_WORDS,
     limit_rows,
