@@ -113,9 +113,7 @@ def _hopeless(judge: Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray
     return apart
 
 
-def _per_second(
-    judge: Judge, table: FloatArray, apart: BoolArray, asked: Asked
-) -> list[tuple[float, float]]:
+def _per_second(judge: Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
     """Return what a shape decides a second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
