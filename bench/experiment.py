@@ -31,9 +31,10 @@ from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
 from rsea_ros.cli.demo import EXCITED, PATIENT  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
-from rsea_ros.experiment.design import Asked, propose  # noqa: E402
+from rsea_ros.experiment.design import propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.proposal import Asked  # noqa: E402
 from rsea_ros.experiment.shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighing import weigh  # noqa: E402
 from rsea_ros.hardware.peer.remote import RemoteBench  # noqa: E402

@@ -1,4 +1,4 @@
-"""Small recordings and the real work on them, for measurements of the whole. Workers import this."""
+"""Real small recordings and the real work on them, to measure the whole; workers import it."""
 
 from __future__ import annotations
 

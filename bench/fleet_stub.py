@@ -1,4 +1,4 @@
-"""Stub recordings and stub work on them, for measurements of the engine alone. Workers import this."""
+"""Stub recordings and the stub work on them, to measure the engine alone; workers import it."""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,8 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Design the run and write it."""
     from rsea_ros.experiment.advice import advise
-    from rsea_ros.experiment.design import Asked
     from rsea_ros.experiment.limits import limits_from
+    from rsea_ros.experiment.proposal import Asked
     from rsea_ros.identification.workers import worker_pools
 
     place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])
@@ -67,8 +68,8 @@ def run(args: argparse.Namespace) -> int:
     models = [model for path in args.models for model in models_in(path)]
     with progress("experiment") as tell, worker_pools() as pools:
         tell("reading", 0.0)
-        hypotheses, noise = _possible(models, args, pools.run)
-        advice = advise(hypotheses, asked, noise, pools.run, tell)
+        hypotheses, noise, excluded = _possible(models, args, pools.run)
+        advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
     report = written(advice, place, args)
     if args.json:
         print((report.parent / JSON).read_text(encoding="utf-8"), end="")
@@ -95,24 +96,28 @@ def models_in(path: str) -> list[Model]:
 
 def _possible(
     models: Sequence[Model], args: argparse.Namespace, run: Map
-) -> tuple[list[Hypothesis], dict[str, float]]:
-    """Return the hypotheses, and the noise by channel as bags show it (empty without bags)."""
+) -> tuple[list[Hypothesis], dict[str, float], dict[str, float]]:
+    """Return the hypotheses; as bags show it, the noise by channel, and the causes that they exclude.
+
+    With bags, that there is no cause at all is a hypothesis too.
+    """
     from rsea_ros.experiment.files import hypotheses_from
 
     if not args.bag:
-        return hypotheses_from(models), {}
+        return hypotheses_from(models), {}, {}
     from rsea_ros.cli.diagnose import readable
+    from rsea_ros.experiment.campaign import Rules
     from rsea_ros.experiment.hypothesis import NOTHING
     from rsea_ros.experiment.weighing import weigh
 
     first = models[0].rig
     rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
     records = [readable(bag, topic_map(args)) for bag in args.bag]
-    names = [m.name for m in models if m.name != NOTHING]
-    weighing = weigh(records, rig, names, run=run)
-    listed = {m.name for m in models}
-    kept = [h for h in weighing.hypotheses() if h.name in listed]
-    return kept, dict(weighing.cases[0].noise)
+    weighing = weigh(records, rig, [m.name for m in models if m.name != NOTHING], run=run)
+    likely = weighing.hypotheses()
+    kept = [h for h in likely if h.probability >= Rules.possible] or likely[:1]
+    excluded = {h.name: h.probability for h in likely if h not in kept}
+    return kept, dict(weighing.cases[0].noise), excluded
 
 
 def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
@@ -135,6 +140,10 @@ def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.report.experiment_words import limit_rows, plain_name, proof_words, verdict
 
     print(verdict(advice))
+    for h in advice.hypotheses:
+        print(f"possible    {plain_name(h.name)}: probability {h.probability:.3f}")
+    for name, probability in advice.excluded.items():
+        print(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}")
     p = advice.proposal
     if p is not None:
         for i, a in enumerate(p.names):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rsea_ros.experiment.apart import Apart, measurements_apart
 from rsea_ros.experiment.bound import Bound, bound
-from rsea_ros.experiment.design import Asked, Proposal, noise_by_channel, propose
+from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.experiment.judge import noise_by_channel
+from rsea_ros.experiment.proposal import Asked, Proposal
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.progress import Progress
 
@@ -26,12 +28,16 @@ class Proof:
 
 @dataclass(frozen=True)
 class Advice:
-    """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates."""
+    """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates.
+
+    excluded: causes that the records so far speak against, with their probability.
+    """
 
     hypotheses: tuple[Hypothesis, ...]
     asked: Asked
     proposal: Proposal | None
     proofs: tuple[Proof, ...]
+    excluded: Mapping[str, float] = field(default_factory=dict)
 
 
 _WORTH = 0.02

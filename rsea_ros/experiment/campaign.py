@@ -12,9 +12,10 @@ from typing import Literal
 
 from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
 from rsea_ros.experiment.advice import Proof, proofs_of
-from rsea_ros.experiment.design import Asked, Proposal, propose
+from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.limits import used
+from rsea_ros.experiment.proposal import Asked, Proposal
 from rsea_ros.experiment.weighing import Weighing, weigh
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig

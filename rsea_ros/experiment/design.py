@@ -1,5 +1,4 @@
-"""Design of a run: the shape and length that decide most for each second, within limits that are held in
-doubt.
+"""Design of a run: the shape and length that decide most for each second, within limits that hold in doubt.
 
 Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
 objective: gear friction and stops make none. Judged by simulation with the compiled step: separation.py says
@@ -9,22 +8,19 @@ by what. The final amplitude is the largest at which margins.py holds all limits
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
-from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.experiment.judge import INSIDE, Judge, noise_by_channel
 from rsea_ros.experiment.margins import Peaks, ends_of, peaks, share_used
+from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.refine import refined
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
-from rsea_ros.experiment.shape import Kind, Shape, command_of
-from rsea_ros.identification.identify import CHANNELS
-from rsea_ros.identification.problem import Case
+from rsea_ros.experiment.shape import Shape
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -53,64 +49,7 @@ _FAR = 1e4
 """S of one linear step, above which a full fit of the rival would not bring it near nothing."""
 _KEPT = 0.8
 """Of what the probe promises of a shorter run, what that must keep; else it is made longer."""
-_INSIDE = 0.9
-"""Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
 _SMALLEST, _BISECTIONS = 0.01, 8
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What a design may do. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
-
-    limits: Limits
-    rate: float = 280.0
-    shortest: float = 0.5
-    longest: float = 10.0
-    probe: float = 2.0
-    refine: int = 24
-    kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.shortest <= self.longest:
-            raise ParameterError(
-                f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
-            )
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A run to be played, and what is expected of it.
-
-    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
-    table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
-    share that it decides; sharpened: nats by which it narrows the parameters where one cause is left.
-    expected, at_level: peaks of every quantity.
-    """
-
-    shape: Shape
-    duration: float
-    rate: float
-    command: FloatArray
-    names: tuple[str, ...]
-    table: FloatArray
-    hopeless: tuple[tuple[str, str], ...]
-    decided: float
-    sharpened: float
-    peaks: Peaks
-    tried: int = 0
-    energy: float = field(default=0.0)
-
-    @property
-    def worst(self) -> tuple[str, str, float] | None:
-        """The pair that it separates least of those that can be, with its S; None for a single cause."""
-        table = self.table.copy()
-        for pair in self.hopeless:
-            i, j = (self.names.index(n) for n in pair)
-            table[i, j] = table[j, i] = np.inf
-        if not np.isfinite(table).any():
-            return None
-        i, j = divmod(int(np.argmin(table)), len(table))
-        return self.names[i], self.names[j], float(table[i, j])
 
 
 def check_commanded_by_torque(rig: Rig) -> None:
@@ -120,58 +59,6 @@ def check_commanded_by_torque(rig: Rig) -> None:
             f"rig {rig.name}: positions command it, expected a rig that torques command: "
             "limits of the torque do not bound a position loop"
         )
-
-
-@dataclass(frozen=True)
-class _Judge:
-    """Judges shapes for hypotheses. noise: by channel."""
-
-    hypotheses: Sequence[Hypothesis]
-    asked: Asked
-    noise: Mapping[str, float]
-    run: Map
-
-    def within(self, shape: Shape, duration: float) -> FloatArray:
-        """Return the command of a shape in shares, as large as the limits allow at the likeliest values."""
-        limits, rate = self.asked.limits, self.asked.rate
-        whole = abs(shape.bias) + shape.amplitude
-        size = limits.torque * min(1.0, 1.0 / whole) * _INSIDE
-        scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
-        command = command_of(scaled, duration, rate, limits.slew)
-        for _ in range(3):
-            share = max(self.share(h, command) for h in self.hypotheses)
-            if share <= _INSIDE * 1.05:
-                break
-            command = command * (_INSIDE / share if math.isfinite(share) else 0.5)
-        return command
-
-    def share(self, hypothesis: Hypothesis, command: FloatArray) -> float:
-        """Return the share of the limits that a command uses at the likeliest values."""
-        rate = self.asked.rate
-        rig = hypothesis.rig_at(hypothesis.if_there())
-        found = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
-        return used(found, self.asked.limits)
-
-    def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
-        """Return what each hypothesis predicts of a command."""
-        case = self.case(command, is_quick=is_quick)
-        return [response(h, case, self.run) for h in self.hypotheses]
-
-    def case(self, command: FloatArray, *, is_quick: bool) -> Case:
-        """Return a run of a command, not yet made."""
-        return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
-
-    @property
-    def probability(self) -> FloatArray:
-        """Of each hypothesis, shape (k,)."""
-        return np.array([h.probability for h in self.hypotheses])
-
-
-def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
-    """Return the noise of every channel that the bench measures."""
-    rig = hypotheses[0].problem.rig
-    listed = [n for n in CHANNELS if n in (measured or rig.sensors) and rig.measures(n)]
-    return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}
 
 
 def propose(
@@ -187,7 +74,7 @@ def propose(
     """
     say = tell or (lambda step, share: None)
     check_commanded_by_torque(hypotheses[0].problem.rig)
-    judge = _Judge(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
+    judge = Judge(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
     if len(hypotheses) == 1:
         return _sharpest(judge, say)
     shapes = [s for s in TRIED if s.kind in asked.kinds]
@@ -212,7 +99,7 @@ def propose(
     return _final(judge, shape, length, apart, 2 * len(shapes) + count)
 
 
-def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
+def _hopeless(judge: Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
     """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
     stack, asked = np.array(tables), judge.asked
     apart = np.eye(len(judge.hypotheses), dtype=bool)
@@ -226,66 +113,17 @@ def _hopeless(judge: _Judge, shapes: Sequence[Shape], tables: Sequence[FloatArra
     return apart
 
 
-def _per_second(
-    judge: _Judge, table: FloatArray, apart: BoolArray, asked: Asked
-) -> list[tuple[float, float]]:
+def _per_second(judge: Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
     """Return what a shape decides a second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
 
-def refined(start: Shape, value: Callable[[Shape], float], asked: Asked, say: Progress) -> tuple[Shape, int]:
-    """Return the shape near `start` of the largest value, and how many were judged."""
-    names = {
-        "multisine": ("bias", "amplitude", "low", "high", "tilt"),
-        "chirp": ("bias", "amplitude", "low", "high"),
-        "steps": ("bias", "amplitude", "hold"),
-        "holds": ("bias", "amplitude", "hold"),
-    }[start.kind]
-    first = np.array([_inner(n, getattr(start, n)) for n in names])
-    seen: list[tuple[float, Shape]] = []
-
-    def loss(x: FloatArray) -> float:
-        moved: dict[str, Any] = {n: _outer(n, float(v), asked) for n, v in zip(names, x, strict=True)}
-        shape = replace(start, **moved)
-        shape = replace(shape, high=max(shape.high, 1.5 * shape.low))
-        seen.append((value(shape), shape))
-        say("refining", 0.6 + 0.35 * min(1.0, len(seen) / max(asked.refine, 1)))
-        return -seen[-1][0]
-
-    if asked.refine:
-        simplex = np.vstack([first, *(first + 0.25 * np.eye(len(first)))])
-        options = {"maxfev": asked.refine, "initial_simplex": simplex, "xatol": 0.02, "fatol": 2e-3}
-        minimize(loss, first, method="Nelder-Mead", options=options)
-    return (max(seen, key=lambda item: item[0])[1] if seen else start), len(seen)
-
-
-_LOGARITHMIC = ("low", "high", "hold")
-
-
-def _inner(name: str, value: float) -> float:
-    return math.log(value) if name in _LOGARITHMIC else value
-
-
-def _outer(name: str, x: float, asked: Asked) -> float:
-    """Return the value of a shape's number inside what makes sense for it."""
-    value = math.exp(min(x, 50.0)) if name in _LOGARITHMIC else x
-    low, high = {
-        "bias": (-0.8, 0.8),
-        "amplitude": (0.1, 1.0),
-        "low": (0.05, 0.2 * asked.rate),
-        "high": (1.0, 0.475 * asked.rate),
-        "tilt": (-0.5, 1.5),
-        "hold": (0.02, 2.0),
-    }[name]
-    return min(max(value, low), high)
-
-
-def _final(judge: _Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
+def _final(judge: Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = judge.asked, judge.hypotheses
-    command, found = held(judge.within(shape, length) / _INSIDE, asked, ends_of(hypotheses))
+    command, found = held(judge.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
     responses = judge.responses(command, is_quick=False)
     table = _with_refits(judge, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)
@@ -326,7 +164,7 @@ def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tu
     return best
 
 
-def _with_refits(judge: _Judge, command: FloatArray, table: FloatArray) -> FloatArray:
+def _with_refits(judge: Judge, command: FloatArray, table: FloatArray) -> FloatArray:
     """Return S with a full fit of each nearest rival, where one linear step does not settle it."""
     case, table = judge.case(command, is_quick=False), table.copy()
     for i, row in enumerate(table):
@@ -336,7 +174,7 @@ def _with_refits(judge: _Judge, command: FloatArray, table: FloatArray) -> Float
     return table
 
 
-def _sharpest(judge: _Judge, say: Progress) -> Proposal:
+def _sharpest(judge: Judge, say: Progress) -> Proposal:
     """Return the run that narrows the parameters of a single cause most (D-optimality)."""
     asked = judge.asked
     shapes = [s for s in TRIED if s.kind in asked.kinds]

@@ -13,28 +13,20 @@ Neural Computation 4, 1992.)
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rsea_ros.checks.faults import check
-from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.effects.guess import Guess
+from rsea_ros.experiment.fits import fitted, fitted_again
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
-from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
-from rsea_ros.identification.problem import Case, Problem, case_from
-from rsea_ros.identification.solver import Map, Solution, power, serial, solve
+from rsea_ros.experiment.prior import problem_of, weights_of
+from rsea_ros.identification.problem import Case, case_from
+from rsea_ros.identification.solver import Map, Solution, power, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, FloatArray, Record
 
-_SHARE = 0.15
-"""Of a cause's typical size, where fits begin too."""
-_LITTLE, _CLOSE = 4.0, 1.5
-"""A fit whose cost lies between these, above the least and times the least, is begun once more."""
-_GAIN = 1e-4
-_ITERATIONS = 12
 HOPELESS = 1e-6
 """Probability below which a cause is not fitted again to further records."""
 
@@ -131,69 +123,17 @@ def weigh(
     names = [NOTHING, *causes]
     if before is not None:
         names = [n for n in names if before.probability.get(n, 0.0) > HOPELESS]
-    nominal = _fitted(NOTHING, problem_of(NOTHING, rig, cases), before, {}, run)
+    nominal = fitted(NOTHING, problem_of(NOTHING, rig, cases), _where(before, NOTHING), {}, run)
     near = dict(zip((u.name for u in nominal.problem.unknowns), nominal.theta, strict=True))
     solutions = {NOTHING: nominal}
     for name in (n for n in names if n != NOTHING):
-        solutions[name] = _fitted(name, problem_of(name, rig, cases), before, near, run)
-    return _weighed(_again(solutions, run), cases)
+        solutions[name] = fitted(name, problem_of(name, rig, cases), _where(before, name), near, run)
+    return _weighed(fitted_again(solutions, run), cases)
 
 
-def _fitted(
-    name: str, problem: Problem, before: Weighing | None, near: Mapping[str, float], run: Map
-) -> Solution:
-    """Return a cause fitted from the best of its guesses, and from where it was or the rig's own fit."""
-    guesses = effect_named(name).default_guesses if name != NOTHING else [{}]
-    named = [{f"{name}.{k}": v for k, v in guess.items()} for guess in [*guesses, *_smaller(name, guesses)]]
-    warm = before.fits[name].solution.theta if before is not None and name in before.fits else None
-    rows = [vector_at(problem, {}, guess) for guess in named]
-    others = (
-        [warm] if warm is not None else [vector_at(problem, near, guess) for guess in named] if near else []
-    )
-    starts = [_best(problem, group, run) for group in (rows, others) if group]
-    fits = [solve(problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run) for theta in starts]
-    return min(fits, key=lambda s: s.cost)
-
-
-def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
-    """Return guesses of a cause with a share of its typical size: a minimum may lie nearer to none at all."""
-    if name == NOTHING:
-        return []
-    main = effect_named(name).main
-    if not math.isfinite(main.null) or (main.logarithmic and main.null <= 0.0):
-        return []
-    return [{**g, main.name: main.null + _SHARE * (g[main.name] - main.null)} for g in guesses]
-
-
-def _again(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
-    """Return the fits, those that left a little more than the best once more from the rig's values there.
-
-    A fit that began far from where the rig's own values end may stop in a place that is none.
-    """
-    best = min(fits.values(), key=lambda s: s.cost)
-    rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
-    again = dict(fits)
-    for name, fit in fits.items():
-        if best.cost + _LITTLE < fit.cost < _CLOSE * best.cost and name != NOTHING:
-            theta = np.array(
-                [rig.get(u.name, float(v)) for u, v in zip(fit.problem.unknowns, fit.theta, strict=True)]
-            )
-            other = solve(fit.problem, theta, iterations=_ITERATIONS, gain=_GAIN, run=run)
-            again[name] = min(fit, other, key=lambda s: s.cost)
-    return again
-
-
-def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:
-    """Return the start of the least cost; fits that begin far off may end in a place that is none."""
-    if len(thetas) == 1:
-        return thetas[0]
-    costs = run(lambda k: np.array([_cost(problem, thetas[k])]), range(len(thetas)))
-    return thetas[int(np.argmin([float(c[0]) for c in costs]))]
-
-
-def _cost(problem: Problem, theta: FloatArray) -> float:
-    away = theta - np.array([u.inner(u.start) for u in problem.unknowns])
-    return power(problem.residual(theta)) + float(weights_of(problem) @ away**2)
+def _where(before: Weighing | None, name: str) -> FloatArray | None:
+    """Return where the fit of a cause ended before, None for one that was not fitted."""
+    return before.fits[name].solution.theta if before is not None and name in before.fits else None
 
 
 def information_of(solution: Solution, scale: float) -> FloatArray:

@@ -24,6 +24,7 @@ from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 
 SETTINGS: Mapping[str, Any] = {
+    "distributed.worker.preload": ["rsea_ros.fleet.worker"],
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,

@@ -25,7 +25,7 @@ class Hypothesis:
     value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
     alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
     below which the data cannot show it, as a delay within a sample. relative: `apply` takes the new value
-    over the old one.
+    over the old one. common: one sigma of the value that every look has in common, as that of a calibration.
     """
 
     code: str
@@ -40,6 +40,7 @@ class Hypothesis:
     apply: Callable[[Rig, float], Rig]
     grain: float = 0.0
     relative: bool = False
+    common: float = 0.0
 
     @property
     def inner(self) -> float:

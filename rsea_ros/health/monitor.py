@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.errors import RigError
 from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import Answer, Changes
 from rsea_ros.health.estimates import Estimate
@@ -38,12 +39,21 @@ class Monitor:
     """
 
     def __init__(self, rig: Rig, noise: Noise, settings: Settings | None = None) -> None:
+        """Raises RigError for a rig that the observer cannot follow."""
+        if rig.loop is not None:
+            raise RigError(f"rig {rig.name}: a position loop commands it, expected torques as commands")
         self._rig, self._noise, self._settings = rig, noise, settings or Settings()
+        Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold)
+        self._least = STILL * noise.position if math.isfinite(noise.position) else 0.0
         self.sensors = Sensors(rig)
+        self.looks = self.still = self.jumps = self.late = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Learn anew how the joint is."""
         self._cutter = Cutter(self._settings.every)
         self._first: list[Look] = []
         self.changes: Changes | None = None
-        self.looks = self.still = self.jumps = self.late = 0
         self.now = -math.inf
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
@@ -90,7 +100,7 @@ class Monitor:
 
     def _judge(self, look: Look) -> None:
         self.looks += 1
-        if self.sensors.frozen or look.travel() < STILL * self._noise.position:
+        if self.sensors.frozen or look.travel() < self._least:
             self.still += 1
             if self.changes is not None:
                 self.changes.estimates.hold()
@@ -109,8 +119,11 @@ class Monitor:
         models = hypotheses_of(self._rig, period)
         single = (*(h for h in models if h.name != FACTOR), *nuisances_of(self._rig))
         rig, now = tuned(self._rig, self._noise, single, self._first, self._settings.hold)
-        values = {h.name: h.value for h in now}
-        hypotheses = tuple(replace(h, value=values.get(h.name, h.value)) for h in models)
+        known = {h.name: h for h in now}
+        hypotheses = tuple(
+            replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h
+            for h in models
+        )
         self._start(rig, hypotheses, {h.name: h.value for h in models})
 
     def _start(self, rig: Rig, hypotheses: tuple[Hypothesis, ...], models: dict[str, float]) -> None:

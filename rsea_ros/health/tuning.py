@@ -35,17 +35,22 @@ def tuned(
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
         bank = Bank(rig, noise, now, hold)
-        total = _change([bank.judge(look) for look in looks], hypotheses, total)
+        total, sigma = _change([bank.judge(look) for look in looks], hypotheses, total)
         changes = list(zip(hypotheses, total.tolist(), strict=True))
-        now = tuple(replace(h, value=min(max(h.value + by, h.low), h.high)) for h, by in changes)
+        now = tuple(
+            replace(h, value=min(max(h.value + by, h.low), h.high), common=s)
+            for (h, by), s in zip(changes, sigma.tolist(), strict=True)
+        )
         rig = first
         for hypothesis, by in changes:
             rig = hypothesis.changed(rig, by)
     return rig, now
 
 
-def _change(found: Sequence[Evidence], hypotheses: Sequence[Hypothesis], before: FloatArray) -> FloatArray:
-    """Return the change of each parameter in all, (p,). before: of what the looks were judged with."""
+def _change(
+    found: Sequence[Evidence], hypotheses: Sequence[Hypothesis], before: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
     from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs
 
     scatter = scatter_of(found)
@@ -55,5 +60,5 @@ def _change(found: Sequence[Evidence], hypotheses: Sequence[Hypothesis], before:
     information, score = information * np.outer(doubt, doubt), score * doubt
     root = np.linalg.cholesky(information + np.eye(len(doubt)))
     wanted = np.linalg.solve(root, score + information @ (before / doubt))
-    result: FloatArray = doubt * lsq_linear(root.T, wanted, bounds=(-SURE, SURE)).x
-    return result
+    sigma = doubt * np.sqrt(np.diag(np.linalg.inv(root @ root.T)))
+    return doubt * lsq_linear(root.T, wanted, bounds=(-SURE, SURE)).x, sigma

@@ -12,8 +12,8 @@ from rsea_ros.laws.columns import Bench
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.law import Curve, Law, Part, joined
+from rsea_ros.laws.reading import ranges_of
 from rsea_ros.laws.selection import Model
-from rsea_ros.laws.writing import ranges_of
 
 _POINTS = 41
 """Of a learnt curve, evenly apart."""

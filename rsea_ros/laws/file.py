@@ -14,9 +14,10 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.claims import claims_of
 from rsea_ros.laws.columns import bench_of
 from rsea_ros.laws.law import Law
+from rsea_ros.laws.reading import letters_of
 from rsea_ros.laws.refinement import Refined, effect_from
 from rsea_ros.laws.result import Shown, WrittenLaw
-from rsea_ros.laws.writing import Provenance, letters_of, source_of
+from rsea_ros.laws.writing import Provenance, source_of
 from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000

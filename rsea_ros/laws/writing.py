@@ -9,34 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from rsea_ros.effects.effect import Claims
-from rsea_ros.laws.law import Law, Part
-from rsea_ros.laws.memory import RING
+from rsea_ros.laws.body import FARTHER, body_of, curve_body, is_limited, states_of
+from rsea_ros.laws.equation import about_of, equation_of
+from rsea_ros.laws.law import Law
+from rsea_ros.laws.reading import READS, letters_of, words_of
 
-_FARTHER = 3.0
-"""Times the range of the data: beyond that a law keeps its value, for no datum speaks for it."""
 _WIDE = 10.0
 """Times the fitted value: bounds of another fit."""
-_READS = {"w": "GEAR_VELOCITY", "q": "OUTPUT_ANGLE", "theta": "ROTOR_ANGLE", "d": "DEFLECTION", "T": "LOAD",
-          "u": "COMMAND", "h": "HOUSING_ANGLE"}  # fmt: skip
-_AT_SENSOR = {
-    "theta": "s[TURNS] * s[OUTPUT_ANGLE]",
-    "T": "s[FT]",
-    "w": "s[OUTPUT_VELOCITY]",
-    "q": "s[OUTPUT_ANGLE]",
-}
-_AT_COMMAND = {"w": "s[OUTPUT_VELOCITY]", "q": "s[OUTPUT_ANGLE]", "theta": "s[TURNS] * s[OUTPUT_ANGLE]"}
-_ADDS = {
-    "gear": "s[GEAR_TORQUE] += torque", "spring": "s[SPRING_TORQUE] += torque",
-    "load": "s[HOUSING_TORQUE] += torque\n    s[DISTAL_TORQUE] += torque", "ft": "s[FT] += torque",
-    "motor": "s[COMMAND] += torque", "command": "s[COMMAND] += torque\n    s[CURRENT] += torque",
-}  # fmt: skip
 _LETTERS = {"w": "the speed ω, rad/s", "q": "the angle q, rad", "theta": "the rotor's angle θ, rad",
             "d": "the deflection d, rad", "T": "the load T, N m", "u": "the command u, N m",
             "h": "the load's angle φ, rad"}  # fmt: skip
-_SYMBOLS = {"w": "ω", "q": "q", "theta": "θ", "d": "d", "T": "T_s", "u": "u", "t": "t", "h": "φ"}
 
 
 @dataclass(frozen=True)
@@ -49,37 +32,10 @@ class Provenance:
     gain: str
 
 
-def equation_of(law: Law) -> str:
-    """Return the equation with the names of the parameters, in plain text."""
-    left = {
-        "encoder": "position error",
-        "ft": "T_ft error",
-        "motor": "T_m added",
-        "command": "T_m added",
-    }.get(law.place, "T")
-    if law.curve is not None:
-        factor = {"": "", "T": "·|T_s|", "u": "·u", "w": "·ω", "d": "·d"}[law.curve.factor]
-        return f"{left} = size · f({_SYMBOLS[law.curve.over]}){factor}, f learnt from data"
-    terms = []
-    for part, (c, s) in zip(law.parts, law.names, strict=True):
-        text = part.term.equation.format(a=s) if s else part.term.equation
-        if s and s not in text:
-            text += f" with {s}"
-        terms.append(_signed(c, text, minus=part.term.friction))
-    tail = ", smooth below creep_velocity" if law.is_friction else ""
-    return f"{left} = {' + '.join(terms).replace('+ -', '- ')}{tail}"
-
-
-def _signed(coefficient: str, text: str, *, minus: bool) -> str:
-    bare = text.removeprefix("-")
-    sign = "-" if minus or bare != text else ""
-    return f"{sign}{coefficient}" if bare == "1" else f"{sign}{coefficient} · {bare}"
-
-
 def source_of(law: Law, claims: Claims, provenance: Provenance) -> str:
     """Return the text of the effect file."""
     header = _docstring(law, provenance)
-    body = _curve_body(law) if law.curve is not None else _body(law)
+    body = curve_body(law) if law.curve is not None else body_of(law)
     signature = 'def apply(s, p, x):  # type: ignore[no-untyped-def]\n    """Add the law."""'
     function = f"@compiled\n{signature}\n{body}\n"
     return f"{header}\n{_imports(law, body)}\n{_tables(law)}\n{function}\n\n{_effect(law, claims)}"
@@ -87,167 +43,19 @@ def source_of(law: Law, claims: Claims, provenance: Provenance) -> str:
 
 def _docstring(law: Law, provenance: Provenance) -> str:
     kind = "A learnt law, no cause: a curve through data" if law.is_learnt else "A law that was found in data"
-    seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in _LETTERS)
+    seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters_of(law))
     bags = "\n".join(f"    {name}  sha256 {digest}" for name, digest in provenance.bags.items())
-    beyond = "its last value" if law.is_learnt else f"the value at {_FARTHER:g} times that range"
+    kept = "its last value" if law.is_learnt else f"the value at {FARTHER:g} times that range"
+    limited = law.is_learnt or any(is_limited(law, n) for n in letters_of(law))
+    beyond = f" Beyond it the law keeps {kept}." if limited else ""
+    reach = [f"Seen in the data: {seen}.{beyond}"] if seen else []
     lines = [
         f'"""{kind}: {"angle error" if law.place == "encoder" else "torque"} by {law.regressor}.',
         "", f"    {equation_of(law)}", "",
-        f"Seen in the data: {seen}. Beyond it the law keeps {beyond}.",
+        *reach,
         provenance.gain, f"Written by rsea law {provenance.version} on {provenance.date} from", bags, '"""',
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
-
-
-def _time_letters(law: Law) -> set[str]:
-    words = {w for part in law.parts for w in _words(part.term.expression)}
-    if law.curve is not None:
-        words |= {law.curve.over, law.curve.factor}
-    return words & {"t", "share"}
-
-
-def _words(expression: str) -> set[str]:
-    import re
-
-    return set(re.findall(r"[a-z_A-Z]+", expression))
-
-
-def letters_of(law: Law) -> set[str]:
-    """Return the letters of the variables that a law reads."""
-    used: set[str] = set()
-    for part in law.parts:
-        used |= _words(part.term.expression) & set(_READS)
-        used |= {"w"} if part.term.friction else set()
-        used |= {part.term.remembers} if part.term.memory else set()
-    if law.curve is not None:
-        used |= {law.curve.over, law.curve.factor} & set(_READS)
-        used |= {"w"} if law.curve.factor == "w" else set()
-    return used
-
-
-def _read(law: Law, letter: str) -> str:
-    if law.place in ("ft", "encoder"):
-        return _AT_SENSOR.get(letter, f"s[{_READS.get(letter, '')}]")
-    if letter == "h":  # one end is clamped: it stays at zero, and no torque moves it
-        return "s[HOUSING_ANGLE] + s[DISTAL_ANGLE]"
-    if law.place in ("command", "motor"):
-        return _AT_COMMAND.get(letter, f"s[{_READS.get(letter, '')}]")
-    return f"s[{_READS[letter]}]"
-
-
-def _variables(law: Law) -> list[str]:
-    lines = []
-    for letter in _READS:
-        if letter in letters_of(law):
-            limit = law.ranges[letter] * _FARTHER
-            value = _read(law, letter)
-            unlimited = letter in ("theta", "q") or (
-                letter in ("T", "u") and law.place in ("ft", "command", "motor")
-            )
-            lines.append(
-                f"{letter} = {value}"
-                if unlimited
-                else f"{letter} = min(max({value}, -{limit:.6g}), {limit:.6g})"
-            )
-    time = _time_letters(law)
-    if "t" in time:
-        lines.append("t = s[TIME]")
-    if "share" in time:
-        lines.append("share = s[TIME] / s[DURATION]")
-    return lines
-
-
-def _body(law: Law) -> str:
-    lines, state, at = _variables(law), 0, 0
-    sizes: list[str] = []
-    smooth: list[str] = []
-    index: dict[str, int] = {}
-    for k, name in enumerate(law.parameters):
-        index[name] = k
-    if law.is_friction:
-        state = 1
-    for part, (c, s) in zip(law.parts, law.names, strict=True):
-        expression = part.term.expression
-        if s:
-            expression = _with_shape(expression, f"p[{index[s]}]")
-        if part.term.memory:
-            made, state = _memory(part, f"m{at}", f"p[{index[s]}]", state)
-            lines += made
-            expression = _with_letter(expression, "m", f"m{at}")
-            at += 1
-        (sizes if part.term.friction else smooth).append(f"p[{index[c]}] * ({expression})")
-    if sizes:
-        lines.append(f"x[0] = mean_friction(s, {' + '.join(sizes)}, x[0], p[{index['creep_velocity']}])")
-    total = " + ".join([*smooth, *(["-x[0]"] if sizes else [])])
-    lines += [f"torque = {total}", *_added(law, state)]
-    return "\n".join(f"    {line}" for line in lines)
-
-
-def _added(law: Law, state: int) -> list[str]:
-    if law.place != "encoder":
-        return [_ADDS[law.place]]
-    rate = f"(torque - x[{state}]) / s[STEP] if x[{state + 1}] == 1.0 else 0.0"
-    return ["s[POSITION] += torque", f"s[VELOCITY] += {rate}",
-            f"x[{state}], x[{state + 1}] = torque, 1.0"]  # fmt: skip
-
-
-def _with_shape(expression: str, replaced: str) -> str:
-    return _with_letter(expression, "a", replaced)
-
-
-def _with_letter(expression: str, letter: str, replaced: str) -> str:
-    import re
-
-    return re.sub(rf"\b{letter}\b", replaced, expression)
-
-
-def _memory(part: Part, name: str, shape: str, state: int) -> tuple[list[str], int]:
-    """Return the lines that keep a memory in the states from `state` on, and the next free one."""
-    of, kind = part.term.remembers, part.term.memory
-    if kind in ("lag", "heat"):
-        value = f"{of} * {of}" if kind == "heat" else of
-        return [
-            f"x[{state}] = lagged(x[{state}], {value}, s[STEP], {shape})",
-            f"{name} = x[{state}]",
-        ], state + 1
-    if kind == "ring":
-        zeta = part.term.constant
-        rung = f"{name} = rung(x, {state}, {of}, s[STEP], {shape}, {zeta:g})"
-        if part.term.place == "spring":  # called twice a step; only the second may change a state
-            return [f"{name} = x[{state}]", "if s[COMMIT] == 1.0:", f"    {rung}"], state + 2
-        return [rung], state + 2
-    if kind == "delay":
-        return [f"{name} = from_ring(x, {state}, {of}, {shape} / s[STEP])"], state + RING + 1
-    made = (
-        f"bent(x[{state}], {of} - x[{state + 1}], {shape})"
-        if kind == "dahl"
-        else f"played(x[{state}], {of}, {shape})"
-    )
-    keep = [f"{name} = {made}"]
-    commit = "if s[COMMIT] == 1.0:" if part.term.place == "spring" else "if True:"
-    keep += [commit, f"    x[{state}], x[{state + 1}] = {name}, {of}"]
-    if commit == "if True:":
-        keep = [keep[0], keep[2].strip()]
-    return keep, state + 2
-
-
-def states_of(law: Law) -> int:
-    """Return how many states the file's function keeps."""
-    sizes = {"": 0, "lag": 1, "heat": 1, "delay": RING + 1, "dahl": 2, "play": 2, "ring": 2}
-    return int(law.is_friction) + sum(sizes[p.term.memory] for p in law.parts) + 2 * (law.place == "encoder")
-
-
-def _curve_body(law: Law) -> str:
-    curve = law.curve
-    assert curve is not None
-    lines = [*_variables(law), f"at = ({curve.over} - FIRST) / SPACING",
-             f"at = min(max(at, 0.0), {len(curve.x) - 1}.0)", f"k = min(int(at), {len(curve.x) - 2})",
-             "value = CURVE[k] + (at - k) * (CURVE[k + 1] - CURVE[k])"]  # fmt: skip
-    factor = {"": "", "T": " * abs(T)", "u": " * abs(u)" if law.place == "gear" else " * u", "d": " * d",
-              "w": " * w" if curve.over == "t" else " * tanh(w / 2e-3)"}[curve.factor]  # fmt: skip
-    if law.place == "ft" and curve.factor == "T":
-        factor = " * T"
-    return "\n".join(f"    {line}" for line in [*lines, f"torque = p[0] * value{factor}", *_added(law, 0)])
 
 
 def _tables(law: Law) -> str:
@@ -259,7 +67,7 @@ def _tables(law: Law) -> str:
 
 
 def _imports(law: Law, body: str) -> str:
-    words = _words(body)
+    words = words_of(body)
     maths = sorted(words & {"sin", "cos", "tanh", "exp", "pi"})
     table = sorted(set(_table_names()) & words | {"Port"})
     helpers = sorted(words & {"lagged", "bent", "played", "from_ring", "rung"})
@@ -285,7 +93,7 @@ def _effect(law: Law, claims: Claims) -> str:
     )
     rows = "".join(f"        {row},\n" for row in _parameter_rows(law))
     letters = letters_of(law) - {"u"} if law.place in ("gear", "load", "spring") else set()
-    reads = [_READS[n] for n in _READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
+    reads = [READS[n] for n in READS if n in letters] + ["DISTAL_ANGLE"] * ("h" in letters)
     reading = f"    reads=({', '.join(reads)},),\n" if reads else ""
     exponent = claims.amplitude_exponent
     states = states_of(law)
@@ -296,12 +104,6 @@ def _effect(law: Law, claims: Claims) -> str:
         + (f"    states={states},\n" if states else "") + reading
         + f'    about="{about_of(law)}",\n    equation="{equation_of(law)}",\n)\n'
     )  # fmt: skip
-
-
-def about_of(law: Law) -> str:
-    """Return what the law is, in a few words."""
-    kind = "learnt law" if law.is_learnt else "law found in data"
-    return f"{kind}: {'angle error' if law.place == 'encoder' else 'torque'} by {law.regressor}"
 
 
 def _parameter_rows(law: Law) -> list[str]:
@@ -323,8 +125,3 @@ def _parameter_rows(law: Law) -> list[str]:
                         f"typical={part.shape:.6g}, "
                         f"logarithmic=True)")  # fmt: skip
     return [*rows, *(["PRESLIDING"] if law.is_friction else [])]
-
-
-def ranges_of(law: Law, letters: Mapping[str, np.ndarray]) -> dict[str, float]:
-    """Return the largest size of each variable that a law reads."""
-    return {n: float(np.max(np.abs(letters[n]))) for n in _READS if n in letters_of(law)}

@@ -20,9 +20,9 @@ from msg_adapters.ros import JointState, Trigger
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
 from rsea_ros.experiment.campaign import Budget, Campaign, Outcome, Round
 from rsea_ros.experiment.causes import USUAL, causes_from
-from rsea_ros.experiment.design import Asked, Proposal
 from rsea_ros.experiment.limits import limits_from
 from rsea_ros.experiment.opinion import diagnosed
+from rsea_ros.experiment.proposal import Asked, Proposal
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import Place, unused
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report

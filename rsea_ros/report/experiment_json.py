@@ -7,8 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.design import Proposal
 from rsea_ros.experiment.margins import LEVEL
+from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment_words import proof_words, verdict
 from rsea_ros.report.identification_json import strict
 
@@ -22,6 +22,7 @@ def advice_json(advice: Advice) -> dict[str, Any]:
         "schema": SCHEMA,
         "sentence": verdict(advice),
         "causes": {h.name: h.probability for h in advice.hypotheses},
+        "excluded": dict(advice.excluded),
         "limits": advice.asked.limits.stated(),
         "limits_hold_with_probability": LEVEL,
         "run": None if p is None else proposal_json(p),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.experiment.advice import Advice
-from rsea_ros.experiment.design import Proposal
+from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment_words import (
     LEVEL_WORDS,
     limit_rows,
@@ -60,6 +60,7 @@ def _keys(p: Proposal) -> list[tuple[str, str]]:
 
 def _causes(advice: Advice) -> str:
     rows = [(plain_name(h.name), f"{h.probability:.3f}") for h in advice.hypotheses]
+    rows += [(f"{plain_name(n)} (excluded by the records)", f"{p:.1g}") for n, p in advice.excluded.items()]
     return section("Still possible", table(("cause", "probability"), rows, {1}))
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.design import Proposal
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.experiment.limits import UNITS
 from rsea_ros.experiment.margins import LEVEL
+from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.wording import listed
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from rsea_ros.effects.catalogue import lent
+from rsea_ros.laws.equation import equation_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.result import LawResult
-from rsea_ros.laws.writing import equation_of
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.identification_json import numbers

@@ -7,8 +7,8 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.laws.equation import about_of, equation_of
 from rsea_ros.laws.result import LawResult, WrittenLaw
-from rsea_ros.laws.writing import about_of, equation_of
 from rsea_ros.report import words
 from rsea_ros.report.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.law_words import NAMES, UNITS, gain_sentence, headline, parameter_lines

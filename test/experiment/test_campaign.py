@@ -10,8 +10,9 @@ from independent.hidden import hide
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.experiment.campaign import Budget, Campaign
 from rsea_ros.experiment.causes import causes_from
-from rsea_ros.experiment.design import Asked, propose
+from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.limits import Limits
+from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.weighing import middles_of_runs, weigh
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.campaign_files import write_campaign

@@ -10,11 +10,12 @@ from independent.hidden import hide
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.advice import advise
 from rsea_ros.experiment.bound import bound
-from rsea_ros.experiment.design import Asked, propose
+from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.files import hypotheses_from, model_of
 from rsea_ros.experiment.hypothesis import motion, run_case
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used
 from rsea_ros.experiment.margins import at_ends
+from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.separation import Refit, refitted
 from rsea_ros.experiment.shape import Shape, at_rest_around, command_of
 from rsea_ros.experiment.weighing import cases_of

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from msg_adapters import read_record
+from msg_adapters import TopicMap, read_record
 from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_state_message, wrench_message
 from rsea_ros.health.codes import NAMES
 from rsea_ros.health.finding import Finding
@@ -61,7 +61,7 @@ def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, lis
     keeper.ask("RSEA_STIFFNESS", middle)
     listener.until(lambda: keeper.poll() is not None)
     assert keeper.last is not None
-    assert len(read_record(keeper.last / "after", strict=False)["ft"]) > 20
+    assert len(read_record(keeper.last / "after", TopicMap(namespace="/"), strict=False)["ft"]) > 20
     keeper.ask("RSEA_STIFFNESS", middle)
     keeper.poll()
     assert "holds 1, expected less than 1 (bags)" in keeper.trouble
