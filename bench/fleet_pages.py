@@ -153,7 +153,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{'asked':<52}measured")
         load = f"{os.getloadavg()[0]:.0f} processes on {os.cpu_count()} cores"
         print(
-            f"{f'{args.rows} rows reported in <= 10 s':<52}{seconds:.1f} s ({spent:.1f} s of processor; {load})"
+            f"{f'{args.rows} rows reported in <= 10 s':<52}{seconds:.1f} s "
+            f"({spent:.1f} s of processor; {load})"
         )
         write_fleet_report(made.history, made.recordings, out / "fleet")
         if shutil.which(args.chromium):

@@ -13,6 +13,7 @@ import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import dask
@@ -127,7 +128,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
         )
         client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
         with cluster, client:
-            yield OnDask(client, lambda: cluster.scale(workers)), cluster.dashboard_link
+            yield OnDask(client, partial(cluster.scale, workers)), cluster.dashboard_link
 
 
 def cores() -> int:

@@ -61,7 +61,8 @@ class Estimates:
     def estimates(self) -> list[Estimate]:
         """Return value and interval of each parameter."""
         covariance = np.linalg.inv(self._information + self._prior)
-        change, half = covariance @ self._score, SURE * np.sqrt(np.diag(covariance))
+        common = np.array([h.common for h in self._hypotheses])
+        change, half = covariance @ self._score, SURE * np.sqrt(np.diag(covariance) + common**2)
         return [
             Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
             for h, c, d, held in zip(

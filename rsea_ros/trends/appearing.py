@@ -13,6 +13,8 @@ from rsea_ros.trends.result import Appearance, Interval
 from rsea_ros.trends.settings import DAY, TrendSettings
 from rsea_ros.trends.significance import adjusted
 
+_LESS_BEFORE = 3.0
+"""Log likelihood ratio, odds of 20, from which a joint is said to have been without it before."""
 _MOSTLY, _RARELY = 0.5, 0.25
 """Share of the days that name what a joint always had, at least, and in its fleet, at most."""
 _SURE = 0.98
@@ -110,7 +112,7 @@ def _appeared(scan: Scan, q: float, settings: TrendSettings) -> Appearance | Non
     if q > settings.false_discovery or not len(scan.t):
         return None
     n, t = scan.naming, scan.t
-    from_first = float(np.max(scan.ratio)) < np.log(len(t) / settings.false_discovery)
+    from_first = float(np.max(scan.ratio)) < _LESS_BEFORE
     best = 0 if from_first else int(np.argmax(scan.ratio))
     first = best + int(np.argmax(scan.named[best:] > 0.0))
     earliest, since, latest = (t[first],) * 3 if from_first else _dates(scan, best, first, settings)

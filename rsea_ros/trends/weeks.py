@@ -12,8 +12,8 @@ from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.settings import DAY
 
 _Z = 1.959964
-_WEEK, _MOST = 7.0, 110
-"""Days; steps of a picture: more are no longer told apart."""
+_WEEK, _SHORT, _MOST = 7.0, 70.0, 110
+"""Days of a week; days up to which a step is a day; steps of a picture: more are no longer told apart."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,12 @@ class Steps:
     def days(self) -> float:
         """Return how long a step is."""
         return float(self.edges[1] - self.edges[0]) / DAY
+
+    @property
+    def name(self) -> str:
+        """Return what a step is called."""
+        weeks = round(self.days / _WEEK)
+        return "day" if self.days < _WEEK else "week" if weeks == 1 else f"{weeks} weeks"
 
     @property
     def middle(self) -> FloatArray:
@@ -60,8 +66,10 @@ class Binned:
 
 
 def steps_over(first_s: float, last_s: float) -> Steps:
-    """Return steps of whole weeks, from Monday on, that hold both times; few enough for a picture."""
+    """Return steps that hold both times: days of a short history, else whole weeks from Monday on."""
     day = np.floor(first_s / DAY)
+    if last_s / DAY - day < _SHORT:
+        return Steps((day + np.arange(int(np.floor(last_s / DAY) - day) + 2)) * DAY)
     monday = day - (day + 3.0) % _WEEK
     weeks = max(1, int(np.floor((last_s / DAY - monday) / _WEEK)) + 1)
     length = -(-weeks // _MOST)

@@ -23,7 +23,7 @@ _SHADES = 8
 _QUANTILE, _NOISE, _LEAST = 0.995, 8.0, 0.01
 """Colours are full at this quantile of the changes, at so many times their median, and at 1 %, at least."""
 _OFTEN = 0.5
-"""Share of a week's recordings that counts as often."""
+"""Share of the recordings of a step that counts as often."""
 
 
 def heat_map(parameter: str, joints: Sequence[str], found: FleetTrends, steps: Steps, links: Links) -> str:
@@ -37,7 +37,7 @@ def heat_map(parameter: str, joints: Sequence[str], found: FleetTrends, steps: S
         _title(parameter, rows),
         picture,
         _key(percent(-full), "as on the first day", percent(full), (-1.0, 1.0)),
-        caption="Mean of each week against the joint's first level, at its mean temperature. Grey: "
+        caption=f"Mean of each {steps.name} against the joint's first level, at its mean temperature. Grey: "
         "recordings, but none that could tell. Empty: no recording.",
     )
 
@@ -61,8 +61,8 @@ def naming_map(
     return section(
         f"{plain}: often in {often} of {len(found.joints)} joints",
         picture,
-        _key("no recording", "", "all of the week's recordings", (0.0, 1.0)),
-        caption="Share of each week's recordings that name it, for the joints that do at all.",
+        _key("no recording", "", f"all recordings of the {steps.name}", (0.0, 1.0)),
+        caption=f"Share of the recordings of each {steps.name} that name it, for the joints that do at all.",
     )
 
 

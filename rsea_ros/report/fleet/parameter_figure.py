@@ -45,11 +45,10 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
 def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
     some = np.isfinite(bins.value)
     y, half = bins.value[some] * factor, (bins.high - bins.low)[some] * factor / 2.0
-    title = "week" if steps.days < 8 else f"{steps.days / 7:.0f} weeks"
     return points(
         steps.middle[some],
         numbers(y),
-        title,
+        steps.name,
         marker={"color": MEASURED, "size": 5},
         error_y={
             "type": "data",
@@ -137,7 +136,7 @@ def _caption(trend: Trend) -> str:
     if trend.per_kelvin is not None:
         parts[0] += f", at the mean temperature; a kelvin makes {percent(trend.per_kelvin.value)} of it"
     level = abs(trend.now.value) if trend.now else 0.0
-    if level:
+    if level and trend.day_sd > 0.0:
         parts.append(f"Days scatter by {amount(trend.day_sd / level)}")
     parts.append(f"{int(np.sum(s.told))} of {len(s.told)} recordings could tell it")
     return ". ".join(p for p in parts if p) + "."
