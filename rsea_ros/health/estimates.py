@@ -3,8 +3,8 @@
     F <- l F + A / phi,   r <- l r + c / phi,   change = r / (F + F_0)
 
 of each parameter alone, the others as the model has them: together, calibrations and stiffness would follow
-the smallest misfit. l forgets only by as much as the look tells of a parameter: what is not excited keeps what
-was known, and the look is said to hold it. F_0 is a weak prior.
+the smallest misfit. l forgets only by as much as the look tells of a parameter: what is not excited keeps
+what was known, and the look is said to hold it. F_0 is a weak prior.
 Source: Cao, Schwartz, Automatica 36, 2000 (forgetting where there is excitation).
 """
 
