@@ -11,7 +11,8 @@ from xml.etree import ElementTree
 from setuptools import find_packages, setup
 
 NODES = (
-    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "replay", "watch",
 )  # fmt: skip
 MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")

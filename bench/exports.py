@@ -89,6 +89,8 @@ def played(rig: Rig, given: FloatArray, is_fmu: bool) -> float:
             apart = differences(one, mine, play(export(one).content, one, given))
         except RseaError as error:
             print(f"{rig.name:22} {name or 'nominal':26} {error}")
+            if not name:
+                break
             continue
         size = {d.channel: d.times_noise for d in differences(one, mine, nominal)}
         cells = (f"{d.channel} {d.times_noise:.2g} / {size[d.channel]:.3g}" for d in apart)

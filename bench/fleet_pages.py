@@ -2,9 +2,9 @@
 
 .venv/bin/python bench/fleet_pages.py [--rows 100000] [--chromium chromium]
 
-Writes the report of a simulated fleet of 10 000 recordings and, with --rows, of a history of so many rows; opens
-the page of the fleet and of one joint in a headless Chromium, and counts what the page asks for from outside
-and what it writes to the console.
+Writes the report of a simulated fleet of 10 000 recordings and of a history of --rows rows; opens the page of
+the fleet and of two joints in a headless Chromium, and counts what they ask for from outside and what they write
+to the console.
 """
 
 from __future__ import annotations
@@ -153,7 +153,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{'asked':<52}measured")
         load = f"{os.getloadavg()[0]:.0f} processes on {os.cpu_count()} cores"
         print(
-            f"{f'{args.rows} rows reported in <= 10 s':<52}{seconds:.1f} s ({spent:.1f} s of processor; {load})"
+            f"{f'{args.rows} rows reported in <= 10 s':<52}{seconds:.1f} s "
+            f"({spent:.1f} s of processor; {load})"
         )
         write_fleet_report(made.history, made.recordings, out / "fleet")
         if shutil.which(args.chromium):

@@ -61,7 +61,7 @@ def records(folder: Path) -> None:
     """Write the bags that are identified and diagnosed."""
     for name, more in (("plain", []), ("rubbing", ["--effect", FRICTION])):
         with redirect_stdout(io.StringIO()):
-            rsea(["simulate", RIG, *more, "--out", str(folder / name)])
+            rsea(["simulate", RIG, "--duration", "160", *more, "--out", str(folder / name)])
 
 
 def opened(page: Path, browser: str) -> tuple[int, int, int]:

@@ -19,7 +19,8 @@ from msg_adapters.ros import JointState
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = (
-    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "replay", "watch",
 )  # fmt: skip
 
 

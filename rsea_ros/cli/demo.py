@@ -30,7 +30,9 @@ from rsea_ros.report.fault_words import fault_lines
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
 EXAMPLE = "rsea demo --out first_demo"
 RIG = "paper_high_impedance"
-NAMES = ("bag", "bag-2", "bench.yaml", "log", "identification.json", "model.yaml", "report.html")
+NAMES = (
+    "bag", "bag-2", "bench.yaml", "log", "identification.json", "experiment.json", "model.yaml", "report.html"
+)  # fmt: skip
 DISTURBANCES = {"commands_left_out", "late_commands", "lost_messages", "watchdog_trips"}
 """Faults of a bag whose bench or excitation was held up: its commands did not act as it says."""
 SHORT, FULL = 20.0, 160.0
@@ -47,6 +49,9 @@ START_UP = 60.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("--full", action="store_true", help="the paper's 160 s of excitation instead of 20 s")
+    parser.add_argument(
+        "--experiment", action="store_true", help="find a hidden cause by runs that are designed one by one"
+    )
     parser.add_argument("--wire", action="store_true", help="the plant behind real wires, and the driver")
     parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
@@ -62,6 +67,10 @@ def run(args: argparse.Namespace) -> int:
     domain = random.randint(1, 101) if args.domain is None else args.domain
     duration = FULL if args.full else SHORT
     out.mkdir(parents=True, exist_ok=True)
+    if args.experiment:
+        from rsea_ros.cli._demo_experiment import show
+
+        return show(out, domain, args)
     bench = bench_of(load_rig(RIG), args.seed)
     save_rig(bench, out / "bench.yaml")
     print(f"{RIG}, its true values up to {100.0 * SPREAD:g} % off, which only the plant knows")

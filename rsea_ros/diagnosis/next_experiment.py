@@ -167,7 +167,7 @@ def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experi
 
 _WITH_MULTISINE = " with an odd multisine, whose empty lines show distortion apart from noise"
 _SERIES_WHY = (
-    "nothing in the catalogue explains the residual: repeat at {} the amplitude{}; "
+    "nothing in the catalogue explains what is left: repeat at {} the amplitude{}; "
     "what scales with the command is linear, what does not is friction-like"
 )
 

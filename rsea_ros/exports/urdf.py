@@ -14,6 +14,7 @@ from xml.etree import ElementTree as xml
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import WORLD, Chain, Joint, Link, chain_of
 from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
+from rsea_ros.exports.others import acting, sized
 from rsea_ros.model.rig import Rig
 
 NAMESPACE = "urn:rsea_ros:rig"
@@ -22,6 +23,7 @@ NAMESPACE = "urn:rsea_ros:rig"
 
 def export_urdf(rig: Rig) -> Export:
     """Return the URDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
+    rig = acting(rig)
     chain = chain_of(rig)
     said, unsaid = _coverage(rig, chain, has_springs=False)
     robot = xml.Element("robot", name=rig.name)
@@ -37,6 +39,7 @@ def export_urdf(rig: Rig) -> Export:
 
 def export_sdf(rig: Rig) -> Export:
     """Return the SDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
+    rig = acting(rig)
     chain = chain_of(rig)
     said, unsaid = _coverage(rig, chain, has_springs=True)
     root = xml.Element("sdf", {"version": "1.11", "xmlns:rsea": NAMESPACE})
@@ -57,9 +60,12 @@ def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[tuple[Said,
     unsaid = [Unsaid(name, f"{why}; {only}") for name, why in chain.left_out.items()]
     if not has_springs and not rig.rigid_spring:
         unsaid.append(Unsaid("spring.stiffness", f"URDF joints have no spring; {only}"))
+    finite = sized(rig)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
-        if how is None or (one.name == "hard_stop" and not _stop(rig, chain)):
+        if one.name not in finite:
+            unsaid.append(Unsaid(one.name, f"a parameter of it is infinite; {only}"))
+        elif how is None or (one.name == "hard_stop" and not _stop(rig, chain)):
             unsaid.append(Unsaid(one.name, only))
         else:
             said.append(Said(one.name, how))
@@ -90,8 +96,7 @@ def _stop(rig: Rig, chain: Chain) -> dict[str, float]:
 
 
 def _parameters(rig: Rig, name: str) -> dict[str, float]:
-    found = [effect_named(name).complete(one.parameters) for one in rig.effects if one.name == name]
-    return found[0] if found else {}
+    return sized(rig).get(name, {})
 
 
 def _urdf_link(link: Link) -> xml.Element:

@@ -13,6 +13,7 @@ import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import dask
@@ -23,6 +24,7 @@ from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 
 SETTINGS: Mapping[str, Any] = {
+    "distributed.worker.preload": ["rsea_ros.fleet.worker"],
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
@@ -127,7 +129,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
         )
         client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
         with cluster, client:
-            yield OnDask(client, lambda: cluster.scale(workers)), cluster.dashboard_link
+            yield OnDask(client, partial(cluster.scale, workers)), cluster.dashboard_link
 
 
 def cores() -> int:

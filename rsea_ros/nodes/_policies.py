@@ -24,7 +24,8 @@ from rsea_ros.nodes._run import NAMESPACE
 from rsea_ros.nodes.record import TOPICS
 
 NODES = (
-    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "replay", "watch",
 )  # fmt: skip
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "driver": {"autostart": True, "rig": "sea_two_encoders"},

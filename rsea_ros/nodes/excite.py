@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 import sys
-import time
 from typing import Any
 
 from rclpy.node import Node
 
-from msg_adapters.ros import JointState, stamp_of, torque_command_message
+from rsea_ros.experiment.run_file import read_run
 from rsea_ros.identification.excitation import KINDS, Settings, check_limits, excitation
-from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
 from rsea_ros.nodes._parameters import JOINT, Parameter
-from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
+from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._run import run_node
+from rsea_ros.signals import FloatArray
 
 TABLE = (
+    Parameter("file", "", "run.csv of rsea experiment to play instead; empty: what follows"),
     Parameter("kind", "chirp", "excitation", choices=tuple(KINDS)),
     Parameter(
         "amplitude", 20.0, "peak of chirp and steps, rms of multisine and white noise", "N m", 0.0, 1e4
@@ -37,92 +36,62 @@ TABLE = (
     Parameter("subscribers", 1, "subscriptions of torque_command to wait for", "", 1, 100),
     JOINT,
 )
-SETTLE = SECOND // 2
-CLOSING_ZEROS = 3
-MARGIN = SECOND // 100
-"""A command that has less than this left until it takes effect is left out: its stamp would not be true."""
 
 
 class Excite:
-    """Commands on the grid of the measurements' stamps, each published `lead` before it takes effect."""
+    """Plays one excitation, or the file of one, and ends."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
-        self._rate: float = values["rate"]
-        self._command = excitation(values["kind"], Settings(**{n: values[n] for n in names}), values["ramp"])
-        check_limits(self._command, values["limit"], self._rate)
-        self._node, self._lead = node, round(values["lead"] * SECOND)
-        self._wanted = values["subscribers"]
-        self._next, self._left_out, self._stamp = 0, 0, 0
-        self._joint = values["joint"]
-        self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
-        self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
-        self._cycle = Cycle(self._rate, self._step, catch_up=True)
-        self._started = False
+        command, rate = planned(values)
+        check_limits(command, values["limit"], rate)
+        self._node, self._wanted = node, values["subscribers"]
+        self._player = Player(
+            node, command, rate, lead=values["lead"], wanted=self._wanted, joint=values["joint"]
+        )
         self._health = Health(node, self._report)
         node.create_timer(1.0, self._tell, clock=STEADY)
 
-    def _begin(self, message: JointState) -> None:
-        """Start at a whole number of periods after a measurement, once everybody listens."""
-        if self._started or self._publisher.get_subscription_count() < self._wanted:
-            return
-        self._started = True
-        self._cycle.start(self._first(stamp_of(message.header.stamp)) - self._lead)
-        self._node.destroy_subscription(self._measurements)
-
-    def _first(self, measured: int) -> int:
-        """Return when the first command takes effect, ns."""
-        earliest = time.time_ns() + self._lead + SETTLE
-        periods = math.ceil((earliest - measured) * self._rate / SECOND)
-        first: int = measured + round(periods * SECOND / self._rate)
-        return first
-
-    def _step(self, now: int) -> None:
-        """Publish the next command, or leave it out when this thread was held up for too long."""
-        k, self._next = self._next, self._next + 1
-        torque = self._command[k] if k < len(self._command) else 0.0
-        self._stamp = now + self._lead
-        if self._lead and self._stamp - time.time_ns() < min(MARGIN, self._lead // 2):
-            self._left_out += 1
-        else:
-            self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
-
     def finished(self) -> bool:
         """Tell whether the whole excitation is out."""
-        if self._started:
-            self._cycle.running()
-        return self._next >= len(self._command)
+        return self._player.over()
 
     def conclude(self) -> None:
         """Leave nothing to do: `close` commands the zeros."""
 
     def close(self) -> None:
         """Command zero torque after the last command, and wait until that has arrived."""
-        self._cycle.stop()
-        last = max(self._stamp, time.time_ns())
-        for k in range(1, CLOSING_ZEROS + 1 if self._started else 1):
-            stamp = last + round(k * SECOND / self._rate)
-            self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
-        await_arrival(self._publisher)
-        self._node.get_logger().info(f"torque zero after {self._next} commands, {self._left_out} left out")
+        self._player.close()
+        p = self._player
+        self._node.get_logger().info(f"torque zero after {p.next} commands, {p.left_out} left out")
 
     def _tell(self) -> None:
-        if self._started:
-            share = min(1.0, self._next / len(self._command))
-            self._node.get_logger().info(f"{share:.0%} of {len(self._command) / self._rate:.1f} s")
+        p = self._player
+        if p.started:
+            share = min(1.0, p.next / len(p.command))
+            self._node.get_logger().info(f"{share:.0%} of {len(p.command) / p.rate:.1f} s")
         else:
-            count = self._publisher.get_subscription_count()
             wanted = (
-                f"{count} of {self._wanted} subscriptions of torque_command and a message on joint_states"
+                f"{p.subscriptions} of {self._wanted} subscriptions of torque_command and a message on "
+                "joint_states"
             )
             self._node.get_logger().info(f"waiting: {wanted}", throttle_duration_sec=5.0)
 
     def _report(self) -> Report:
-        values = {"commands": self._next, "left_out": self._left_out}
-        if self._started:
-            values |= self._cycle.timing().values()  # type: ignore[arg-type]
-        level = WARN if self._left_out else OK
-        return Report(level, "running" if self._started else "waiting for a measurement", values)
+        p = self._player
+        values = {"commands": p.next, "left_out": p.left_out}
+        if p.started:
+            values |= p.cycle.timing().values()  # type: ignore[arg-type]
+        level = WARN if p.left_out else OK
+        return Report(level, "running" if p.started else "waiting for a measurement", values)
+
+
+def planned(values: dict[str, Any]) -> tuple[FloatArray, float]:
+    """Return the command, N m, and its rate, Hz: of `file` where one is given, else of the parameters."""
+    if values["file"]:
+        return read_run(values["file"])
+    names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
+    command = excitation(values["kind"], Settings(**{n: values[n] for n in names}), values["ramp"])
+    return command, values["rate"]
 
 
 def main() -> int:

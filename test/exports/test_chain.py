@@ -10,6 +10,7 @@ import pytest
 
 from rsea_ros.errors import RigError
 from rsea_ros.exports.chain import GRAVITY
+from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.urdf import export_sdf, export_urdf
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.lumped import lumped
@@ -66,7 +67,9 @@ def characteristic(mass, damping, stiffness):
         ("paper_moving_output", LEFT_OUT | {"housing_end.gravity": 7.0}),
         ("prototype_knee", LEFT_OUT),
         ("so101_joint", {}),
-        ("pendulum", {"spring_end.gravity": 0.0, "spring_end.damping": 0.0}),
+        ("pendulum", {}),
+        ("pendulum", {"spring_end.damping": 0.2, "spring_end.stiffness": 3.0}),
+        ("pendulum", {"spring_end.gravity_angle": 0.4}),
     ],
 )
 def test_the_joints_hold_the_rigs_equations_of_motion(name, changes):
@@ -109,6 +112,12 @@ def test_the_block_holds_every_value():
     assert {v.get("name"): float(v.get("value")) for v in block.findall("value")} == rig.values()
     assert block.find("effect").get("name") == "backlash"
     assert block.find("effect/parameter").get("value") == "0.003"
+
+
+@pytest.mark.parametrize("export", [export_urdf, export_sdf, export_mjcf])
+def test_a_linear_rig_is_refused(export):
+    with pytest.raises(RigError, match="rig emps: moves along a line, expected a rotary rig"):
+        export(load_rig("emps"))
 
 
 def test_a_lumped_rig_is_no_mechanism():

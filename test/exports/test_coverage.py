@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from xml.etree import ElementTree
 
 import pytest
@@ -134,3 +135,14 @@ def test_bams_budget_is_our_friction_at_speed(motor, load):
     ours = abs(p["motor_coefficient"] * motor + p["load_coefficient"] * load)
     ours += p["quadratic"] * min(abs(motor), abs(load)) ** 2
     assert loss + fade * quad == pytest.approx(ours)
+
+
+@pytest.mark.parametrize("target", EXPORTS)
+def test_an_effect_without_a_size_is_nothing_to_say(target):
+    """A model.yaml may hold effects at their null values, and an infinite limit is no number in any file."""
+    rig = load_rig("paper_high_impedance")
+    idle = rig.with_effects(*(EffectSetting(n, e.null) for n, e in catalogue().items()))
+    assert EXPORTS[target](idle).content == EXPORTS[target](rig).content
+    half = rig.with_effects(EffectSetting("voltage_sag", {"limit": 10.0, "no_load_speed": math.inf}))
+    made = EXPORTS[target](half)
+    assert [one.name for one in made.unsaid if "inf" in one.why] == ["voltage_sag"]

@@ -11,6 +11,7 @@ import pytest
 from rsea_ros.cli.main import main
 from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
+from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.mujoco_play import play_mujoco
 from rsea_ros.model.rig import EffectSetting
@@ -77,6 +78,19 @@ def test_several_effects_at_once_beside_free_ends():
 
 
 @MUJOCO
+@pytest.mark.parametrize("other", ["torque_constant_error", "current_loop_lag", "torque_saturation"])
+def test_what_cannot_stand_beside_another_is_left_out_whole(other):
+    """The actuator had become a dcmotor already when its gain was refused."""
+    both = load_rig("paper_high_impedance").with_effect("voltage_sag", limit=5.0).with_effect(other)
+    made = export_mjcf(both)
+    left = {one.name for one in made.unsaid} & {"voltage_sag", other}
+    said = both.with_effects(*(one for one in both.effects if one.name not in left))
+    given = command(0.25)
+    theirs = play_mujoco(made.content, both, given)
+    assert max(one.times_noise for one in differences(said, ours(said, given, RATE), theirs)) < 1.0
+
+
+@MUJOCO
 def test_a_model_that_runs_away_is_told_and_leaves_no_log(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     stiff = "lugre_friction:coulomb_torque=50,bristle_stiffness=1e8,bristle_damping=0"
@@ -120,6 +134,15 @@ def test_a_missing_builder_of_fmus_is_one_line(tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("target", ["fmu", "mjcf"])
+def test_an_effect_that_the_rig_cannot_have_is_one_line(target, tmp_path, capsys):
+    arguments = ["--effect", "base_compliance", "--out", str(tmp_path / "a")]
+    assert main(["export", f"--{target}", "so101_joint", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert "effect base_compliance: rig so101_joint: spring_end is free, expected clamped" in error
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
     from fmpy import simulate_fmu
     from fmpy.validation import validate_fmu
@@ -143,6 +166,13 @@ def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
         theirs = {name: result[name] for name in ("ft", "position", "velocity")}
         found = differences(expected, ours(expected, given, RATE), theirs)
         assert max(one.times_noise for one in found) < 0.5
+
+
+def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
+    rig, given = load_rig("paper_high_impedance").with_effect("ft_drift", drift=3.0), command(0.25)
+    theirs = play_fmu(export_fmu(rig).content, rig, given)
+    (ft,) = (one for one in differences(rig, ours(rig, given, RATE), theirs) if one.channel == "ft")
+    assert ft.times_noise < 1.0
 
 
 @pytest.mark.parametrize("arguments", [[], ["--mjcf", "prototype_knee", "--urdf", "prototype_knee"]])

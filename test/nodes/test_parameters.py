@@ -15,7 +15,8 @@ from rsea_ros.nodes._parameters import Parameter
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
 NODES = (
-    "controller", "driver", "excite", "health", "identify", "model", "plant", "record", "replay", "watch",
+    "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
+    "replay", "watch",
 )  # fmt: skip
 RATE = Parameter("rate", 280.0, "samples a second", "Hz", 10.0, 1000.0)
 COUNT = Parameter("count", 3, "how many", "", 0, 10)
@@ -67,6 +68,7 @@ WRONG = {
     "plant": ({"rate": 5000}, "parameter rate = 5000.0, expected a number from 10 to 1000 Hz"),
     "driver": ({"device": "motor"}, "parameter device = 'motor', expected one of simulated"),
     "excite": ({"amplitude": 60.0, "duration": 5.0}, "expected at most 68 N m either way"),
+    "experiment": ({"limits": "velocity=1"}, "no torque, expected at least torque="),
     "record": ({"out": "/dev/null/bag"}, "/dev/null"),
     "replay": ({"bag": "no/such/bag"}, "no/such/bag: no such bag"),
     "model": ({"tolerance_deg": 91.0}, "tolerance_deg = 91.0, expected a number from 0.1 to 90 deg"),

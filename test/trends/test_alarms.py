@@ -120,4 +120,5 @@ def test_the_false_discovery_rate_is_that_of_benjamini_and_hochberg():
 
 @pytest.mark.parametrize("rate", [0.05, 0.01, 1e-5])
 def test_the_threshold_of_a_scan_has_its_rate(rate):
-    assert scan_p(scan_threshold(rate, 0.03, 200), 0.03, 200) == pytest.approx(rate, rel=1e-6)
+    for freedom in (5, 200, 1000):
+        assert scan_p(scan_threshold(rate, 0.03, freedom), 0.03, freedom) == pytest.approx(rate, rel=1e-6)

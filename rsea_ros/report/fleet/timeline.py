@@ -23,10 +23,11 @@ def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> str:
     if not shown:
         return ""
     first = min(shown, key=lambda a: a.since_s)
+    number = "one finding" if len(dated) == 1 else f"{len(dated)} findings"
     more = f" The first {_MOST} of {len(dated)} findings." if len(dated) > _MOST else ""
     rows = "".join(_row(a, steps, links) for a in shown)
     return section(
-        f"What changed since when: {len(dated)} findings, the earliest of {short_day(first.since_s)}",
+        f"What changed since when: {number}, the earliest of {short_day(first.since_s)}",
         f'<div class="spans">{rows}{months(steps)}</div>',
         caption="A bar begins on the day of the change, pale where that day is in doubt. Orange: it goes on, "
         f"or has a name. Blue: the change is over, its level stays. Grey: bad data.{more}",

@@ -1,0 +1,75 @@
+"""`rsea demo --experiment`: a bench with a hidden cause, a poor log, and runs designed one by one."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from rsea_ros.cli import demo
+from rsea_ros.cli._processes import Processes
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig, save_rig
+
+HIDDEN = (
+    ("hard_stop", {"angle": 0.011, "stiffness": 5000.0}),
+    ("current_loop_lag", {"time_constant": 0.003}),
+    ("nonlinear_spring", {"cubic": 350.0}),
+    ("ft_sensor_lag", {"time_constant": 0.0035}),
+)
+"""Causes that slow work does not show."""
+LIMITS = "torque=25,velocity=2,deflection=0.04"
+SLOW = {"kind": "chirp", "amplitude": 0.6, "noise": 0.0, "low": 0.15, "high": 0.4, "duration": 10.0}
+SESSION = 150.0
+"""s that the session may take on a busy machine."""
+
+
+def show(out: Path, domain: int, args: argparse.Namespace) -> int:
+    """Hide a cause, record slow work, let the experiment node find the cause, and print what was hidden."""
+    rig = load_rig(demo.RIG)
+    name, parameters = HIDDEN[int(np.random.default_rng(args.seed).integers(len(HIDDEN)))]
+    bench = demo.bench_of(rig, args.seed).with_effect(name, **parameters)
+    save_rig(bench, out / "bench.yaml")
+    print(
+        f"{demo.RIG}, its values up to {100.0 * demo.SPREAD:g} % off, with a cause that only the plant knows"
+    )
+    with Processes(out / "log", domain) as nodes:
+        with demo.source(nodes, out, args) as first:
+            log = _slow_work(nodes, out, first)
+            _session(nodes, out, log)
+        lines = nodes.log("experiment").read_text(encoding="utf-8").splitlines()
+        nodes.stop(first)
+    for line in lines:
+        if "[INFO]" in line:
+            print(line.partition("]: ")[2])
+    print(f"hidden was: {hidden(bench)}")
+    return 0
+
+
+def _slow_work(nodes: Processes, out: Path, first: str) -> Path:
+    """Record what a bench does all day, which tells little; return the bag."""
+    bag = out / "bag"
+    with demo.stage(f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m") as tell:
+        nodes.start("record", {"out": bag})
+        nodes.start("excite", {**SLOW, "subscribers": 2})
+        nodes.wait("excite", 10.0 + demo.START_UP, tell)
+        nodes.stop("record")
+    return bag
+
+
+def _session(nodes: Processes, out: Path, bag: Path) -> None:
+    """Let the node go round; the demo consents to every run beforehand."""
+    with demo.stage(f"experiment: runs within {LIMITS}, without asking") as tell:
+        values = {"bag": bag, "out": out, "limits": LIMITS, "ask": False, "rig": demo.RIG}
+        nodes.start("experiment", values)
+        nodes.wait("experiment", SESSION, tell)
+
+
+def hidden(bench: Rig) -> str:
+    """Return what was hidden, in words."""
+    cause = bench.effects[-1]
+    main = effect_named(cause.name).main
+    size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {main.unit}"
+    return f"{cause.name.replace('_', ' ')}, {size}"

@@ -1,0 +1,158 @@
+"""`rsea experiment`: the run that tells apart the causes that are still possible."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._progress import progress
+from rsea_ros.cli._topics import add_topic_options, topic_map
+from rsea_ros.errors import FieldError, ParameterError
+from rsea_ros.new_files import NewFiles, Place
+
+if TYPE_CHECKING:
+    from rsea_ros.experiment.advice import Advice
+    from rsea_ros.experiment.files import Model
+    from rsea_ros.experiment.hypothesis import Hypothesis
+    from rsea_ros.identification.solver import Map
+
+HELP = "the run that tells apart the causes still possible, within a bench's limits"
+EXAMPLE = "rsea experiment friction/model.yaml play/model.yaml --limits torque=20,velocity=1"
+CSV, JSON, REPORT = FILES = ("run.csv", "experiment.json", "report.html")
+NO_RUN = "no_run"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    from rsea_ros.experiment.limits import UNITS
+
+    units = ", ".join(f"{name} ({unit})" for name, unit in UNITS.items())
+    add = parser.add_argument
+    what = "model.yaml of each cause (its last effect), a diagnosis.json beside its model.yaml, or a rig"
+    add("models", nargs="+", metavar="MODEL", help=what)
+    add("--limits", required=True, metavar="NAME=VALUE,…", help=f"largest sizes either way: {units}")
+    add("--bag", nargs="+", action="extend", default=[], help="runs so far, by which the causes are weighed")
+    add("--rate", type=positive, default=280.0, help="commands a second, Hz (default %(default)g)")
+    add("--longest", type=positive, default=10.0, help="s of the run (default %(default)g)")
+    add(
+        "--refine",
+        type=int,
+        default=24,
+        metavar="N",
+        help="shapes judged beside the first (default %(default)s)",
+    )
+    add("--out", help=f"directory for {', '.join(FILES)} (default out/experiment, -2, …)")
+    add_force(parser)
+    add("--json", action="store_true", help="print experiment.json to stdout and nothing else")
+    add_fail_on(parser, (NO_RUN,))
+    add_topic_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Design the run and write it."""
+    from rsea_ros.experiment.advice import advise
+    from rsea_ros.experiment.limits import limits_from
+    from rsea_ros.experiment.proposal import Asked
+    from rsea_ros.identification.workers import worker_pools
+
+    place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])
+    asked = Asked(
+        limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine
+    )
+    models = [model for path in args.models for model in models_in(path)]
+    with progress("experiment") as tell, worker_pools() as pools:
+        tell("reading", 0.0)
+        hypotheses, noise, excluded = _possible(models, args, pools.run)
+        advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
+    report = written(advice, place, args)
+    if args.json:
+        print((report.parent / JSON).read_text(encoding="utf-8"), end="")
+    else:
+        _print(advice, report)
+    return FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
+
+
+def models_in(path: str) -> list[Model]:
+    """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
+    from rsea_ros import strict_yaml
+    from rsea_ros.experiment.documents import models_of
+    from rsea_ros.experiment.files import model_of
+    from rsea_ros.model.rig_file import load_rig
+
+    if Path(path).suffix != ".json":
+        return [model_of(load_rig(path))]
+    extended = load_rig(Path(path).parent / "model.yaml")
+    try:
+        return models_of(strict_yaml.read(Path(path)).content, extended)
+    except FieldError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def _possible(
+    models: Sequence[Model], args: argparse.Namespace, run: Map
+) -> tuple[list[Hypothesis], dict[str, float], dict[str, float]]:
+    """Return the hypotheses; as bags show it, the noise by channel, and the causes that they exclude.
+
+    With bags, that there is no cause at all is a hypothesis too.
+    """
+    from rsea_ros.experiment.files import hypotheses_from
+
+    if not args.bag:
+        return hypotheses_from(models), {}, {}
+    from rsea_ros.cli.diagnose import readable
+    from rsea_ros.experiment.campaign import Rules
+    from rsea_ros.experiment.hypothesis import NOTHING
+    from rsea_ros.experiment.weighing import weigh
+
+    first = models[0].rig
+    rig = first.with_effects(*(e for e in first.effects if e.name != models[0].name))
+    records = [readable(bag, topic_map(args)) for bag in args.bag]
+    weighing = weigh(records, rig, [m.name for m in models if m.name != NOTHING], run=run)
+    likely = weighing.hypotheses()
+    kept = [h for h in likely if h.probability >= Rules.possible] or likely[:1]
+    excluded = {h.name: h.probability for h in likely if h not in kept}
+    return kept, dict(weighing.cases[0].noise), excluded
+
+
+def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
+    """Write run.csv, experiment.json and report.html; return the report's path."""
+    from rsea_ros.experiment.run_file import run_text
+    from rsea_ros.report.experiment_json import advice_json
+    from rsea_ros.report.experiment_page import advice_page
+    from rsea_ros.report.provenance import provenance_of
+    from rsea_ros.report.results import json_text, with_provenance
+
+    source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])
+    with NewFiles(place) as new:
+        if advice.proposal is not None:
+            new.write(CSV, run_text(advice.proposal.command, advice.proposal.rate))
+        new.write(JSON, json_text(with_provenance(advice_json(advice), source)))
+        return new.write(REPORT, advice_page(advice, source))
+
+
+def _print(advice: Advice, report: Path) -> None:
+    from rsea_ros.report.experiment_words import limit_rows, plain_name, proof_words, verdict
+
+    print(verdict(advice))
+    for h in advice.hypotheses:
+        print(f"possible    {plain_name(h.name)}: probability {h.probability:.3f}")
+    for name, probability in advice.excluded.items():
+        print(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}")
+    p = advice.proposal
+    if p is not None:
+        for i, a in enumerate(p.names):
+            for j, b in enumerate(p.names):
+                if i != j:
+                    print(f"separates   {plain_name(a)} over {plain_name(b)}: S = {p.table[i, j]:.3g}")
+        for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
+            print(f"asks        {name} {expected}, at most {level} of {limit} {unit}")
+        print(f"run         {report.parent / CSV}")
+    for proof in advice.proofs:
+        print(f"no run      {proof_words(proof)}")
+    print(f"report      {report}")

@@ -1,0 +1,6 @@
+"""Design of experiments: the run that tells the causes apart that are still possible, within a bench's
+limits.
+
+weighing.py holds causes against all records, design.py finds the next run, bound.py proves where none would
+help, campaign.py goes round until one cause is left. Nothing here plays a run: nodes and verbs do.
+"""

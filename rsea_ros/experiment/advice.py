@@ -1,0 +1,85 @@
+"""The answer offline: the run to play, or the proof that none helps and what to measure instead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rsea_ros.experiment.apart import Apart, measurements_apart
+from rsea_ros.experiment.bound import Bound, bound
+from rsea_ros.experiment.design import propose
+from rsea_ros.experiment.hypothesis import Hypothesis
+from rsea_ros.experiment.judge import noise_by_channel
+from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.identification.solver import Map, serial
+from rsea_ros.progress import Progress
+
+LONGEST_OF_ALL = 60.0
+"""s of a run in whose length a pair must be hopeless to be called so."""
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A pair that no run separates: the bound in the direction that is larger, and what to measure apart."""
+
+    bound: Bound
+    apart: tuple[Apart, ...]
+
+
+@dataclass(frozen=True)
+class Advice:
+    """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates.
+
+    excluded: causes that the records so far speak against, with their probability.
+    """
+
+    hypotheses: tuple[Hypothesis, ...]
+    asked: Asked
+    proposal: Proposal | None
+    proofs: tuple[Proof, ...]
+    excluded: Mapping[str, float] = field(default_factory=dict)
+
+
+_WORTH = 0.02
+"""Share that a run must decide to be worth playing."""
+
+
+def advise(
+    hypotheses: Sequence[Hypothesis],
+    asked: Asked,
+    measured: Mapping[str, float] | None = None,
+    run: Map = serial,
+    tell: Progress | None = None,
+) -> Advice:
+    """Return the run that tells hypotheses apart, and for pairs that no run separates the proof.
+
+    measured: noise by channel. Raises ParameterError as propose does.
+    """
+    proposal = propose(hypotheses, asked, measured, run, tell)
+    proofs = proofs_of(hypotheses, proposal.hopeless, asked, measured or {}, run)
+    is_worth = len(hypotheses) == 1 or proposal.decided > _WORTH
+    return Advice(tuple(hypotheses), asked, proposal if is_worth else None, proofs)
+
+
+def proofs_of(
+    hypotheses: Sequence[Hypothesis],
+    pairs: Sequence[tuple[str, str]],
+    asked: Asked,
+    measured: Mapping[str, float],
+    run: Map = serial,
+) -> tuple[Proof, ...]:
+    """Return the proofs for pairs that no run seems to separate; without those where one yet may."""
+    named, noise = {h.name: h for h in hypotheses}, noise_by_channel(hypotheses, measured)
+    proofs = [_proved(named[a], named[b], asked, noise, run) for a, b in pairs]
+    return tuple(p for p in proofs if p is not None)
+
+
+def _proved(a: Hypothesis, b: Hypothesis, asked: Asked, noise: Mapping[str, float], run: Map) -> Proof | None:
+    """Return the proof that no run separates two, None where the bound leaves room for one."""
+    both = [
+        (i, j, bound(i, j, asked.limits, LONGEST_OF_ALL, noise, asked.rate, run)) for i, j in ((a, b), (b, a))
+    ]
+    true, rival, larger = max(both, key=lambda item: item[2].most)
+    if not larger.is_hopeless:
+        return None
+    return Proof(larger, tuple(measurements_apart(larger, true, rival)))

@@ -1,0 +1,203 @@
+"""The loop: weigh, propose, play, weigh what all runs say together, until it is known or cannot be.
+
+Nothing here knows how a run is played: `play` gets a proposal and returns its record, None where a person
+said no. It raises DeviceError for a run that broke; nothing is learnt from such a run and the loop ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from rsea_ros.errors import DeviceError, IdentificationError, ParameterError
+from rsea_ros.experiment.advice import Proof, proofs_of
+from rsea_ros.experiment.design import propose
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.limits import used
+from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.experiment.weighing import Weighing, weigh
+from rsea_ros.identification.solver import Map, serial
+from rsea_ros.model.rig import Rig
+from rsea_ros.progress import Progress
+from rsea_ros.signals import Record
+
+End = Literal[
+    "confirmed", "nothing_wrong", "unexplained", "undecidable", "spent", "declined", "broken", "failed"
+]
+"""confirmed: one cause. nothing_wrong: none is there. unexplained: no cause fits what the runs show.
+undecidable: no run tells more apart. spent: the budget is. declined: a person said no. broken: a run broke
+off. failed: the runs could not be weighed, or no run was possible within the limits.
+"""
+Play = Callable[[Proposal], Record | None]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What the loop may spend. seconds: of excitation. energy: N^2 m^2 s, the integral of the squared torque,
+    which the heat in the winding follows. runs: at most.
+    """
+
+    seconds: float = 60.0
+    energy: float = float("inf")
+    runs: int = 8
+
+    def __post_init__(self) -> None:
+        for name in ("seconds", "energy", "runs"):
+            if not getattr(self, name) > 0:
+                raise ParameterError(f"budget {name} = {getattr(self, name):g}, expected > 0")
+
+
+@dataclass(frozen=True)
+class Rules:
+    """When the loop ends. confirmed: probability of a cause. possible: probability from which it is still one
+    that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
+    by_data: S by which the data alone must prefer the best to every other of no more parameters, so that no
+    name rests on what is usual. worth: share that the next run must be expected to decide. most: causes for
+    which a run is designed. larger: than all runs before, by which a run that decides nothing by itself is
+    worth playing, while it uses less than held_back of the limits at the likeliest values.
+    """
+
+    confirmed: float = 0.95
+    possible: float = 0.005
+    floor: float = 1.3
+    worth: float = 0.02
+    most: int = 7
+    by_data: float = 6.0
+    larger: float = 1.15
+    held_back: float = 0.8
+
+
+@dataclass(frozen=True)
+class Round:
+    """What was known before a run, and the run. proposal: None in the last one."""
+
+    weighing: Weighing
+    proposal: Proposal | None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the loop ended. proofs: of pairs that no run separates. records: those that count, the first ones
+    included. why: what broke, in words.
+    """
+
+    end: End
+    rounds: tuple[Round, ...]
+    records: tuple[Record, ...]
+    proofs: tuple[Proof, ...] = ()
+    why: str = ""
+
+    @property
+    def weighing(self) -> Weighing:
+        """What all runs say together."""
+        return self.rounds[-1].weighing
+
+    @property
+    def cause(self) -> str:
+        """The most likely cause."""
+        return self.weighing.best
+
+    @property
+    def seconds(self) -> float:
+        """Excitation that was played, s."""
+        return sum(r.proposal.duration for r in self.rounds if r.proposal is not None)
+
+
+@dataclass
+class _Session:
+    """What there is so far."""
+
+    records: list[Record]
+    weighing: Weighing
+    rounds: list[Round] = field(default_factory=list)
+
+    def ended(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> Outcome:
+        rounds = (*self.rounds, Round(self.weighing, None))
+        return Outcome(end, rounds, tuple(self.records), proofs, why)
+
+
+@dataclass
+class Campaign:
+    """A bench, the causes it may have, what runs may do. hear: is given each round as it begins."""
+
+    rig: Rig
+    causes: Sequence[str]
+    asked: Asked
+    play: Play
+    budget: Budget = field(default_factory=Budget)
+    rules: Rules = field(default_factory=Rules)
+    run: Map = serial
+    tell: Progress | None = None
+    hear: Callable[[Round], None] = lambda _: None
+    choose: Callable[..., Proposal] = propose
+    """How the next run is chosen; a bench puts other policies here."""
+
+    def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
+        """Go round from some records until the loop ends. first: what they say, where it is known.
+
+        Raises IdentificationError where nothing can be fitted to them.
+        """
+        session = _Session(list(records), first or weigh(records, self.rig, self.causes, None, self.run))
+        while (outcome := self._round(session)) is None:
+            try:
+                now = weigh(session.records, self.rig, self.causes, session.weighing, self.run)
+            except IdentificationError as error:
+                session.records.pop()
+                return session.ended("failed", why=str(error))
+            session.weighing = now
+        return outcome
+
+    def possible(self, weighing: Weighing) -> list[Hypothesis]:
+        """Return the causes for which a run is designed: those that may be, and those that fit as well."""
+        near = weighing.near_by_data(self.rules.by_data)
+        every = weighing.hypotheses()
+        return [h for h in every if h.probability >= self.rules.possible or h.name in near][: self.rules.most]
+
+    def _round(self, session: _Session) -> Outcome | None:
+        """Design a run and have it played; return how the loop ended, None where it goes on."""
+        weighing = session.weighing
+        if end := self._known(weighing) or self._spent(session.rounds):
+            return session.ended(end)
+        possible, noise = self.possible(weighing), weighing.cases[0].noise
+        try:
+            proposal = self.choose(possible, self.asked, noise, self.run, self.tell)
+        except ParameterError as error:
+            return session.ended("failed", why=str(error))
+        if proposal.decided < self.rules.worth and not self._widens(proposal, session.rounds):
+            proofs = proofs_of(possible, proposal.hopeless, self.asked, noise, self.run)
+            return session.ended("undecidable", proofs)
+        self.hear(Round(weighing, proposal))
+        try:
+            record = self.play(proposal)
+        except DeviceError as error:
+            return session.ended("broken", why=str(error))
+        if record is None:
+            return session.ended("declined")
+        session.rounds.append(Round(weighing, proposal))
+        session.records.append(record)
+        return None
+
+    def _known(self, weighing: Weighing) -> End | None:
+        """Return how the loop ends by what is known, None where it goes on."""
+        if weighing.probability[weighing.best] < self.rules.confirmed:
+            return None
+        if weighing.near_by_data(self.rules.by_data):
+            return None
+        if weighing.left > self.rules.floor:
+            return "unexplained"
+        return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
+
+    def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
+        """Tell whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
+        before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
+        now = proposal.peaks
+        is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)
+        return is_larger and used(now.expected, self.asked.limits) < self.rules.held_back
+
+    def _spent(self, rounds: Sequence[Round]) -> End | None:
+        played = [r.proposal for r in rounds if r.proposal is not None]
+        seconds, energy = sum(p.duration for p in played), sum(p.energy for p in played)
+        budget = self.budget
+        left = seconds + self.asked.shortest <= budget.seconds and energy < budget.energy
+        return None if left and len(played) < budget.runs else "spent"

@@ -1,0 +1,137 @@
+"""A hypothesis: the rig with one cause, and what is known of its numbers; and its response to a command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, jacobian, serial
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.drive import coarser, drive_from
+from rsea_ros.model.rig import Rig, Sensor
+from rsea_ros.model.simulation import simulate_drive
+from rsea_ros.signals import Channel, FloatArray, Record
+
+NOTHING = "nothing"
+"""Name of the hypothesis that the rig, its values fitted, is all that there is."""
+_SEEN = 3.0
+"""Standard deviations from none at all, from which the size of a cause counts as known."""
+SEEN = ("ft", "deflection", "position", "velocity")
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause that is still possible. See the module docstring.
+
+    problem: the rig with the cause, and what may move; its cases do not matter. theta: the most likely
+    values in the fit's coordinates, shape (n,). information: of prior and data so far, the inverse of the
+    covariance, shape (n, n). probability: beside the other hypotheses.
+    """
+
+    name: str
+    problem: Problem
+    theta: FloatArray
+    information: FloatArray
+    probability: float
+
+    @property
+    def rig(self) -> Rig:
+        """The rig with its most likely values."""
+        return self.rig_at(self.theta)
+
+    def rig_at(self, theta: FloatArray) -> Rig:
+        """Return the rig with other values, in the fit's coordinates."""
+        return apply(self.problem.rig, self.problem.unknowns, theta)[0]
+
+    def sd(self) -> FloatArray:
+        """Return the standard deviation of every unknown, in the fit's coordinates, shape (n,)."""
+        result: FloatArray = np.sqrt(np.diag(np.linalg.inv(self.information)))
+        return result
+
+    def draws(self, count: int, rng: np.random.Generator) -> list[Rig]:
+        """Return rigs whose values are drawn from what is known of them."""
+        factor = np.linalg.cholesky(np.linalg.inv(self.information))
+        moved = self.theta + rng.standard_normal((count, len(self.theta))) @ factor.T
+        return [self.rig_at(theta) for theta in moved]
+
+    def if_there(self) -> FloatArray:
+        """Return the values to be expected if the cause is there, shape (n,).
+
+        The most likely ones; where its size may as well be none, a standard deviation away from that, and the
+        others as they go with it: a run has to be judged by what it would show of the cause.
+        """
+        if not self.own:
+            return self.theta
+        main, spread = self.own[0], np.linalg.inv(self.information)
+        away = self.theta[main] - self.problem.unknowns[main].inner(self.problem.unknowns[main].start)
+        sd = float(np.sqrt(spread[main, main]))
+        if abs(away) > _SEEN * sd:
+            return self.theta
+        side = -1.0 if away < 0.0 else 1.0
+        moved = self.theta + spread[:, main] / sd * side
+        result: FloatArray = np.clip(moved, *self.bounds())
+        return result
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and highest coordinates, shape (n,) each."""
+        unknowns = self.problem.unknowns
+        low = [u.inner(max(u.low, 1e-300) if u.logarithmic else u.low) for u in unknowns]
+        return np.array(low), np.array([u.inner(u.high) for u in unknowns])
+
+    @property
+    def own(self) -> list[int]:
+        """Where the cause's own parameters are among the unknowns."""
+        names = [u.name for u in self.problem.unknowns]
+        return [i for i, n in enumerate(names) if n.split(".")[0] == self.name]
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a hypothesis predicts of a run, over the sensors' noise.
+
+    if_there: with the values to be expected if it is true, shape (m,). predicted, slope: at its most likely
+    values, (m,), with derivatives, (m, n), from which it is fitted where another is true.
+    """
+
+    if_there: FloatArray
+    predicted: FloatArray
+    slope: FloatArray
+
+
+def noise_of(rig: Rig, channel: str, measured: Mapping[str, float] | None = None) -> float:
+    """Return the noise of a channel: as measured, else as the rig states it with q / sqrt(12)."""
+    if measured and channel in measured:
+        return measured[channel]
+    sensor = rig.sensors.get(channel, Sensor())
+    return float(max(np.hypot(sensor.noise, sensor.quantum / np.sqrt(12.0)), 1e-9))
+
+
+def run_case(command: FloatArray, rate: float, noise: Mapping[str, float], *, is_quick: bool = False) -> Case:
+    """Return a run that was not made: a command, the channels that would be measured, all zero, their noise.
+
+    is_quick: on steps twice as long.
+    """
+    t = np.arange(len(command)) / rate
+    blank = {n: Channel(t + 1.0 / rate, np.zeros(len(t))) for n in noise}
+    drive = drive_from(Record({"command": Channel(t, command), **blank}))
+    drive = replace(drive, initial=(0.0, 0.0))
+    zeros = {n: c.y for n, c in blank.items()}
+    mask = {n: np.ones(len(t), bool) for n in noise}
+    return Case(coarser(drive) if is_quick else drive, {n: c.t for n, c in blank.items()}, zeros, noise, mask)
+
+
+def response(hypothesis: Hypothesis, case: Case, run: Map = serial) -> Response:
+    """Return what a hypothesis predicts of a case."""
+    problem = replace(hypothesis.problem, cases=(case,))
+    predicted = problem.residual(hypothesis.theta)
+    slope = jacobian(problem, hypothesis.theta, predicted, run)
+    return Response(problem.residual(hypothesis.if_there()), predicted, slope)
+
+
+def motion(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
+    """Return the noise-free torque and motion of a run from rest, whether or not the bench measures them."""
+    case = run_case(command, rate, {n: 1.0 for n in SEEN if rig.measures(n)})
+    return simulate_drive(rig, case.drive)  # type: ignore[arg-type]

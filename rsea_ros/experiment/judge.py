@@ -1,0 +1,73 @@
+"""Judges shapes: scales them to the limits and simulates what each hypothesis predicts of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_of, response, run_case
+from rsea_ros.experiment.limits import of_command, of_response, used
+from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.shape import Shape, command_of
+from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.solver import Map
+from rsea_ros.signals import FloatArray
+
+INSIDE = 0.9
+"""Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Judges shapes for hypotheses. noise: by channel."""
+
+    hypotheses: Sequence[Hypothesis]
+    asked: Asked
+    noise: Mapping[str, float]
+    run: Map
+
+    def within(self, shape: Shape, duration: float) -> FloatArray:
+        """Return the command of a shape in shares, as large as the limits allow at the likeliest values."""
+        limits, rate = self.asked.limits, self.asked.rate
+        whole = abs(shape.bias) + shape.amplitude
+        size = limits.torque * min(1.0, 1.0 / whole) * INSIDE
+        scaled = replace(shape, amplitude=shape.amplitude * size, bias=shape.bias * size)
+        command = command_of(scaled, duration, rate, limits.slew)
+        for _ in range(3):
+            share = max(self.share(h, command) for h in self.hypotheses)
+            if share <= INSIDE * 1.05:
+                break
+            command = command * (INSIDE / share if math.isfinite(share) else 0.5)
+        return command
+
+    def share(self, hypothesis: Hypothesis, command: FloatArray) -> float:
+        """Return the share of the limits that a command uses at the likeliest values."""
+        rate = self.asked.rate
+        rig = hypothesis.rig_at(hypothesis.if_there())
+        found = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
+        return used(found, self.asked.limits)
+
+    def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
+        """Return what each hypothesis predicts of a command."""
+        case = self.case(command, is_quick=is_quick)
+        return [response(h, case, self.run) for h in self.hypotheses]
+
+    def case(self, command: FloatArray, *, is_quick: bool) -> Case:
+        """Return a run of a command, not yet made."""
+        return run_case(command, self.asked.rate, self.noise, is_quick=is_quick)
+
+    @property
+    def probability(self) -> FloatArray:
+        """Of each hypothesis, shape (k,)."""
+        return np.array([h.probability for h in self.hypotheses])
+
+
+def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
+    """Return the noise of every channel that the bench measures."""
+    rig = hypotheses[0].problem.rig
+    listed = [n for n in CHANNELS if n in (measured or rig.sensors) and rig.measures(n)]
+    return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}

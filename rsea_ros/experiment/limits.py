@@ -1,0 +1,104 @@
+"""What a run may ask of a bench, and by how much a command or its response comes near to that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from rsea_ros.decimal_number import is_decimal
+from rsea_ros.errors import ParameterError
+from rsea_ros.signals import FloatArray
+from rsea_ros.wording import did_you_mean, shown
+
+UNITS: Mapping[str, str] = {
+    "torque": "N m",
+    "slew": "N m/s",
+    "heat": "N m",
+    "deflection": "rad",
+    "velocity": "rad/s",
+    "travel": "rad",
+    "power": "W",
+    "ft": "N m",
+}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The largest size of each quantity either way; infinite where nothing limits it.
+
+    torque: of the command. slew: its change from one command to the next, over their period. heat: its RMS
+    over the run, which the heat in a motor's winding follows (no rig states a thermal model, so this stands
+    for its temperature). deflection: of the spring. velocity, travel: of the gear output against the
+    housing. power: mechanical, command times velocity. ft: torque at the F/T sensor. Raises ParameterError
+    for a limit that is not above zero, and without one of the torque.
+    """
+
+    torque: float
+    slew: float = math.inf
+    heat: float = math.inf
+    deflection: float = math.inf
+    velocity: float = math.inf
+    travel: float = math.inf
+    power: float = math.inf
+    ft: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name, unit in UNITS.items():
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ParameterError(f"limit {name} = {value:g} {unit}, expected > 0 {unit}")
+        if math.isinf(self.torque):
+            raise ParameterError(
+                "limit torque = inf N m, expected a finite torque: nothing else bounds a run"
+            )
+
+    def stated(self) -> dict[str, float]:
+        """Return the finite limits by name."""
+        return {f.name: v for f in fields(self) if math.isfinite(v := getattr(self, f.name))}
+
+
+def limits_from(text: str) -> Limits:
+    """Return the limits of `torque=20,velocity=0.5`. Raises ParameterError for what is not of that form."""
+    values: dict[str, float] = {}
+    for item in filter(None, text.split(",")):
+        name, _, value = (part.strip() for part in item.partition("="))
+        if name not in UNITS:
+            near = did_you_mean(name, UNITS)
+            raise ParameterError(f"--limits: {shown(name)}, expected one of {', '.join(UNITS)}{near}")
+        if not is_decimal(value):
+            raise ParameterError(f"--limits: {name} = {shown(value)}, expected a number in {UNITS[name]}")
+        if name in values:
+            raise ParameterError(f"--limits: {name} is given twice, expected once")
+        values[name] = float(value)
+    if "torque" not in values:
+        raise ParameterError("--limits: no torque, expected at least torque=… in N m")
+    return Limits(**values)
+
+
+def of_command(command: FloatArray, rate: float) -> dict[str, float]:
+    """Return what a command asks by itself: its size, its slew, its RMS while it is not at rest. rate: Hz."""
+    around = np.concatenate([[0.0], command, [0.0]])
+    return {
+        "torque": float(np.max(np.abs(command))),
+        "slew": float(np.max(np.abs(np.diff(around)))) * rate,
+        "heat": float(np.sqrt(np.mean(np.trim_zeros(command) ** 2))) if command.any() else 0.0,
+    }
+
+
+def of_response(command: FloatArray, outputs: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Return the largest deflection, velocity, travel, power and F/T torque of a simulated run."""
+    size = {n: float(np.max(np.abs(y))) for n, y in outputs.items()}
+    peaks = {"velocity": size["velocity"], "travel": size["position"]}
+    peaks["power"] = float(np.max(np.abs(command * outputs["velocity"])))
+    if "ft" in size:
+        peaks |= {"ft": size["ft"], "deflection": size["deflection"]}
+    return peaks
+
+
+def used(peaks: Mapping[str, float], limits: Limits) -> float:
+    """Return the largest share of a limit that is used; above 1 one is broken."""
+    shares = [peaks[n] / limit for n, limit in limits.stated().items() if n in peaks]
+    return max((s if math.isfinite(s) else math.inf for s in shares), default=0.0)

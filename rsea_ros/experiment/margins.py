@@ -1,0 +1,88 @@
+"""Limits held although the bench is not known: a chance constraint over its values.
+
+For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
+and at both ends of every principal axis of what is known of them, z standard deviations away. The increases
+add up as squares: for a peak that goes straight with the values that is the quantile of z, for one that
+bends the simulated ends count. z is such that all causes together, each by its probability, break a limit
+with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from rsea_ros.experiment.hypothesis import Hypothesis, motion
+from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+LEVEL = 1.0 - 1e-5
+"""Probability with which all limits hold, over the causes and what is known of their numbers."""
+_LIKELIEST = 0.01
+"""Share of its benches in which even the least likely cause may break a limit."""
+BETWEEN = 1.02
+"""What a peak between two samples may have above them."""
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """The largest of every quantity in a run: expected at the most likely values, and at LEVEL."""
+
+    expected: dict[str, float]
+    at_level: dict[str, float]
+
+
+def ends_of(hypotheses: Sequence[Hypothesis]) -> list[list[Rig]]:
+    """Return for each hypothesis its most likely rig, then the two ends of every axis."""
+    return [_ends(h, quantile_of(h.probability, len(hypotheses))) for h in hypotheses]
+
+
+def quantile_of(probability: float, count: int) -> float:
+    """Return z of one of `count` causes: a less likely one may break a limit more often."""
+    allowed = (1.0 - LEVEL) / (count * max(probability, 1e-9))
+    return float(norm.isf(min(max(allowed, 1.0 - LEVEL), _LIKELIEST)))
+
+
+def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
+    unknowns, theta = hypothesis.problem.unknowns, hypothesis.theta
+    moving = [i for i, u in enumerate(unknowns) if not u.is_clock]
+    covariance = np.linalg.inv(hypothesis.information)[np.ix_(moving, moving)]
+    sd = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
+    rigs = [hypothesis.rig]
+    for value, vector in zip(values, vectors.T, strict=True):
+        for side in (-z, z):
+            moved = theta.copy()
+            moved[moving] += side * np.sqrt(max(value, 0.0)) * vector * sd
+            rigs.append(hypothesis.rig_at(moved))
+    return rigs
+
+
+def peaks(command: FloatArray, rate: float, rigs: Sequence[Sequence[Rig]]) -> Peaks:
+    """Return the peaks of a command over the rigs of ends_of."""
+    by_command = of_command(command, rate)
+    expected, at_level = dict(by_command), dict(by_command)
+    for group in rigs:
+        runs = [of_response(command, motion(rig, command, rate)) for rig in group]
+        for name in runs[0]:
+            values = BETWEEN * np.array([run[name] for run in runs])
+            expected[name] = max(expected.get(name, 0.0), float(values[0]))
+            at_level[name] = max(at_level.get(name, 0.0), at_ends(values))
+    return Peaks(expected, at_level)
+
+
+def at_ends(values: FloatArray) -> float:
+    """Return the peak at the quantile: in the middle, then at both ends of each axis, shape (1 + 2 k,)."""
+    if not np.isfinite(values).all():
+        return np.inf
+    increases = np.maximum(values[1:].reshape(-1, 2).max(axis=1) - values[0], 0.0)
+    return float(values[0] + np.sqrt(np.sum(increases**2)))
+
+
+def share_used(found: Peaks, limits: Limits) -> float:
+    """Return the largest share of a limit that is used at LEVEL."""
+    return used(found.at_level, limits)

@@ -1,0 +1,68 @@
+"""What a design may do, and the run that comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.errors import ParameterError
+from rsea_ros.experiment.limits import Limits
+from rsea_ros.experiment.margins import Peaks
+from rsea_ros.experiment.shape import Kind, Shape
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a design may do. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
+
+    limits: Limits
+    rate: float = 280.0
+    shortest: float = 0.5
+    longest: float = 10.0
+    probe: float = 2.0
+    refine: int = 24
+    kinds: tuple[Kind, ...] = ("multisine", "chirp", "steps", "holds")
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.shortest <= self.longest:
+            raise ParameterError(
+                f"longest run {self.longest:g} s, expected at least the shortest of {self.shortest:g} s"
+            )
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A run to be played, and what is expected of it.
+
+    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
+    table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
+    share that it decides; sharpened: nats by which it narrows the parameters where one cause is left.
+    expected, at_level: peaks of every quantity.
+    """
+
+    shape: Shape
+    duration: float
+    rate: float
+    command: FloatArray
+    names: tuple[str, ...]
+    table: FloatArray
+    hopeless: tuple[tuple[str, str], ...]
+    decided: float
+    sharpened: float
+    peaks: Peaks
+    tried: int
+    energy: float
+
+    @property
+    def worst(self) -> tuple[str, str, float] | None:
+        """The pair that it separates least of those that can be, with its S; None for a single cause."""
+        table = self.table.copy()
+        for pair in self.hopeless:
+            i, j = (self.names.index(n) for n in pair)
+            table[i, j] = table[j, i] = np.inf
+        if not np.isfinite(table).any():
+            return None
+        i, j = divmod(int(np.argmin(table)), len(table))
+        return self.names[i], self.names[j], float(table[i, j])

@@ -1,0 +1,162 @@
+"""Causes weighed against each other by all records together: each fitted to all of them, their evidence
+compared.
+
+The logarithm of the evidence is Laplace's, with priors on the rig's values and on the cause's size:
+
+    ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
+
+C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
+units of the noise, not below 1. A cause of which the data show nothing weighs as much as nothing does: it
+stays possible until a run could have shown it. Every cause is as likely as any other beforehand. (MacKay,
+Neural Computation 4, 1992.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.checks.faults import check
+from rsea_ros.experiment.fits import fitted, fitted_again
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
+from rsea_ros.experiment.prior import problem_of, weights_of
+from rsea_ros.identification.problem import Case, case_from
+from rsea_ros.identification.solver import Map, Solution, power, serial
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import BoolArray, FloatArray, Record
+
+HOPELESS = 1e-6
+"""Probability below which a cause is not fitted again to further records."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A cause fitted to all records. log_evidence: see the module; left: RMS over the noise."""
+
+    name: str
+    solution: Solution
+    log_evidence: float
+    left: float
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """What all records say. probability: by cause, of those that were not given up before, which sum to 1."""
+
+    cases: tuple[Case, ...]
+    fits: Mapping[str, Weighed]
+    probability: Mapping[str, float]
+    scale: float
+
+    @property
+    def best(self) -> str:
+        """The most likely cause."""
+        return max(self.probability, key=lambda n: self.probability[n])
+
+    @property
+    def left(self) -> float:
+        """RMS over the noise that the best cause leaves."""
+        return self.fits[self.best].left
+
+    def near_by_data(self, least: float) -> list[str]:
+        """Return the causes of no more parameters than the best that fit less than `least` worse, in S.
+
+        By the data alone, whatever the priors say of them.
+        """
+        best = self.fits[self.best].solution
+        others = {n: f.solution for n, f in self.fits.items() if n != self.best}
+        fewer = {n: s for n, s in others.items() if len(s.theta) <= len(best.theta)}
+        away = {n: (power(s.residual) - power(best.residual)) / self.scale for n, s in fewer.items()}
+        return [n for n, s in away.items() if s < least]
+
+    def hypotheses(self, least: float = 0.0) -> list[Hypothesis]:
+        """Return the causes with a probability of at least `least`, the likeliest first."""
+        names = sorted(self.probability, key=lambda n: -self.probability[n])
+        return [self._hypothesis(n) for n in names if self.probability[n] >= least]
+
+    def _hypothesis(self, name: str) -> Hypothesis:
+        solution = self.fits[name].solution
+        information = information_of(solution, self.scale)
+        problem = replace(solution.problem, cases=())
+        return Hypothesis(name, problem, solution.theta, information, self.probability[name])
+
+
+def cases_of(records: Sequence[Record], rig: Rig) -> tuple[Case, ...]:
+    """Return records ready to be fitted, their faulty samples masked."""
+    checked = [check(record, rig) for record in records]
+    return tuple(_once(case_from(c.record, rig, c.masked)) for c in checked)
+
+
+def _once(case: Case) -> Case:
+    """Return a case in which a value that repeats counts once, in the middle of its run.
+
+    In slow motion an encoder rounds many samples in a row to one count, by the same error: they are one
+    observation, and taken as many they would turn the rounding of a turning point into physics.
+    """
+    return case.within({n: middles_of_runs(y) for n, y in case.measured.items()})
+
+
+def middles_of_runs(y: FloatArray) -> BoolArray:
+    """Return which samples stand in the middle of a run of equal values, shape (n,)."""
+    begins = np.flatnonzero(np.diff(y, prepend=np.nan))
+    ends = np.append(begins[1:], len(y))
+    middle = np.zeros(len(y), bool)
+    middle[(begins + ends - 1 + np.arange(len(begins)) % 2) // 2] = True
+    return middle
+
+
+def weigh(
+    records: Sequence[Record],
+    rig: Rig,
+    causes: Sequence[str],
+    before: Weighing | None = None,
+    run: Map = serial,
+) -> Weighing:
+    """Weigh causes, and that there is none, by all records of a bench.
+
+    before: what the earlier ones of the records said; fits go on from there, and what was HOPELESS is left
+    out. Raises IdentificationError for records from which nothing can be fitted.
+    """
+    cases = cases_of(records, rig)
+    names = [NOTHING, *causes]
+    if before is not None:
+        names = [n for n in names if before.probability.get(n, 0.0) > HOPELESS]
+    nominal = fitted(NOTHING, problem_of(NOTHING, rig, cases), _where(before, NOTHING), {}, run)
+    near = dict(zip((u.name for u in nominal.problem.unknowns), nominal.theta, strict=True))
+    solutions = {NOTHING: nominal}
+    for name in (n for n in names if n != NOTHING):
+        solutions[name] = fitted(name, problem_of(name, rig, cases), _where(before, name), near, run)
+    return _weighed(fitted_again(solutions, run), cases)
+
+
+def _where(before: Weighing | None, name: str) -> FloatArray | None:
+    """Return where the fit of a cause ended before, None for one that was not fitted."""
+    return before.fits[name].solution.theta if before is not None and name in before.fits else None
+
+
+def information_of(solution: Solution, scale: float) -> FloatArray:
+    """Return the information of prior and data together, shape (n, n)."""
+    matrix = solution.jacobian
+    result: FloatArray = matrix.T @ matrix / scale + np.diag(weights_of(solution.problem))
+    return result
+
+
+def _weighed(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> Weighing:
+    samples = max(len(next(iter(solutions.values())).residual), 1)
+    scale = max(1.0, min(s.cost for s in solutions.values()) / samples)
+    fits = {n: Weighed(n, s, _evidence(s, scale), _left(s)) for n, s in solutions.items()}
+    logs = np.array([f.log_evidence for f in fits.values()])
+    shares = np.exp(logs - logs.max())
+    return Weighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
+
+
+def _evidence(solution: Solution, scale: float) -> float:
+    known = weights_of(solution.problem)
+    spread = np.linalg.slogdet(information_of(solution, scale) / np.sqrt(np.outer(known, known)))[1]
+    return -0.5 * solution.cost / scale - 0.5 * float(spread)
+
+
+def _left(solution: Solution) -> float:
+    return float(np.sqrt(np.mean(solution.residual**2)))

@@ -1,0 +1,125 @@
+"""Plays a command on torque_command, on the grid of the measurements' stamps, and ends with zeros."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from msg_adapters.ros import JointState, stamp_of, torque_command_message
+from rsea_ros.nodes._cycle import SECOND, Cycle
+from rsea_ros.nodes._qos import COMMAND, MEASUREMENT, await_arrival
+from rsea_ros.signals import FloatArray
+
+SETTLE = SECOND // 2
+CLOSING_ZEROS = 3
+MARGIN = SECOND // 100
+"""A command that has less than this left until it takes effect is left out: its stamp would not be true."""
+SOFT = 0.1
+"""s in which a run that is stopped goes to zero torque, under a raised cosine."""
+
+
+class Player:
+    """Publishes one command (N m, at `rate` Hz), each value `lead` s before it takes effect.
+
+    wanted: subscriptions of torque_command to wait for. publisher: of a node that plays more than once.
+    next: values that are out. left_out: values that came too late.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        command: FloatArray,
+        rate: float,
+        *,
+        lead: float,
+        wanted: int,
+        joint: str,
+        publisher: Publisher[JointState] | None = None,
+    ) -> None:
+        self.command, self.rate = command, rate
+        self.next, self.left_out, self.started = 0, 0, False
+        self._node, self._lead, self._wanted, self._joint = node, round(lead * SECOND), wanted, joint
+        self._stamp, self._last = 0, 0.0
+        self._stopped_at = -1
+        self._publisher = publisher or node.create_publisher(JointState, "torque_command", COMMAND)
+        self._measurements = node.create_subscription(JointState, "joint_states", self._begin, MEASUREMENT)
+        self.cycle = Cycle(rate, self._step, catch_up=True)
+
+    @property
+    def subscriptions(self) -> int:
+        """How many listen to the commands."""
+        return self._publisher.get_subscription_count()
+
+    def stop(self) -> None:
+        """Go to zero within SOFT s from the value that comes next; the run is over then."""
+        if self._stopped_at < 0:
+            self._stopped_at = self.next
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it was asked to stop."""
+        return self._stopped_at >= 0
+
+    def over(self) -> bool:
+        """Tell whether all is out. Raises what has gone wrong in the thread."""
+        if self.started:
+            self.cycle.running()
+        soft = self._stopped_at + round(SOFT * self.rate) if self.stopped else len(self.command)
+        return self.next >= min(soft, len(self.command)) or (self.stopped and not self.started)
+
+    def close(self) -> None:
+        """Go softly to zero, command zero torque after the last command, and wait until that has arrived."""
+        if not self.started:
+            self._node.destroy_subscription(self._measurements)
+        self._end_softly()
+        self.cycle.stop()
+        last = max(self._stamp, time.time_ns())
+        for k in range(1, CLOSING_ZEROS + 1 if self.started else 1):
+            stamp = last + round(k * SECOND / self.rate)
+            self._publisher.publish(torque_command_message(stamp, 0.0, self._joint))
+        await_arrival(self._publisher)
+
+    def _end_softly(self) -> None:
+        """Wait for the soft end of a run that is under way, unless its thread has failed."""
+        deadline = time.monotonic() + 2.0 * SOFT
+        if self.started and self.next < len(self.command):
+            self.stop()
+        while self.started and self.cycle.error is None and time.monotonic() < deadline and not self.over():
+            time.sleep(0.005)
+
+    def _begin(self, message: JointState) -> None:
+        """Start at a whole number of periods after a measurement, once everybody listens."""
+        if self.started or self.stopped or self.subscriptions < self._wanted:
+            return
+        self.started = True
+        self.cycle.start(self._first(stamp_of(message.header.stamp)) - self._lead)
+        self._node.destroy_subscription(self._measurements)
+
+    def _first(self, measured: int) -> int:
+        """Return when the first command takes effect, ns."""
+        earliest = time.time_ns() + self._lead + SETTLE
+        periods = math.ceil((earliest - measured) * self.rate / SECOND)
+        first: int = measured + round(periods * SECOND / self.rate)
+        return first
+
+    def _step(self, now: int) -> None:
+        """Publish the next command, or leave it out when this thread was held up for too long."""
+        k, self.next = self.next, self.next + 1
+        torque = self._torque(k)
+        self._stamp = now + self._lead
+        if self._lead and self._stamp - time.time_ns() < min(MARGIN, self._lead // 2):
+            self.left_out += 1
+        else:
+            self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
+
+    def _torque(self, k: int) -> float:
+        """Return the command of cycle k: as planned, after a stop ever less of the last one, then zero."""
+        if not self.stopped:
+            self._last = float(self.command[k]) if k < len(self.command) else 0.0
+            return self._last
+        done = (k - self._stopped_at + 1) / (SOFT * self.rate)
+        return self._last * 0.5 * (1.0 + float(np.cos(np.pi * min(done, 1.0))))

@@ -1,0 +1,236 @@
+"""experiment: tells the causes apart that a bench may have, run by run, each with a person's consent.
+
+It begins with what was recorded before (`bag`). ~/approve plays the run that is proposed,
+~/decline ends the session, ~/cancel stops a run softly at any sample. What is known stands in /diagnostics.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters import read_record, write_record
+from msg_adapters.overlay import write_overlay
+from msg_adapters.ros import JointState, Trigger
+from rsea_ros.errors import DeviceError, ParameterError, RseaError
+from rsea_ros.experiment.campaign import Budget, Campaign, Outcome, Round
+from rsea_ros.experiment.causes import USUAL, causes_from
+from rsea_ros.experiment.limits import limits_from
+from rsea_ros.experiment.opinion import diagnosed
+from rsea_ros.experiment.proposal import Asked, Proposal
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.new_files import Place, unused
+from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
+from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
+from rsea_ros.nodes._player import Player
+from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._trial import Ears, Trial
+from rsea_ros.report.campaign_files import write_campaign
+from rsea_ros.report.campaign_words import end_sentence, known
+from rsea_ros.report.diagnosis_files import write_diagnosis
+from rsea_ros.report.experiment_words import shape_words
+from rsea_ros.signals import Record
+
+DEFAULT = "out/experiment"
+TABLE = (
+    Parameter("rig", "paper_high_impedance", "what the bench is: a name of config/rigs, or a file"),
+    Parameter("bag", "", "what was recorded so far, commas between several bags"),
+    Parameter("causes", ",".join(USUAL), "effects of the catalogue that it may be, commas between them"),
+    Parameter("limits", "torque=10", "of every run, as in rsea experiment --limits"),
+    Parameter("seconds", 60.0, "budget of excitation", "s", 0.5, 1e5),
+    Parameter("energy", 1e6, "budget of the integral of the squared torque", "N^2 m^2 s", 1.0, 1e12),
+    Parameter("longest", 10.0, "length of a run at most", "s", 0.5, 600.0),
+    Parameter("rate", 280.0, "commands a second", "Hz", 50.0, 1000.0),
+    Parameter("ask", True, "wait for ~/approve before each run; false: play at once"),
+    Parameter("lead", 0.1, "how long before it takes effect a command is published", "s", 0.0, 0.2),
+    Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
+    AXIS,
+    JOINT,
+)
+
+
+class Experiment:
+    """The loop in a thread of its own; this one plays and hears."""
+
+    def __init__(self, node: Node, values: dict[str, Any]) -> None:
+        self._node, self._values = node, values
+        self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
+        self._publisher = node.create_publisher(JointState, "torque_command", COMMAND)
+        self._ears = Ears(node, values["axis"])
+        self._trial: Trial | None = None
+        self._proposal: Proposal | None = None
+        self._round: Round | None = None
+        self._answer: bool | None = None
+        self._cancelled = ""
+        self._changed = threading.Condition()
+        self._campaign = self._made(values)
+        self._runs = 0
+        for name, answer in (
+            ("approve", self._approve),
+            ("decline", self._decline),
+            ("cancel", self._cancel),
+        ):
+            node.create_service(Trigger, f"~/{name}", answer)
+        self._health = Health(node, self._report)
+        node.create_timer(0.02, self._look, clock=STEADY)
+        self._pool = ThreadPoolExecutor(1, "experiment")
+        self._work: Future[Outcome] = self._pool.submit(self._go)
+
+    def _made(self, values: dict[str, Any]) -> Campaign:
+        asked = Asked(limits_from(values["limits"]), values["rate"], longest=values["longest"])
+        budget = Budget(values["seconds"], values["energy"])
+        causes = causes_from(values["causes"])
+        return Campaign(load_rig(values["rig"]), causes, asked, self._play, budget, hear=self._hear)
+
+    def _go(self) -> Outcome:
+        """Begin with the bags. Raises ParameterError without one, BagError for one that cannot be read."""
+        bags = [bag for bag in self._values["bag"].split(",") if bag]
+        if not bags:
+            raise ParameterError("bag = '', expected what was recorded so far (rsea run record)")
+        return self._campaign.go([read_record(bag, strict=False) for bag in bags])
+
+    def _hear(self, round_: Round) -> None:
+        self._round = round_
+        log = self._node.get_logger()
+        log.info(known(round_.weighing))
+        assert round_.proposal is not None
+        log.info(
+            f"proposed: {shape_words(round_.proposal)}; {round_.proposal.decided:.0%} expected to be decided"
+        )
+
+    def _play(self, proposal: Proposal) -> Record | None:
+        """From the loop's thread: ask, have it played, return its record; None where the answer was no."""
+        with self._changed:
+            self._proposal, self._answer = proposal, None if self._values["ask"] else True
+            self._changed.wait_for(lambda: self._answer is not None or self._cancelled)
+            if self._cancelled or not self._answer:
+                self._proposal = None
+                return None
+            self._changed.wait_for(lambda: self._proposal is None)
+            trial, self._trial = self._trial, None
+        assert trial is not None
+        record = trial.record()
+        self._runs += 1
+        write_record(record, self._out / f"run-{self._runs}.mcap")
+        return record
+
+    def _look(self) -> None:
+        """From the executor: begin a run that was approved, end one that is over."""
+        with self._changed:
+            if self._proposal is None or not self._answer:
+                return
+            if self._trial is None:
+                self._trial = Trial(self._ears, self._player(self._proposal))
+            elif self._trial.over():
+                self._trial.close()
+                self._proposal = None
+                self._changed.notify_all()
+
+    def _player(self, proposal: Proposal) -> Player:
+        lead, joint = self._values["lead"], self._values["joint"]
+        command, rate = proposal.command, proposal.rate
+        return Player(
+            self._node, command, rate, lead=lead, wanted=2, joint=joint, publisher=self._publisher
+        )
+
+    def _approve(self, request: Any, response: Any) -> Any:
+        return self._answered(True, response)
+
+    def _decline(self, request: Any, response: Any) -> Any:
+        return self._answered(False, response)
+
+    def _answered(self, answer: bool, response: Any) -> Any:
+        with self._changed:
+            waits = self._proposal is not None and self._answer is None
+            if waits:
+                assert self._proposal is not None
+                self._answer = answer
+                said = f"{'plays' if answer else 'does not play'}: {shape_words(self._proposal)}"
+                self._changed.notify_all()
+            response.success, response.message = waits, said if waits else "no run waits for an answer"
+        return response
+
+    def _cancel(self, request: Any, response: Any) -> Any:
+        with self._changed:
+            self._cancelled = "cancelled by ~/cancel"
+            if self._trial is not None:
+                self._trial.stop(self._cancelled)
+            self._changed.notify_all()
+        response.success, response.message = (
+            True,
+            "goes softly to zero torque; nothing is learnt from this run",
+        )
+        return response
+
+    def finished(self) -> bool:
+        """Tell whether the loop has ended."""
+        return self._work.done()
+
+    def conclude(self) -> None:
+        """Write what is known, where the loop has ended by itself."""
+        if not self._work.done():
+            return
+        outcome = self._work.result()
+        log = self._node.get_logger()
+        log.info(end_sentence(outcome))
+        report = write_campaign(outcome, self._campaign, self._out)
+        self._health.publish()
+        if outcome.seconds:
+            log.info(f"diagnosis of all runs: {self._diagnosed(outcome)}")
+        log.info(f"report: {report}")
+
+    def _diagnosed(self, outcome: Outcome) -> str:
+        """Write the diagnosis of all runs together and return its sentence; a person may interrupt it."""
+        try:
+            verdict = diagnosed(outcome.records, self._campaign.rig, self._campaign.causes)
+            write_diagnosis(
+                verdict, outcome.records[-1], Place(self._out / "diagnosis", fresh=True), write_overlay
+            )
+        except RseaError as error:
+            return f"none: {' '.join(str(error).split())}"
+        return verdict.sentence
+
+    def close(self) -> None:
+        """Zero torque first; then let the loop's thread end."""
+        with self._changed:
+            self._cancelled = self._cancelled or "the node is closing"
+            if self._trial is not None and self._proposal is not None:
+                self._trial.stop(self._cancelled)
+                self._trial.close()
+                self._proposal = None
+            self._changed.notify_all()
+        self._campaign.tell = _end
+        self._pool.shutdown(cancel_futures=True)
+
+    def _report(self) -> Report:
+        if self._work.done() and not self._work.cancelled() and self._work.exception() is None:
+            outcome = self._work.result()
+            level = OK if outcome.end in ("confirmed", "nothing_wrong") else WARN
+            return Report(level, end_sentence(outcome), outcome.weighing.probability)
+        waits = self._proposal is not None and self._answer is None
+        state = "waits for ~/approve" if waits else "plays" if self._trial is not None else "designs"
+        values: dict[str, object] = {"runs": self._runs}
+        if self._proposal is not None:
+            values["run"] = shape_words(self._proposal)
+        if self._round is not None:
+            values |= {n: f"{p:.3f}" for n, p in self._round.weighing.probability.items()}
+        return Report(OK, state, values)
+
+
+def _end(step: str, share: float) -> None:
+    raise DeviceError("the node is closing")
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("experiment", TABLE, Experiment, endless=False)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

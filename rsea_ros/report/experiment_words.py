@@ -1,0 +1,69 @@
+"""What a designed run says, in sentences."""
+
+from __future__ import annotations
+
+from rsea_ros.experiment.advice import Advice, Proof
+from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.limits import UNITS
+from rsea_ros.experiment.margins import LEVEL
+from rsea_ros.experiment.proposal import Proposal
+from rsea_ros.wording import listed
+
+
+def plain_name(name: str) -> str:
+    """Return a cause as it stands in a sentence."""
+    return "no cause at all" if name == NOTHING else name.replace("_", " ")
+
+
+def shape_words(p: Proposal) -> str:
+    """Return what a run looks like: `multisine 0.5 to 42 Hz, 0.5 s, up to 18 N·m`."""
+    s = p.shape
+    band = f" {s.low:.2g} to {s.high:.3g} Hz" if s.kind in ("multisine", "chirp") else f" of {s.hold:.2g} s"
+    bias = f" around {p.command.mean():.2g} N·m" if abs(s.bias) > 0.02 else ""
+    return f"{s.kind}{band}{bias}, {p.duration:.3g} s, up to {p.peaks.at_level['torque']:.3g} N·m"
+
+
+def verdict(advice: Advice) -> str:
+    """Return the answer in a sentence."""
+    p = advice.proposal
+    names = [plain_name(h.name) for h in advice.hypotheses]
+    if p is None:
+        return f"No run within the limits tells {listed(names)} apart"
+    if len(names) == 1:
+        times = 2.718281828**p.sharpened
+        return f"The next run narrows what is known of {names[0]} {times:.3g} times: {shape_words(p)}"
+    share = f"{100.0 * p.decided:.0f} %"
+    return f"The next run is expected to decide between {listed(names)} in {share} of cases: {shape_words(p)}"
+
+
+def proof_words(proof: Proof) -> str:
+    """Return why no run separates a pair, and what would."""
+    b = proof.bound
+    low, high = b.frequency[0], b.frequency[-1]
+    head = (
+        f"{plain_name(b.true)} and {plain_name(b.rival)}: no run of {b.duration:.0f} s with a spectrum in "
+        f"{low:.2g} to {high:.3g} Hz within the limits separates them by more than S = {b.most:.2g} "
+        "(6 makes odds of twenty to one)"
+    )
+    return f"{head}. Measure apart: {'; or '.join(a.what for a in proof.apart)}."
+
+
+def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, str, str, str]]:
+    """Return each quantity: expected, at the level that is stated, limit, unit."""
+    names = [n for n in UNITS if n in p.peaks.expected]
+    return [
+        (
+            n,
+            f"{p.peaks.expected[n]:.4g}",
+            f"{p.peaks.at_level[n]:.4g}",
+            f"{stated[n]:.4g}" if n in stated else "none",
+            UNITS[n],
+        )
+        for n in names
+    ]
+
+
+LEVEL_WORDS = (
+    f"the upper limit that holds with a probability of {LEVEL:.5f}, over the causes still possible and what "
+    "is known of their numbers"
+)

@@ -1,0 +1,73 @@
+"""rsea experiment: a run that the excite node plays, or in one line why it cannot be."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rsea_ros.cli.main import main
+from rsea_ros.experiment.documents import models_of
+from rsea_ros.experiment.run_file import read_run
+from rsea_ros.model.rig_file import load_rig, save_rig
+
+RIG = load_rig("paper_high_impedance")
+
+
+@pytest.fixture
+def models(tmp_path):
+    """Two models that a run separates."""
+    paths = [tmp_path / "lag.yaml", tmp_path / "delay.yaml"]
+    save_rig(RIG.with_effect("current_loop_lag", time_constant=3e-3), paths[0])
+    save_rig(RIG.with_effect("command_delay", delay=3e-3), paths[1])
+    return [str(p) for p in paths]
+
+
+def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
+    out = tmp_path / "out"
+    words = ["--limits", "torque=5,slew=4000", "--longest", "0.5", "--refine", "0"]
+    assert main(["experiment", *models, *words, "--out", str(out), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["run"]["separations"][0]["separation"] > 12.0 and not said["no_run_separates"]
+    command, rate = read_run(out / "run.csv")
+    assert rate == pytest.approx(280.0, rel=1e-6) and np.max(np.abs(command)) <= 5.0
+    assert np.max(np.abs(np.diff(command))) * rate <= 4000.0 * (1.0 + 1e-6)
+    assert "What the run separates" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--limits", "velocity=1"], "--limits: no torque"),
+        (["--limits", "torque=5", "--longest", "0"], "expected a number > 0"),
+    ],
+)
+def test_what_cannot_be_is_one_line(models, words, message, capsys):
+    try:
+        status = main(["experiment", *models, *words])
+    except SystemExit as error:
+        status = error.code
+    shown = capsys.readouterr().err
+    assert status == 2 and message in shown and len(shown.splitlines()) == 1
+
+
+def test_a_diagnosis_gives_its_doubtful_cause_and_the_alternatives():
+    extended = RIG.with_effect("coulomb_friction", torque=1.0).with_effect("ft_gain_error", gain=1.1)
+    interval = {"value": 1.1, "unit": "1", "ci95": [1.05, 1.15]}
+    document = {
+        "causes": [
+            {"name": "coulomb_friction", "probability": 1.0, "parameters": {"torque": {"value": 1.0}}},
+            {"name": "ft_gain_error", "probability": 0.6, "parameters": {"gain": interval}},
+        ],
+        "alternatives": [
+            {
+                "name": "torque_constant_error",
+                "instead_of": "ft_gain_error",
+                "probability": 0.4,
+                "parameters": {"gain": interval},
+            }
+        ],
+    }
+    ours, other = models_of(document, extended)
+    assert (ours.name, ours.probability) == ("ft_gain_error", 0.6)
+    assert ours.intervals == {"ft_gain_error.gain": (1.05, 1.15)}
+    assert [e.name for e in other.rig.effects] == ["coulomb_friction", "torque_constant_error"]

@@ -1,0 +1,108 @@
+"""The loop finds a hidden cause by runs, and learns nothing from one that broke."""
+
+import json
+
+import numpy as np
+import pytest
+from independent.bench import Bench, record_command
+from independent.hidden import hide
+
+from rsea_ros.errors import DeviceError, ParameterError
+from rsea_ros.experiment.campaign import Budget, Campaign
+from rsea_ros.experiment.causes import causes_from
+from rsea_ros.experiment.design import propose
+from rsea_ros.experiment.limits import Limits
+from rsea_ros.experiment.proposal import Asked
+from rsea_ros.experiment.weighing import middles_of_runs, weigh
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.campaign_files import write_campaign
+
+RIG = load_rig("paper_high_impedance")
+CAUSES = ("current_loop_lag", "hard_stop")
+ASKED = Asked(Limits(torque=20.0, velocity=2.0), refine=0, kinds=("multisine",), longest=2.0)
+BENCH = hide(Bench(), "current_loop_lag", {"time_constant": 3e-3})
+
+
+@pytest.fixture(scope="module")
+def log():
+    """A few seconds of slow work, which show no cause."""
+    t = np.arange(4 * 280) / 280.0
+    return record_command(BENCH, 0.3 * np.sin(2.0 * np.pi * 0.25 * t), np.random.default_rng(1))
+
+
+@pytest.fixture(scope="module")
+def known(log):
+    """What the slow work says."""
+    return weigh([log], RIG, CAUSES)
+
+
+@pytest.fixture(scope="module")
+def proposal(known):
+    """The run that is designed first."""
+    return propose(known.hypotheses(), ASKED, known.cases[0].noise)
+
+
+@pytest.fixture
+def campaign(proposal):
+    """A function that makes a loop; every run that it proposes is the first one."""
+
+    def make(play, **more):
+        return Campaign(RIG, CAUSES, ASKED, play, choose=lambda *_: proposal, **more)
+
+    return make
+
+
+def test_what_the_log_could_not_show_stays_as_likely_as_no_cause(known):
+    assert known.probability["hard_stop"] == pytest.approx(known.probability["nothing"], rel=0.1)
+    assert min(known.probability.values()) > 0.05
+
+
+def test_the_loop_confirms_the_hidden_cause_by_a_run(log, known, campaign, tmp_path):
+    rng, played = np.random.default_rng(2), []
+
+    def play(proposal):
+        played.append(proposal)
+        return record_command(BENCH, proposal.command, rng)
+
+    work = campaign(play)
+    outcome = work.go([log], known)
+    assert (outcome.end, outcome.cause) == ("confirmed", "current_loop_lag")
+    assert outcome.seconds == sum(p.duration for p in played) <= 2.0
+    assert len(outcome.records) == 1 + len(played)
+    report = write_campaign(outcome, work, tmp_path / "out").read_text(encoding="utf-8")
+    assert "Current loop lag" in report and "after run 1" in report
+    said = json.loads((tmp_path / "out" / "experiment.json").read_text(encoding="utf-8"))
+    assert said["end"] == "confirmed" and len(said["rounds"]) == len(played) + 1
+    assert load_rig(tmp_path / "out" / "model.yaml").effects[-1].name == "current_loop_lag"
+
+
+def test_nothing_is_learnt_from_a_run_that_broke(log, known, campaign):
+    def play(proposal):
+        raise DeviceError("driver: overload")
+
+    outcome = campaign(play).go([log], known)
+    assert outcome.end == "broken" and "overload" in outcome.why
+    assert outcome.records == (log,) and outcome.seconds == 0.0
+    assert outcome.weighing.probability == known.probability
+
+
+def test_a_person_may_say_no(log, known, campaign):
+    outcome = campaign(lambda proposal: None).go([log], known)
+    assert outcome.end == "declined" and outcome.seconds == 0.0
+
+
+def test_a_budget_that_is_too_small_for_a_run_ends_the_loop(log, known, campaign):
+    outcome = campaign(lambda proposal: pytest.fail("played"), budget=Budget(seconds=0.1)).go([log], known)
+    assert outcome.end == "spent"
+
+
+def test_a_value_that_repeats_counts_once():
+    kept = middles_of_runs(np.array([1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 1.0]))
+    assert np.flatnonzero(kept).tolist() == [1, 3, 4, 6] or np.flatnonzero(kept).tolist() == [1, 3, 5, 6]
+
+
+def test_causes_are_effects_of_the_catalogue_each_once():
+    assert causes_from("backlash, hard_stop") == ("backlash", "hard_stop")
+    for text in ("", "backlash,backlash", "gremlins"):
+        with pytest.raises(ParameterError):
+            causes_from(text)

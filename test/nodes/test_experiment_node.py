@@ -1,0 +1,83 @@
+"""The experiment node asks before it plays, stops softly at any sample, and learns nothing from that run."""
+
+import json
+
+import numpy as np
+import pytest
+
+from msg_adapters import write_record
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger
+from rsea_ros.experiment.run_file import run_text
+from rsea_ros.experiment.shape import Shape, command_of
+from rsea_ros.model.rig_file import load_rig, save_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.nodes._qos import COMMAND
+from rsea_ros.nodes.excite import planned
+from rsea_ros.signals import Channel
+
+RIG = "paper_high_impedance"
+RATE = 280.0
+LIMIT = 8.0
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A bench with a slow current loop, and a bag of it that does not show that."""
+    folder = tmp_path_factory.mktemp("bench")
+    rig = load_rig(RIG).with_effect("current_loop_lag", time_constant=4e-3)
+    save_rig(rig, folder / "bench.yaml")
+    t = np.arange(round(5.0 * RATE)) / RATE
+    slow = synthesize(rig, Channel(t, 0.2 * np.sin(2.0 * np.pi * 0.2 * t)), seed=2)
+    write_record(slow, folder / "slow.mcap")
+    return folder
+
+
+@pytest.fixture
+def ask(listener):
+    """A function that calls a service of the node and returns its answer."""
+
+    def call(name):
+        client = listener.node.create_client(Trigger, f"/rsea/experiment/{name}")
+        listener.until(client.service_is_ready)
+        answer = client.call_async(Trigger.Request())
+        listener.until(answer.done)
+        return answer.result()
+
+    return call
+
+
+def test_a_run_is_asked_for_and_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):
+    commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
+    health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+    start("plant", rig=bench / "bench.yaml")
+    out = tmp_path / "out"
+    node = start(
+        "experiment", rig=RIG, bag=bench / "slow.mcap", causes="current_loop_lag", limits=f"torque={LIMIT}",
+        longest=4.0, out=out,
+    )  # fmt: skip
+
+    def says(text):
+        return any(text in s.message for m in health for s in m.status if "experiment" in s.name)
+
+    listener.until(lambda: says("waits for ~/approve") or not node.running())
+    assert node.running() and not commands, node.output
+    assert ask("approve").success
+    listener.until(lambda: sum(m.effort[0] != 0.0 for m in commands) > 60)
+    assert ask("cancel").success
+    listener.until(lambda: not node.running())
+    assert node.wait() == 0, node.output
+    efforts = np.array([m.effort[0] for m in commands])
+    ends = np.flatnonzero(efforts)[-1]
+    assert np.all(np.abs(efforts) <= LIMIT) and len(efforts) - ends > 3
+    last = np.abs(efforts[ends - 20 : ends + 1])
+    assert np.all(np.diff(last) <= 0.0) and last[-1] < 0.05 * max(last[0], 0.1)  # softly
+    said = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
+    assert said["end"] == "broken" and "cancel" in said["why"] and said["seconds"] == 0.0
+    assert not list(out.glob("run-*"))
+
+
+def test_excite_plays_the_file_of_a_run(tmp_path):
+    command = command_of(Shape("multisine", 4.0), 0.5, RATE)
+    (tmp_path / "run.csv").write_text(run_text(command, RATE), encoding="utf-8")
+    played, rate = planned({"file": str(tmp_path / "run.csv")})
+    assert played == pytest.approx(command, abs=1e-8) and rate == pytest.approx(RATE)
