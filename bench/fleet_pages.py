@@ -3,7 +3,7 @@
 .venv/bin/python bench/fleet_pages.py [--rows 100000] [--chromium chromium]
 
 Writes the report of a simulated fleet of 10 000 recordings and of a history of --rows rows; opens the page of
-the fleet and of two joints in a headless Chromium, and counts what they ask for from outside and what they write
+the fleet and of two joints in a headless Chromium; counts what they ask for from outside and what they write
 to the console.
 """
 
