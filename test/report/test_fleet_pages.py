@@ -57,9 +57,21 @@ def test_the_first_sentence_names_how_many_and_the_worst(pages):
 
 
 def test_what_cannot_be_told_is_said_with_its_reason(pages):
-    assert "One course cannot be determined: not enough excitation" in pages["index.html"]
+    assert "One course cannot be determined" in pages["index.html"]
     assert "Spring stiffness: not enough excitation to tell" in pages["joint-elbow.html"]
     assert "0 of 200 recordings determine it" in pages["joint-elbow.html"]
+
+
+def test_what_the_latest_recording_names_is_news_before_there_is_a_trend(tmp_path):
+    """Two recordings of two joints, one worn: it was listed as steady."""
+    joints = ("left", "right")
+    made = history(np.random.default_rng(1), joints=joints, days=2)
+    worn = recordings(joints, 2, causes=lambda j, d: [cause("backlash", 4e-3)] if j == "right" and d else [])
+    index = write_fleet_report(made, worn, tmp_path / "out")
+    text = index.read_text(encoding="utf-8")
+    assert "<h1>Too few recordings yet to say what changes; the latest name backlash in right" in text
+    assert "now backlash" in text and "<td>steady</td>" not in text
+    assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
 
 
 def test_links_lead_to_the_joints_and_to_the_diagnosis_that_shows_it(pages, tables):
@@ -78,7 +90,7 @@ def test_a_map_has_a_cell_for_each_week_that_was_recorded_and_a_word_for_it(page
     cells = re.findall(r"<title>(hip|elbow), ([^:]*): ([^<]*)</title>", pages["index.html"])
     stiffness = [c for c in cells if "recordings" not in c[2]]
     assert len(stiffness) == 2 * weeks
-    assert {c[2] for c in stiffness if c[0] == "elbow"} == {"not enough excitation to tell"}
+    assert {c[2] for c in stiffness if c[0] == "elbow"} == {"cannot be determined"}
 
 
 def test_pages_stay_small_and_ask_for_nothing(pages):

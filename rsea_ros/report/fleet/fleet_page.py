@@ -15,6 +15,7 @@ from rsea_ros.report.fleet.fleet_tables import (
 )
 from rsea_ros.report.fleet.fleet_words import about, day, name, percent
 from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
+from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.page import Block, bullets, folded, key_numbers, page, paragraph, section
@@ -25,6 +26,8 @@ from rsea_ros.trends.series import Table
 from rsea_ros.trends.weeks import Steps
 from rsea_ros.wording import listed
 
+_NAMED = 3
+"""Joints that the headline names."""
 _ROWS = 60
 """Joints of a heat map: the first of a larger fleet."""
 
@@ -36,7 +39,7 @@ def fleet_page(
     blocks = list(_blocks(fleet, alarms, recordings, steps, links))
     footer = [_period(recordings), "rsea fleet report. All values in SI, all times UTC."]
     kicker = f"Fleet of {len(fleet.joints)} joints · {_period(recordings)}"
-    return page(_headline(fleet, alarms), kicker, blocks, footer)
+    return page(_headline(fleet, alarms, recordings), kicker, blocks, footer)
 
 
 def _blocks(
@@ -45,6 +48,7 @@ def _blocks(
     groups = by_joint(alarms)
     ranked = [a for group in groups.values() for a in group]
     joints = worst_first(fleet.joints, alarms)
+    latest = latest_causes(joints, recordings)
     yield key_numbers(_keys(fleet, groups, recordings))
     yield f"<style>{(Path(__file__).parent / 'fleet.css').read_text(encoding='utf-8')}{shades()}</style>"
     yield timeline(ranked, steps, links)
@@ -54,7 +58,7 @@ def _blocks(
         yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
     for kind, what in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
         yield naming_map(what, kind, _naming(fleet, kind, what, joints)[:_ROWS], fleet, steps, links)
-    yield section("All joints", joint_table(joints, fleet, groups, recordings, links))
+    yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     yield _undetermined(fleet, links)
     yield folded("How sure this is", bullets(_sure(fleet)))
 
@@ -72,9 +76,11 @@ def _mapped(fleet: FleetTrends) -> list[str]:
     return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=moved)
 
 
-def _headline(fleet: FleetTrends, alarms: Sequence[Alarm]) -> str:
+def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
-        return "These recordings are too few to say how the joints fare"
+        latest = [f"{what} in {joint}" for joint, what in latest_causes(fleet.joints, recordings).items()]
+        now = f"; the latest name {listed(latest[:_NAMED])}" if latest else ""
+        return f"Too few recordings yet to say what changes{now}"
     groups = by_joint(alarms)
     if not groups:
         return f"All {len(fleet.joints)} joints are steady"
@@ -115,7 +121,7 @@ def _undetermined(fleet: FleetTrends, links: Links) -> str:
             "Nothing was left undetermined", paragraph("Every joint's recordings tell every parameter.")
         )
     number = "One course" if len(undetermined) == 1 else f"{len(undetermined)} courses"
-    title = f"{number} cannot be determined: not enough excitation"
+    title = f"{number} cannot be determined"
     return section(title, undetermined_table(undetermined, links))
 
 

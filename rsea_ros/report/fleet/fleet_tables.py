@@ -57,10 +57,11 @@ def joint_table(
     joints: Sequence[str],
     fleet: FleetTrends,
     alarmed: Mapping[str, Sequence[Alarm]],
+    latest: Mapping[str, str],
     recordings: Table,
     links: Links,
 ) -> str:
-    """Return a row for each joint."""
+    """Return a row for each joint. latest: causes that its latest recording names."""
     head = [("Joint", False), ("State", False), ("Recordings", True), ("Refused or broken", True),
             ("Parameters determined", True), ("Largest change", True)]  # fmt: skip
     of = np.asarray(recordings["joint"], str)
@@ -74,7 +75,7 @@ def joint_table(
         rows.append(
             (
                 links.joint(joint),
-                escape(", ".join(dict.fromkeys(a.kind for a in alarmed.get(joint, ())))) or "steady",
+                escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, ""))),
                 str(int(np.sum(here))),
                 str(int(np.sum(here & ~done))),
                 f"{len(determined)} of {len(trends)}",
@@ -82,6 +83,12 @@ def joint_table(
             )
         )
     return rows_of(head, rows)
+
+
+def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
+    """Return what moved; else what the latest recording names; else whether anything is known."""
+    kinds = ", ".join(dict.fromkeys(a.kind for a in alarms))
+    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few recordings")
 
 
 def parameter_rows(trends: Sequence[Trend]) -> str:

@@ -125,7 +125,8 @@ def finding(trend: Trend) -> str:
 def _finding(trend: Trend) -> str:
     plain, unit = name(trend.series.parameter), trend.series.unit
     if trend.state == "undetermined":
-        return f"{plain}: not enough excitation to tell"
+        enough = bool(np.mean(trend.series.identifiable) > 0.5)
+        return f"{plain}: {'too few recordings' if enough else 'not enough excitation'} to tell"
     if trend.state == "steady":
         factor, shown = words.scaled(trend.detectable, unit)
         level = trend.now.value if trend.now is not None else 0.0

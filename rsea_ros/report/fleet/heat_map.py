@@ -113,7 +113,7 @@ def _picture(
     for i, joint in enumerate(joints):
         for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
             blank = bool(undetermined[i, j])
-            said = "not enough excitation to tell" if blank else text(i, int(j))
+            said = "cannot be determined" if blank else text(i, int(j))
             cells.append(
                 _cell(i, int(j), "n" if blank else _class(float(depth[i, j])), f"{joint}, {weeks[j]}: {said}")
             )
@@ -153,7 +153,7 @@ def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
     moved = [t for t in determined if t.state != "steady"]
     plain = name(parameter)
     if not determined:
-        return f"{plain}: not enough excitation to tell in any joint"
+        return f"{plain} cannot be determined in any joint"
     if not moved:
         return f"{plain} is steady in all {len(determined)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))

@@ -10,6 +10,7 @@ import numpy as np
 from rsea_ros.report.fleet.cause_figure import cause_figure, share_figure
 from rsea_ros.report.fleet.fleet_tables import alarm_table, parameter_rows, rows_of
 from rsea_ros.report.fleet.fleet_words import finding, sentence, short_day
+from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.parameter_figure import parameter_figure
 from rsea_ros.report.page import Block, folded, key_numbers, page, paragraph, section
@@ -33,7 +34,9 @@ def joint_page(
 ) -> str:
     """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
     rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
-    title = f"{joint}: {sentence(alarms[0])}" if alarms else f"{joint}: {_quiet(fleet, joint)}"
+    latest = latest_causes([joint], recordings).get(joint, "")
+    quiet = f"{latest} in its latest recording" if latest else _quiet(fleet, joint)
+    title = f"{joint}: {sentence(alarms[0]) if alarms else quiet}"
     blocks = list(_blocks(joint, fleet, alarms, recordings, rows, steps, links))
     footer = ["rsea fleet report. All values in SI, all times UTC."]
     return page(title, f"Joint {joint} · {len(rows)} recordings", blocks, footer)
@@ -110,7 +113,7 @@ def _quiet(fleet: FleetTrends, joint: str) -> str:
     return (
         f"steady in all {len(determined)} parameters that its recordings tell"
         if determined
-        else "its recordings tell nothing yet"
+        else "too few recordings yet"
     )
 
 

@@ -73,7 +73,7 @@ def _undetermined(bins: Binned, steps: Steps) -> Json:
         "could not be determined",
         yaxis="y2",
         marker={"symbol": "x-thin-open", "size": 7, "color": NOISE},
-        hovertemplate="not enough excitation to tell",
+        hovertemplate="not enough excitation",
     )
 
 
