@@ -2,9 +2,9 @@
 
 .venv/bin/python bench/fleet_pages.py [--rows 100000] [--chromium chromium]
 
-Writes the report of a simulated fleet of 10 000 recordings and, with --rows, of a history of so many rows; opens
-the page of the fleet and of one joint in a headless Chromium, and counts what the page asks for from outside
-and what it writes to the console.
+Writes the report of a simulated fleet of 10 000 recordings and of a history of --rows rows; opens the page of
+the fleet and of two joints in a headless Chromium; counts what they ask for from outside and what they write
+to the console.
 """
 
 from __future__ import annotations

@@ -139,14 +139,14 @@ def _limit_of_parameter(made: Fleet, joint: str, wear: Wear, about: str) -> floa
     h = made.history
     rows = (h["joint"] == joint) & (h["parameter"] == about) & h["identifiable"]
     day, value = (h["time_s"][rows] - START) / DAY, h["value"][rows]
-    sd = (h["high"] - h["low"])[rows] / 3.92 / value
+    sd = np.maximum((h["high"] - h["low"])[rows] / 3.92 / value, 1e-9)
     change = abs(wear.size - 1.0) * wear.share(day)
     whole = np.floor(day).astype(int)
     for until in range(int(wear.since) + 2, 366):
         use = whole < until
         days, place = np.unique(whole[use], return_inverse=True)
-        told = np.bincount(place, 1.0 / sd[use] ** 2)
-        weight = 1.0 / (1.0 / told + DAY_SD[about] ** 2)
+        precision = np.bincount(place, 1.0 / sd[use] ** 2)
+        weight = 1.0 / (1.0 / precision + DAY_SD[about] ** 2)
         profile = np.bincount(place, change[use]) / np.bincount(place)
         about_mean = profile - np.sum(weight * profile) / np.sum(weight)
         z = np.sqrt(np.sum(weight * about_mean**2))

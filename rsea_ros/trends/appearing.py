@@ -37,22 +37,22 @@ class Scan:
     p: float
 
 
-def appearances(found: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
+def appearances(every: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
     """Return what appeared, or was in one joint from the first and not in the fleet.
 
     joints: how many the fleet has. p values are bounded by the number of days times exp(-ratio).
     """
-    usual = _usual(found, joints, settings)
-    scans = [_scan(n, usual[n.kind, n.about], settings) for n in found]
+    usual = _usual(every, joints, settings)
+    scans = [_scan(n, usual[n.kind, n.about], settings) for n in every]
     q = adjusted(np.array([s.p for s in scans]))
     sure = [_appeared(s, float(rate), settings) for s, rate in zip(scans, q, strict=True)]
     return tuple(a for a in sure if a is not None)
 
 
-def _usual(found: Sequence[Naming], joints: int, settings: TrendSettings) -> dict[tuple[str, str], float]:
+def _usual(every: Sequence[Naming], joints: int, settings: TrendSettings) -> dict[tuple[str, str], float]:
     """Return by kind and name the share of recordings that name it in the median joint."""
     shares: dict[tuple[str, str], list[float]] = {}
-    for n in found:
+    for n in every:
         shares.setdefault((n.kind, n.about), []).append(float(np.mean(n.named)))
     lacking = {key: [0.0] * (joints - len(values)) for key, values in shares.items()}
     alone = joints < settings.fewest_joints

@@ -42,8 +42,8 @@ RECORDINGS = (
 class Series:
     """Estimates of a parameter, sorted by time, each array of shape (n,).
 
-    time_s: POSIX s. value, sd: in `unit`; sd from the 95 % interval. told: whether the recording could tell
-    the parameter. temperature: °C, NaN where unknown. artefacts: path of the recording's results.
+    time_s: POSIX s. value, sd: in `unit`; sd from the 95 % interval. identifiable: whether the recording
+    determines the parameter. temperature: °C, NaN where unknown. artefacts: path of the recording's results.
     """
 
     joint: str
@@ -52,14 +52,14 @@ class Series:
     time_s: FloatArray
     value: FloatArray
     sd: FloatArray
-    told: BoolArray
+    identifiable: BoolArray
     temperature: FloatArray
     recording: npt.NDArray[Any]
     artefacts: npt.NDArray[Any]
 
     def kept(self, rows: BoolArray) -> Series:
         """Return the series of some of its rows."""
-        arrays = ("time_s", "value", "sd", "told", "temperature", "recording", "artefacts")
+        arrays = ("time_s", "value", "sd", "identifiable", "temperature", "recording", "artefacts")
         return Series(self.joint, self.parameter, self.unit, **{n: getattr(self, n)[rows] for n in arrays})
 
 

@@ -13,7 +13,7 @@ from rsea_ros.trends.settings import DAY
 
 _Z = 1.959964
 _WEEK, _SHORT, _MOST = 7.0, 70.0, 110
-"""Days of a week; days up to which a step is a day; steps of a picture: more are no longer told apart."""
+"""Days of a week; days up to which a step is a day; steps of a picture: more are no longer distinguished."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +53,17 @@ class Steps:
 
 @dataclass(frozen=True)
 class Binned:
-    """Means of a parameter by step, NaN where no recording told it, each shape (n,).
+    """Means of a parameter by step, NaN where no recording determines it, each shape (n,).
 
-    low, high: 95 % interval, day effects included. told, asked: recordings that told it, and all of them.
+    low, high: 95 % interval, day effects included. identifiable, recorded: recordings that determine it, and
+    all of them.
     """
 
     value: FloatArray
     low: FloatArray
     high: FloatArray
-    told: np.ndarray
-    asked: np.ndarray
+    identifiable: np.ndarray
+    recorded: np.ndarray
 
 
 def steps_over(first_s: float, last_s: float) -> Steps:
@@ -80,10 +81,10 @@ def steps_over(first_s: float, last_s: float) -> Steps:
 def binned(trend: Trend, steps: Steps) -> Binned:
     """Return a trend's days at the mean temperature, averaged by step with their weights."""
     s, n = trend.series, len(steps)
-    told, asked = steps.count(s.time_s[s.told]), steps.count(s.time_s)
+    identifiable, recorded = steps.count(s.time_s[s.identifiable]), steps.count(s.time_s)
     empty = np.full(n, np.nan)
     if trend.by_day is None or not len(trend.by_day.time_s):
-        return Binned(empty, empty, empty, told, asked)
+        return Binned(empty, empty, empty, identifiable, recorded)
     d, place = trend.by_day, steps.place(trend.by_day.time_s)
     w = 1.0 / (((d.high - d.low) / (2.0 * _Z)) ** 2 + trend.day_sd**2)
     total = np.bincount(place, w, n)
@@ -91,4 +92,4 @@ def binned(trend: Trend, steps: Steps) -> Binned:
     safe = np.where(some, total, 1.0)
     value = np.where(some, np.bincount(place, w * d.value, n) / safe, np.nan)
     half = np.where(some, _Z / np.sqrt(safe), np.nan)
-    return Binned(value, value - half, value + half, told, asked)
+    return Binned(value, value - half, value + half, identifiable, recorded)

@@ -25,7 +25,7 @@ WORN = "knee <left>"
 
 @pytest.fixture(scope="module")
 def tables():
-    """A joint that wears, one with backlash from day 50 on, one that cannot be told."""
+    """A joint that wears, one with backlash from day 50 on, one that cannot be determined."""
     rng = np.random.default_rng(3)
     made = history(
         rng, joints=JOINTS, days=100, course=lambda j, d: -2e-3 * np.clip(d - 40, 0, None) * (j == WORN)
@@ -57,9 +57,9 @@ def test_the_first_sentence_names_how_many_and_the_worst(pages):
 
 
 def test_what_cannot_be_told_is_said_with_its_reason(pages):
-    assert "One course cannot be told: not enough excitation" in pages["index.html"]
+    assert "One course cannot be determined: not enough excitation" in pages["index.html"]
     assert "Spring stiffness: not enough excitation to tell" in pages["joint-elbow.html"]
-    assert "0 of 200 recordings could tell it" in pages["joint-elbow.html"]
+    assert "0 of 200 recordings determine it" in pages["joint-elbow.html"]
 
 
 def test_links_lead_to_the_joints_and_to_the_diagnosis_that_shows_it(pages, tables):

@@ -99,13 +99,13 @@ def test_one_wild_recording_raises_no_alarm():
 
 def test_too_little_excitation_is_a_result_with_its_reason():
     found = trend(0, told=0.02, days=100)
-    assert found.state == "untold"
-    assert "recordings could tell it" in found.reason
+    assert found.state == "undetermined"
+    assert "recordings determine it" in found.reason
 
 
 def test_intervals_as_wide_as_the_value_tell_nothing():
     found = trend(0, sd=3.0, days=20)
-    assert found.state == "untold"
+    assert found.state == "undetermined"
     assert "would show" in found.reason
 
 

@@ -119,12 +119,12 @@ def doubt_of_date(alarm: Alarm) -> str:
 def finding(trend: Trend) -> str:
     """Return the title of a parameter's figure."""
     silent = trend.silent_since_s
-    return _finding(trend) + (f"; cannot be told since {day(silent)}" if math.isfinite(silent) else "")
+    return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
 
 
 def _finding(trend: Trend) -> str:
     plain, unit = name(trend.series.parameter), trend.series.unit
-    if trend.state == "untold":
+    if trend.state == "undetermined":
         return f"{plain}: not enough excitation to tell"
     if trend.state == "steady":
         factor, shown = words.scaled(trend.detectable, unit)

@@ -26,13 +26,15 @@ _OFTEN = 0.5
 """Share of the recordings of a step that counts as often."""
 
 
-def heat_map(parameter: str, joints: Sequence[str], found: FleetTrends, steps: Steps, links: Links) -> str:
+def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links) -> str:
     """Return the section of a parameter, the first joint on top; grey where recordings could not tell."""
-    rows = [found.trends.get((joint, parameter), found.sizes.get((joint, parameter))) for joint in joints]
+    rows = [fleet.trends.get((joint, parameter), fleet.sizes.get((joint, parameter))) for joint in joints]
     shown = [_row(trend, steps) for trend in rows]
-    change, untold = np.array([c for c, _ in shown]), np.array([u for _, u in shown])
+    change, undetermined = np.array([c for c, _ in shown]), np.array([u for _, u in shown])
     full = _full(np.abs(change[np.isfinite(change)]))
-    picture = _picture(change / full, untold, joints, steps, links, lambda i, j: percent(float(change[i, j])))
+    picture = _picture(
+        change / full, undetermined, joints, steps, links, lambda i, j: percent(float(change[i, j]))
+    )
     return section(
         _title(parameter, rows),
         picture,
@@ -43,10 +45,10 @@ def heat_map(parameter: str, joints: Sequence[str], found: FleetTrends, steps: S
 
 
 def naming_map(
-    about: str, kind: str, joints: Sequence[str], found: FleetTrends, steps: Steps, links: Links
+    about: str, kind: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links
 ) -> str:
     """Return the section of a cause or a fault: the share of each week's recordings that name it."""
-    of = {n.joint: n for n in found.namings if (n.about, n.kind) == (about, kind)}
+    of = {n.joint: n for n in fleet.namings if (n.about, n.kind) == (about, kind)}
     share = np.array([_share(of[joint], steps) for joint in joints])
     often = sum(bool(np.nanmax(row, initial=0.0) >= _OFTEN) for row in share)
     picture = _picture(
@@ -59,7 +61,7 @@ def naming_map(
     )
     plain = name(about) + ("" if kind == "cause" else " in the data")
     return section(
-        f"{plain}: often in {often} of {len(found.joints)} joints",
+        f"{plain}: often in {often} of {len(fleet.joints)} joints",
         picture,
         _key("no recording", "", f"all recordings of the {steps.name}", (0.0, 1.0)),
         caption=f"Share of the recordings of each {steps.name} that name it, for the joints that do at all.",
@@ -84,15 +86,15 @@ def _full(change: FloatArray) -> float:
 
 
 def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
-    """Return the relative change of each week, and which weeks were recorded and not told."""
+    """Return the relative change of each week, and which weeks were recorded and not determined."""
     empty = np.full(len(steps), np.nan)
     if trend is None:
         return empty, np.zeros(len(steps), bool)
     bins = binned(trend, steps)
     if trend.first is None or not trend.first.value:
-        return empty, bins.asked > 0
+        return empty, bins.recorded > 0
     change: FloatArray = (bins.value - trend.first.value) / abs(trend.first.value)
-    return change, (bins.asked > 0) & ~np.isfinite(change)
+    return change, (bins.recorded > 0) & ~np.isfinite(change)
 
 
 def _share(naming: Naming, steps: Steps) -> FloatArray:
@@ -102,15 +104,15 @@ def _share(naming: Naming, steps: Steps) -> FloatArray:
 
 
 def _picture(
-    depth: FloatArray, untold: BoolArray, joints: Sequence[str], steps: Steps, links: Links,
+    depth: FloatArray, undetermined: BoolArray, joints: Sequence[str], steps: Steps, links: Links,
     text: Callable[[int, int], str],
 ) -> str:  # fmt: skip
     """Return the cells. depth: -1 to 1, NaN for none, shape (joints, steps). text: of a cell."""
     weeks = [short_day(float(t)) for t in steps.edges[:-1]]
     cells = []
     for i, joint in enumerate(joints):
-        for j in np.flatnonzero(np.isfinite(depth[i]) | untold[i]):
-            blank = bool(untold[i, j])
+        for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
+            blank = bool(undetermined[i, j])
             said = "not enough excitation to tell" if blank else text(i, int(j))
             cells.append(
                 _cell(i, int(j), "n" if blank else _class(float(depth[i, j])), f"{joint}, {weeks[j]}: {said}")
@@ -147,13 +149,13 @@ def _key(low: str, middle: str, high: str, ends: tuple[float, float]) -> str:
 
 
 def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
-    told = [t for t in rows if t is not None and t.state != "untold"]
-    moved = [t for t in told if t.state != "steady"]
+    determined = [t for t in rows if t is not None and t.state != "undetermined"]
+    moved = [t for t in determined if t.state != "steady"]
     plain = name(parameter)
-    if not told:
+    if not determined:
         return f"{plain}: not enough excitation to tell in any joint"
     if not moved:
-        return f"{plain} is steady in all {len(told)} joints that tell it"
+        return f"{plain} is steady in all {len(determined)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))
-    where = f"{len(moved)} of {len(told)} joints, most in {most.series.joint}"
+    where = f"{len(moved)} of {len(determined)} joints, most in {most.series.joint}"
     return f"{plain} moved in {where}: {percent(most.relative)}"
