@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 RECORDINGS, WORKERS = 1_000_000, 100
-CLIENT_S, KEYS_S = 0.010, 3.0
+CLIENT_S, KEYS_S = 0.016, 0.8
 """s of the client for each task, and for the keys of 10^5 rows: `cost scheduler`, `cost reading`."""
 PER_WORKER = 3
 """As in cluster.py."""
