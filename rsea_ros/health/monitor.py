@@ -13,7 +13,7 @@ from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import Answer, Changes
 from rsea_ros.health.estimates import Estimate
 from rsea_ros.health.finding import Finding, sensor_findings
-from rsea_ros.health.hypotheses import FACTOR, Hypothesis, hypotheses_of, nuisances_of
+from rsea_ros.health.hypotheses import FACTOR, GAINS, Hypothesis, hypotheses_of, nuisances_of
 from rsea_ros.health.look import FEWEST, Cutter, Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
@@ -117,7 +117,7 @@ class Monitor:
         t = look.t[look.kind == STATE]
         period = float(np.median(np.diff(t))) if len(t) > FEWEST else USUAL
         models = hypotheses_of(self._rig, period)
-        single = (*(h for h in models if h.name != FACTOR), *nuisances_of(self._rig))
+        single = (*(h for h in models if h.name not in (FACTOR, *GAINS)), *nuisances_of(self._rig))
         rig, now = tuned(self._rig, self._noise, single, self._first, self._settings.hold)
         known = {h.name: h for h in now}
         hypotheses = tuple(

@@ -15,6 +15,7 @@ from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.effects.effect import Effect
+from rsea_ros.files import write_new
 from rsea_ros.identification.confidence import confidence_of, interval
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
@@ -43,7 +44,7 @@ def effect_from(source: str, name: str) -> Effect:
     """Return the effect of a text as a file's would be loaded."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"{name}.py"
-        path.write_text(source, encoding="utf-8")
+        write_new(path, source)
         return plugin_constant("law", str(path), "EFFECT", Effect)
 
 

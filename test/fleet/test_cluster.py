@@ -61,7 +61,10 @@ def test_workers_are_asked_for_again_and_again(monkeypatch):
 
 @pytest.mark.parametrize(
     ("result", "error"),
-    [(KilledWorker("task", SimpleNamespace(address="tcp://x"), 0), WorkerLost), (ValueError("no"), ValueError)],
+    [
+        (KilledWorker("task", SimpleNamespace(address="tcp://x"), 0), WorkerLost),
+        (ValueError("no"), ValueError),
+    ],
 )
 def test_an_error_comes_back_with_its_job(result, error):
     client, job = Client(), Job(print, 1)

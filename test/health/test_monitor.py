@@ -13,9 +13,9 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel, Record
 
-RATE, CLEAN, AFTER = 280.0, 8.0, 6.0
+RATE, CLEAN, AFTER = 280.0, 8.0, 8.0
 BENCH = Bench().having(coulomb=3.0, b_m=8.0)
-SETTINGS = Settings(learn=6, every=1.0, fitted=2)
+SETTINGS = Settings(learn=6, every=1.0, fitted=3)
 
 
 def rig():
@@ -54,7 +54,7 @@ def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right():
     assert found == [] and not monitor.learning
     values = {e.name: e for e in monitor.estimates()}
     low, high = values["spring.stiffness"].ci95
-    assert low < BENCH.plant.k_s < high and high - low < 0.06 * BENCH.plant.k_s
+    assert low < BENCH.plant.k_s < high and high - low < 0.03 * BENCH.plant.k_s
 
 
 def test_a_joint_in_a_position_loop_is_refused():

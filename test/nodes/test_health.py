@@ -61,7 +61,7 @@ def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, lis
     keeper.ask("RSEA_STIFFNESS", middle)
     listener.until(lambda: keeper.poll() is not None)
     assert keeper.last is not None
-    assert len(read_record(keeper.last / "after", TopicMap(namespace="/"), strict=False)["ft"]) > 20
+    assert len(read_record(keeper.last / "after", topics=TopicMap(namespace="/"), strict=False)["ft"]) > 20
     keeper.ask("RSEA_STIFFNESS", middle)
     keeper.poll()
     assert "holds 1, expected less than 1 (bags)" in keeper.trouble
