@@ -1,10 +1,10 @@
 """Limits held although the bench is not known: a chance constraint over its values.
 
 For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
-and at both ends of every principal axis of what is known of them, z standard deviations away. The increases
-add up as squares: for a peak that goes straight with the values that is the quantile of z, for one that
-bends the simulated ends count. z is such that all causes together, each by its probability, break a limit
-with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
+and at both ends of every principal axis of what is known of them, z standard deviations away, and half-way
+there. The increases add up as squares: for a peak that goes straight with the values that is the quantile of
+z, for one that bends the simulated ends count. z is such that all causes together, each by its probability,
+break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from rsea_ros.signals import FloatArray
 
 LEVEL = 1.0 - 1e-5
 """Probability with which all limits hold, over the causes and what is known of their numbers."""
+_POINTS = 4
+"""On each axis: both ends and half-way to them, for a stop is struck hardest somewhere in between."""
 _LIKELIEST = 0.01
 """Share of its benches in which even the least likely cause may break a limit."""
 BETWEEN = 1.02
@@ -55,7 +57,7 @@ def _ends(hypothesis: Hypothesis, z: float) -> list[Rig]:
     values, vectors = np.linalg.eigh(covariance / np.outer(sd, sd))
     rigs = [hypothesis.rig]
     for value, vector in zip(values, vectors.T, strict=True):
-        for side in (-z, z):
+        for side in (-z, -0.5 * z, 0.5 * z, z):
             moved = theta.copy()
             moved[moving] += side * np.sqrt(max(value, 0.0)) * vector * sd
             rigs.append(hypothesis.rig_at(moved))
@@ -76,10 +78,10 @@ def peaks(command: FloatArray, rate: float, rigs: Sequence[Sequence[Rig]]) -> Pe
 
 
 def at_ends(values: FloatArray) -> float:
-    """Return the peak at the quantile: in the middle, then at both ends of each axis, shape (1 + 2 k,)."""
+    """Return the peak at the quantile: in the middle, then at the points of each axis, shape (1 + 4 k,)."""
     if not np.isfinite(values).all():
         return np.inf
-    increases = np.maximum(values[1:].reshape(-1, 2).max(axis=1) - values[0], 0.0)
+    increases = np.maximum(values[1:].reshape(-1, _POINTS).max(axis=1) - values[0], 0.0)
     return float(values[0] + np.sqrt(np.sum(increases**2)))
 
 
