@@ -48,6 +48,7 @@ setup(
     package_data={
         "": ["py.typed"],
         "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
+        "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],
         "rsea_ros.watch": ["page/*"],

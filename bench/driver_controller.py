@@ -11,6 +11,7 @@ the bytes of a pseudo-terminal.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import random
 import subprocess
@@ -97,7 +98,7 @@ def _trial(
         late = _lateness(rate)
         _drive(outside)
         begun = time.monotonic_ns()
-        errors = sine(outside, kind.amplitude, rate)
+        errors = sine(outside, kind.amplitude, rate) or [math.nan]  # none where ft was lost for good
         largest = max(abs(torque) for _, torque, _ in outside.wrenches)
         faults = _faults(outside)
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])

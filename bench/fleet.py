@@ -22,6 +22,11 @@ def main(arguments: list[str]) -> int:
 
             client(bags, store)
             return 0
+        case ["peak", folder]:
+            from fleet_memory import print_peak
+
+            print_peak(folder)
+            return 0
         case ["faults", *names]:
             from fleet_faults import main as faults
 

@@ -91,10 +91,17 @@ def drawn_wear(rng: np.random.Generator, joints: int, days: int) -> dict[str, We
     return dict(zip(names, kinds, strict=False))
 
 
-def fleet(seed: int, joints: int = 20, recordings: int = 500, days: int = 365) -> Fleet:
-    """Return a fleet of a seed."""
+def fleet(
+    seed: int, joints: int = 20, recordings: int = 500, days: int = 365, values: str = "parameters"
+) -> Fleet:
+    """Return a fleet of a seed.
+
+    values: `parameters`, the rig's values beside the causes of a diagnosis, or `identified`, those of a fit
+    that trusts the rig's structure.
+    """
     rng = np.random.default_rng([seed, 16])
-    sample = [e for e in json.loads(SAMPLE.read_text()) if e["outcome"] != "error"]
+    played = [e for e in json.loads(SAMPLE.read_text()) if e["outcome"] != "error"]
+    sample = [{**e, "parameters": e.get(values, {})} for e in played]
     wear = drawn_wear(rng, joints, days)
     season = 25.0 + 8.0 * np.sin(2.0 * np.pi * (np.arange(days) / 365.25 - 0.3)) + 2.0 * rng.normal(size=days)
     rows: list[dict[str, Any]] = []

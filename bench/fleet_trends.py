@@ -46,10 +46,10 @@ def look(made: Fleet, day: float) -> tuple[Alarm, ...]:
     return alarms(*parts)
 
 
-def outcome(seed: int) -> dict[str, Any]:
+def outcome(seed: int, values: str) -> dict[str, Any]:
     """Return what came of the fleet of a seed."""
     begun = time.perf_counter()
-    made = fleet(seed)
+    made = fleet(seed, values=values)
     first: dict[str, tuple[float, Alarm]] = {}
     last: tuple[Alarm, ...] = ()
     days = [*range(FIRST, 365, WEEK), 365]
@@ -139,14 +139,14 @@ def _limit_of_parameter(made: Fleet, joint: str, wear: Wear, about: str) -> floa
     h = made.history
     rows = (h["joint"] == joint) & (h["parameter"] == about) & h["identifiable"]
     day, value = (h["time_s"][rows] - START) / DAY, h["value"][rows]
-    sd = (h["high"] - h["low"])[rows] / 3.92 / value
+    sd = np.maximum((h["high"] - h["low"])[rows] / 3.92 / value, 1e-9)
     change = abs(wear.size - 1.0) * wear.share(day)
     whole = np.floor(day).astype(int)
     for until in range(int(wear.since) + 2, 366):
         use = whole < until
         days, place = np.unique(whole[use], return_inverse=True)
-        told = np.bincount(place, 1.0 / sd[use] ** 2)
-        weight = 1.0 / (1.0 / told + DAY_SD[about] ** 2)
+        precision = np.bincount(place, 1.0 / sd[use] ** 2)
+        weight = 1.0 / (1.0 / precision + DAY_SD[about] ** 2)
         profile = np.bincount(place, change[use]) / np.bincount(place)
         about_mean = profile - np.sum(weight * profile) / np.sum(weight)
         z = np.sqrt(np.sum(weight * about_mean**2))
@@ -205,16 +205,21 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--seconds", type=float, default=200.0, help="begin no fleet after so long (%(default)s)"
     )
+    parser.add_argument(
+        "--values", choices=("parameters", "identified"), default="parameters",
+        help="the rig's values beside a diagnosis's causes, or those of a fit without causes (%(default)s)",
+    )  # fmt: skip
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
     lines = args.log.read_text().splitlines() if args.log.exists() else []
     done = {o["seed"]: o for o in map(json.loads, lines)}
     for seed in range(args.seeds):
         if seed not in done and time.perf_counter() < end:
-            done[seed] = outcome(seed)
+            done[seed] = outcome(seed, args.values)
             with args.log.open("a") as file:
                 file.write(json.dumps(done[seed]) + "\n")
-    print(f"simulated: estimates and names drawn from a played sample; {len(done)} of {args.seeds} fleets")
+    drawn = f"{args.values} and causes drawn from a played sample"
+    print(f"simulated: {drawn}; {len(done)} of {args.seeds} fleets")
     print("\n".join(table([done[s] for s in sorted(done)])))
     return 0
 

@@ -15,6 +15,7 @@ import sys
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,9 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
+from rsea_ros.library.fit import identify
 from rsea_ros.report.diagnosis_page import final_values
+from rsea_ros.signals import Record
 
 SAMPLE = Path(__file__).with_name("fleet_trends_played.json")
 TRIED = (
@@ -101,13 +104,29 @@ def plans() -> Iterator[Plan]:
         yield Plan(f"{k:02d} {kind} {what}", int(rng.integers(1, 2**31)), kind, temperature, wear, fault)
 
 
-def played(plan: Plan) -> dict[str, Any]:
-    """Return what came of a plan beside the truth; a refusal is an outcome too."""
-    start = time.perf_counter()
+def recorded(plan: Plan) -> tuple[Bench, Record]:
+    """Return the joint of a plan and what it logs."""
     bench = joint(plan.seed, temperature=plan.temperature, **plan.wear)
     record = recording(bench, plan.kind, plan.seed + 1)
     if plan.fault:
         record = FAULTS[plan.fault](record, np.random.default_rng(plan.seed + 2))
+    return bench, record
+
+
+def identified(plan: Plan) -> dict[str, Any]:
+    """Return what identify, which trusts the rig's structure, says of a plan; nothing if it refuses."""
+    start = time.perf_counter()
+    parameters = {}
+    with suppress(RseaError):
+        fit = identify(recorded(plan)[1], RIG)
+        parameters = {n: [p.value, *p.ci95, p.told_by_data] for n, p in fit.parameters.items() if n in TRUE}
+    return {"name": plan.name, "identified": parameters, "seconds": round(time.perf_counter() - start, 1)}
+
+
+def played(plan: Plan) -> dict[str, Any]:
+    """Return what came of a plan beside the truth; a refusal is an outcome too."""
+    start = time.perf_counter()
+    bench, record = recorded(plan)
     entry: dict[str, Any] = {**asdict(plan), "outcome": "done", "true": truth(bench)}
     others = tuple(name for name in catalogue() if name not in TRIED)
     try:
@@ -165,26 +184,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--write", action="store_true", help=f"write {SAMPLE.name} from the log")
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
-    lines = args.log.read_text().splitlines() if args.log.exists() else []
-    done = {entry["name"]: entry for entry in map(json.loads, lines)}
-    for plan in plans():
-        if plan.name in done or time.perf_counter() > end:
-            continue
-        done[plan.name] = rounded(played(plan))
-        with args.log.open("a") as file:
-            file.write(json.dumps(done[plan.name]) + "\n")
-        names = ", ".join(c["name"] for c in done[plan.name].get("causes", []))
-        print(
-            f"{plan.name:<34}{done[plan.name]['outcome']:<9}{done[plan.name]['seconds']:5.1f} s  {names}",
-            flush=True,
-        )
-    every = sum(1 for _ in plans())
-    print(f"{len(done)} of {every} played; healthy joints have {COULOMB:g} N m of dry friction")
+    done: dict[str, dict[str, Any]] = {}
+    for line in args.log.read_text().splitlines() if args.log.exists() else []:
+        entry = json.loads(line)
+        done.setdefault(entry["name"], {}).update(entry)
+    every = list(plans())
+    for step, key in ((played, "outcome"), (identified, "identified")):
+        for plan in every:
+            if key not in done.get(plan.name, {}) and time.perf_counter() < end:
+                _kept(args.log, done, rounded(step(plan)))
+    told = [sum(key in e for e in done.values()) for key in ("outcome", "identified")]
+    print(f"of {len(every)} recordings {told[0]} diagnosed, {told[1]} identified")
+    print(f"healthy joints have {COULOMB:g} N m of dry friction")
     if args.write:
-        SAMPLE.write_text(
-            "[\n" + ",\n".join(json.dumps(done[p.name]) for p in plans() if p.name in done) + "\n]\n"
-        )
+        kept = [json.dumps(done[p.name]) for p in every if "outcome" in done.get(p.name, {})]
+        SAMPLE.write_text("[\n" + ",\n".join(kept) + "\n]\n")
     return 0
+
+
+def _kept(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
+    """Write what came of a recording to the log and the screen."""
+    done.setdefault(entry["name"], {}).update(entry)
+    with log.open("a") as file:
+        file.write(json.dumps(entry) + "\n")
+    names = ", ".join(c["name"] for c in entry.get("causes", [])) or "identified"
+    print(f"{entry['name']:<34}{entry['seconds']:5.1f} s  {names}", flush=True)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from inputs_arrays import damaged_npz, damaged_parquet
 from inputs_bag_files import bag_of_views, damaged_mcap, damaged_sqlite
 from inputs_bytes import damaged
 from inputs_documents import damaged_json, damaged_table, damaged_yaml
@@ -110,6 +111,9 @@ def _rigs() -> list[bytes]:
     return [f.read_bytes() for f in files]
 
 
+EXPORTED = ("mjcf", "urdf", "sdf", "isaac", "bam")
+
+
 def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
     rig = folder / "rig.yaml"
     rig.write_bytes(data)
@@ -117,9 +121,10 @@ def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
     if outcome.kind != RESULT and number % EVERY:
         return outcome
     bag = folder / f"rig{number}.mcap"
+    exported = str(folder / f"rig{number}.out")
     verbs = (
         ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--excitation", "white_noise"],
-        ["export", "--mjcf", str(rig), "--out", str(folder / f"rig{number}.xml")],
+        ["export", f"--{EXPORTED[number // 3 % len(EXPORTED)]}", str(rig), "--no-play", "--out", exported],
         ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--no-noise", "--excitation", "steps"],
     )
     return call(verbs[number % 3])
@@ -142,11 +147,24 @@ channels: {velocity: {column: phi, unit: rpm}, position: [{column: i, unit: mrad
 """
 
 
-def _play_import(file_name: str, is_map: bool) -> Play:
+EXPRESSED = """header: true
+time: {expression: "t + 0 * i", unit: s}
+runs: {column: load}
+channels:
+  position: {expression: "derivative(clip(phi, -3, 3)) * column('i') ** 2", unit: deg}
+"""
+LISTED = """time: {column: t, unit: s}
+channels:
+  position: {column: "q[1]", unit: deg}
+  command: {expression: "i * column('q[0]')", unit: mA, scale: 3}
+"""
+
+
+def _play_import(file_name: str, is_map: bool, of_file: str = MAP) -> Play:
     def play(folder: Path, data: bytes, number: int) -> Outcome:
         table, maps = folder / file_name, folder / "map.yaml"
         table.write_bytes(_CSV_AS[file_name] if is_map else data)
-        maps.write_bytes(data if is_map else MAP.encode())
+        maps.write_bytes(data if is_map else of_file.encode())
         return call(["import", str(table), "--map", str(maps), "--out", str(folder / f"bag{number}.mcap")])
 
     return play
@@ -166,6 +184,51 @@ def _mat() -> list[bytes]:
     return files
 
 
+def _columns() -> dict[str, np.ndarray]:
+    """Return t, i and load, and q with a matrix of two columns."""
+    rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
+    return dict(zip(("t", "phi", "i", "load"), rows.T, strict=True)) | {"q": rows[:, 1:3]}
+
+
+def _npz() -> list[bytes]:
+    files = []
+    for save in (np.savez, np.savez_compressed):
+        buffer = io.BytesIO()
+        save(buffer, **_columns())
+        files.append(buffer.getvalue())
+    return files
+
+
+def _parquet() -> list[bytes]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    files = []
+    for codec in ("snappy", "none"):
+        buffer = io.BytesIO()
+        columns = {name: pa.array(list(y)) for name, y in _columns().items()}
+        pq.write_table(pa.table(columns), buffer, row_group_size=20, compression=codec)
+        files.append(buffer.getvalue())
+    return files
+
+
+def _json() -> list[bytes]:
+    columns = {name: y.tolist() for name, y in _columns().items()}
+    records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return [json.dumps(columns).encode(), json.dumps(records).encode()]
+
+
+def _structs() -> list[bytes]:
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    savemat(buffer, {"log": {**_columns(), "notes": "a bench"}, "spare": np.zeros(3)})
+    return [buffer.getvalue()]
+
+
+STRUCTS = """time: {column: log.t, unit: s}
+channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
+"""
 _CSV_AS = {
     "run.csv": CSV.encode(),
     "run.tsv": CSV.replace(",", "\t").encode(),
@@ -276,7 +339,16 @@ FORMATS = (
     ),
     Format("metadata", _metadata, damaged_yaml, _play_metadata),
     Format("rig", _rigs, damaged_yaml, _play_rig),
-    Format("map", lambda: [MAP.encode(), RATED.encode()], damaged_yaml, _play_import("run.csv", True)),
+    Format(
+        "map",
+        lambda: [MAP.encode(), RATED.encode(), EXPRESSED.encode()],
+        damaged_yaml,
+        _play_import("run.csv", True),
+    ),
+    Format("structs.mat", _structs, damaged, _play_import("run.mat", False, STRUCTS)),
+    Format("npz", _npz, damaged_npz, _play_import("run.npz", False, LISTED)),
+    Format("parquet", _parquet, damaged_parquet, _play_import("run.parquet", False, LISTED)),
+    Format("json.table", _json, damaged_json, _play_import("run.json", False, LISTED)),
     Format("csv", lambda: [CSV.encode()], damaged_table, _play_import("run.csv", False)),
     Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, _play_import("run.tsv", False)),
     Format("csv.gz", lambda: [gzip.compress(CSV.encode())], _gzipped, _play_import("run.csv.gz", False)),

@@ -140,7 +140,7 @@ def _control(case: Case, folder: Path) -> list[str]:
 _ARGUMENTS: Mapping[str, Callable[[Case, Path], list[str]]] = {
     "simulate": _simulate,
     "control": _control,
-    "export": lambda c, f: ["export", "--mjcf", c["rig"], "--out", str(f / "rig.xml")],
+    "export": lambda c, f: ["export", "--mjcf", c["rig"], "--no-play", "--out", str(f / "rig.xml")],
     "design": lambda c, f: ["design", f"--{c['option']}={c['value']}", "--out", str(f / "out"), "--json"],
 }
 

@@ -3,7 +3,7 @@
 The engine is told bodies, bearings and one pair of teeth (design/mjcf.py); which way the rotor turns, and so
 whether T_d/T_p resonates, is its own result.
 
-Needs MuJoCo beside the project's environment: .venv/bin/pip install -r requirements-mujoco.txt
+MuJoCo is among the packages of the tests, for Python 3.11 or later.
 Run: .venv/bin/python bench/mujoco_second_opinion.py [RIG] [--train TRAIN] [--seconds 20]
 Status 1 when they part by more than 2 % in gain or 3 degrees in phase up to 100 Hz, or by more than 5 % in
 |T_d/T_p| at a line off its resonance.

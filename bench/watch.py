@@ -1,8 +1,8 @@
 """What the live view costs: its processor time as a share of one core, with a page open, at some rates.
 
 Run: python bench/watch.py [--rate 280 1000] [--seconds 20]. A plant, the observer and the node `watch` run as
-processes of their own; a page is a socket that reads all frames. The plant's late cycles, without and with the
-view, say whether it delays the loop. Status 1 when the view takes more than 10 % of a core at 280 Hz.
+processes of their own; a page is a socket that reads all frames. The plant's late cycles, without and with
+the view, say whether it delays the loop. Status 1 when the view takes more than 10 % of a core at 280 Hz.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from rsea_ros.cli._processes import Processes
 
 MOST = 0.10
 DOMAIN = 94
+ADDRESS = re.compile(r"open http://(\S+)/\?token=(\S+)")
 
 
 def main() -> int:
@@ -53,7 +54,7 @@ def measured(rate: float, seconds: float) -> Iterator[tuple[int, float, str]]:
         time.sleep(8.0)
         before = missed(seconds / 2.0)
         nodes.start("watch", {"port": 0})
-        address = awaited(lambda: re.search(r"open http://(\S+)/\?token=(\S+)", nodes.log("watch").read_text()))
+        address = awaited(lambda: ADDRESS.search(nodes.log("watch").read_text()))
         time.sleep(3.0)
         for pages in (0, 1):
             share, frames, size, late = asyncio.run(watched(nodes.pid("watch"), address, pages, seconds))

@@ -59,6 +59,8 @@ def stamp(root: Path) -> tuple[str, ...]:
 def make(root: Path, ros: str, key: str, lock: int) -> None:
     """Make the environment from nothing and stamp it."""
     venv = root / ".venv"
+    if venv.is_symlink():
+        raise InstallError(f"{venv}: a link, made for another lock; expected a folder of its own, or none")
     (venv / "complete").unlink(missing_ok=True)
     say(f"making .venv with Python {platform.python_version()}, this once: about two minutes, about 1.6 GB")
     site = ["--system-site-packages"] if ros == "sourced" else []

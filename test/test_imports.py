@@ -45,7 +45,7 @@ OWN = {
     "diagnosis": BASE | {"effects", "model", "identification", "checks"},
     "control": BASE | {"effects", "model"},
     "design": BASE | {"model"},
-    "laws": BASE | {"effects", "model", "identification", "checks", "diagnosis"},
+    "laws": BASE | {"effects", "model", "identification", "checks", "diagnosis", "compiler"},
     "experiment": BASE | {"effects", "model", "identification", "checks", "diagnosis"},
     "health": BASE | {"effects", "model"},
     "trends": BASE,
@@ -69,7 +69,7 @@ OWN = {
 
 DIAGNOSIS = (
     {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
-    {"result", "score", "short_pieces", "initial_guess"},
+    {"result", "score", "short_pieces", "initial_guess", "recommended_run"},
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
     {"selection", "step_fits", "signature"},
     {"forward_step", "backward_elimination", "evaluation", "flexible"},
@@ -107,7 +107,7 @@ FOREIGN = {
     "diagnosis": NUMERIC,
     "control": NUMERIC,
     "design": NUMERIC,
-    "laws": NUMERIC | {"sklearn"},
+    "laws": NUMERIC,
     "experiment": NUMERIC,
     "health": NUMERIC,
     "trends": {"numpy", "scipy", "ruptures"},

@@ -112,6 +112,17 @@ def test_the_environment_is_made_once_and_anew_when_the_lock_changes(clone, quic
     assert run(clone, quick) == (0, "ran\n", "")
 
 
+def test_an_environment_behind_a_link_is_nobodys_to_clear(clone, quick, tmp_path):
+    """A link to the environment of another clone: with another lock that one was cleared."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "kept").touch()
+    (clone / ".venv").symlink_to(elsewhere)
+    status, out, err = run(clone, quick)
+    assert (status, out) == (2, "") and f"{clone}/.venv: a link" in err
+    assert (elsewhere / "kept").exists()
+
+
 def test_an_interrupted_environment_is_never_used(clone, quick, silent_server):
     ask_for(clone, silent_server.getsockname())
     connections = []

@@ -3,7 +3,7 @@
 asteval evaluates them with a table of symbols that holds the columns and the functions below, nothing else.
 Before it sees a text, the syntax tree is held against a list: numbers, names, + - * / **, and calls of
 those functions. So attributes, subscripts, texts, comprehensions, lambdas and imports are never evaluated,
-numbers are doubles, and an expression takes SIZE passes over the samples at most (decision 0100).
+numbers are doubles, and an expression takes SIZE passes over the samples at most (decision 0130).
 """
 
 from __future__ import annotations

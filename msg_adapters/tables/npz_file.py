@@ -68,10 +68,7 @@ def _root(base: str, names: Any) -> str:
 
 def _array(file: IO[bytes], name: str, size: int) -> Any:
     """Read an array whose header promises what the file holds. size: bytes of it in the file."""
-    version = npy.read_magic(file)
-    if version not in _HEADERS:
-        raise ValueError(f"array {name!r} is of version {version}, expected (1, 0) or (2, 0)")
-    shape, _, dtype = _HEADERS[version](file)
+    shape, dtype = _header(file, name)
     held = float(np.prod(shape, dtype=float)) * dtype.itemsize
     if dtype.hasobject:
         raise ValueError(f"array {name!r} holds Python objects, expected numbers")
@@ -81,6 +78,18 @@ def _array(file: IO[bytes], name: str, size: int) -> Any:
         raise ValueError(f"array {name!r} is {dtype} {shape}, more than its {size} bytes; a damaged file?")
     with _rewound(file) as again:
         return npy.read_array(again, allow_pickle=False)
+
+
+def _header(file: IO[bytes], name: str) -> tuple[Any, Any]:
+    """Return the shape and type that an array's header promises."""
+    try:
+        version = npy.read_magic(file)
+        shape, _, dtype = _HEADERS[version](file)
+    except KeyError:
+        raise ValueError(f"array {name!r} is of version {version}, expected (1, 0) or (2, 0)") from None
+    except Exception:  # NumPy evaluates it as a literal: a damaged one may bring errors of any kind
+        raise ValueError(f"array {name!r} has no header that can be read; a damaged file?") from None
+    return shape, dtype
 
 
 @contextmanager

@@ -20,6 +20,8 @@ EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
 RIG = "paper_high_impedance"
 FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
 FAULTS = "faults"
+_MUCH = 0.2
+"""Of what is wrong: with more than that unexplained, the next step is a law for what has no name."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,6 +70,9 @@ def run(args: argparse.Namespace) -> int:
         print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
     else:
         _print(result, report)
+        if left_unexplained(result) > _MUCH:
+            model = report.parent / "model.yaml"
+            print(f"law         of what is left: rsea law {' '.join(args.bags)} --rig {model}")
     findings = {result.verdict, *([FAULTS] if result.faults else [])}
     return FOUND if findings.intersection(args.fail_on) else 0
 
@@ -84,6 +89,17 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
     record = record if args is None else cut(record, args)
     check_diagnosable(record)
     return record
+
+
+def left_unexplained(result: Diagnosis) -> float:
+    """Return which share of what the baseline leaves above the noise, as power, the causes leave still."""
+    n = result.channel
+    noise, before, after = (
+        rms.get(n, 0.0) ** 2 for rms in (result.noise_rms, result.residual_rms, result.extended_residual_rms)
+    )
+    if result.verdict == "nothing_wrong" or before <= noise:
+        return 0.0
+    return max(0.0, (after if result.causes else before) - noise) / (before - noise)
 
 
 def _print(result: Diagnosis, report: Path) -> None:

@@ -20,6 +20,7 @@ class Grid:
 
     def __init__(self, period: float) -> None:
         self._period = period
+        self._origin = 0  # ns; a float of ns since the epoch has steps of 256 ns
         self._at: float | None = None
         self.offset = 0.0
 
@@ -29,7 +30,7 @@ class Grid:
 
     def jumps(self, stamp: int) -> bool:
         """Tell whether a stamp (ns) is of another run than those before."""
-        return self._at is not None and abs(stamp - self._at) > JUMP
+        return self._at is not None and abs(stamp - self._origin - self._at) > JUMP
 
     def place(self, stamp: int) -> int:
         """Return how many periods a stamp (ns) lies behind the one before; 0 for one in the same period.
@@ -37,9 +38,9 @@ class Grid:
         The first is one period behind nothing.
         """
         if self._at is None:
-            self._at, self.offset = float(stamp), 0.0
+            self._origin, self._at, self.offset = stamp, 0.0, 0.0
             return 1
-        behind = (stamp - self._at) / self._period
+        behind = (stamp - self._origin - self._at) / self._period
         periods = math.floor(behind + EARLY)
         if periods <= 0:
             return 0
@@ -50,6 +51,11 @@ class Grid:
         return periods
 
     @property
-    def at(self) -> float:
+    def next(self) -> int:
+        """The place of the next stamp, ns."""
+        return self._origin + round((self._at or 0.0) + self._period)
+
+    @property
+    def at(self) -> int:
         """The place of the last stamp, ns."""
-        return 0.0 if self._at is None else self._at
+        return self._origin + round(self._at or 0.0)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.causes import alternative_of, cause_of, dropped_of, latest, rejected_of
 from rsea_ros.diagnosis.coherence import lost_above
@@ -158,7 +156,8 @@ def _next_experiment(
         if rivals:
             return separating(stage.solution, [m.solution for m in rivals], record["command"].rate)
     if verdict in ("unexplained", "partly_explained") and not is_at_floor(stages[-1].test):
-        return amplitude_series(float(np.nanmax(np.abs(record["command"].y))), stages[0].solution.problem.rig)
+        last = stages[-1]
+        return amplitude_series(last.solution, last.test.ratio(last.test.worst), record["command"].rate)
     return None
 
 

@@ -1,7 +1,8 @@
 """The next experiment: the cheapest run that would tell rivals apart, by simulating them.
 
-Each possible excitation is applied to the accepted model; the rival, with all that it may move, is fitted to
-that (one linearised step), and what it cannot follow is held against the sensors' noise.
+Each possible excitation, as large as rig and driver allow, is applied to the accepted model; the rival, with
+all that it may move, is fitted to that (one linearised step), and what it cannot follow is held against the
+sensors' noise. No run is recommended where none would tell anything.
 """
 
 from __future__ import annotations
@@ -12,21 +13,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.diagnosis.recommended_run import Run, allowed_run, playable_rate
 from rsea_ros.diagnosis.result import Experiment
-from rsea_ros.errors import RseaError
-from rsea_ros.identification.excitation import JOINT, Settings, excitation
+from rsea_ros.identification.excitation import JOINT, PERIODIC, Settings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian
 from rsea_ros.identification.unknowns import apply, start_vector
-from rsea_ros.model.drive import Drive, drive_from
+from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import UNITS, Channel, FloatArray, Record
+from rsea_ros.signals import UNITS, FloatArray
 from rsea_ros.wording import listed
 
-_DURATION = 12.0
+_DURATION, _SERIES = 12.0, 60.0
+"""s of a run that tells rivals apart, and of one of an amplitude series."""
+_SERIES_TOP = 60.0
+"""Hz: above it the driver's limit of the slew leaves little amplitude."""
 _ENOUGH = 0.5
 """RMS of what a rival cannot follow, over the noise, that tells it apart in a run of 12 s beyond doubt."""
+_VISIBLE = 1.1
+"""RMS of a residual over the noise from which on it is seen."""
+_NEARLY = 0.8
+"""Part of the wanted amplitude that limits must leave for an amplitude series to say something."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,7 @@ EXCITATIONS = tuple(
 
 
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
-    """Return the cheapest run that tells an accepted model from its rivals, or say that none does."""
+    """Return the cheapest allowed run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
     names = listed([r.problem.added[-1] for r in rivals])
     cause = accepted.problem.added[-1]
@@ -67,14 +74,23 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
             f"{cause} and {names} do as well on these data; a run at another amplitude would show more", {}
         )
     present = float(np.max(np.abs(case.drive.command)))
-    tried = []
+    rig, most = _model(accepted), 0.0
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
-        separation = min(_separation(accepted, rival, option, present, rate) for rival in rivals)
-        tried.append((separation, option))
+        run = allowed_run(rig, case, option.kind, _settings(option, rate), option.relative * present)
+        if run is None:
+            continue
+        separation = min(_separation(rival, run.case) for rival in rivals)
         if separation > _ENOUGH:
-            break
-    separation, best = max(tried, key=lambda item: item[0])
-    return _worded(cause, names, separation, best, present, unit_of_commands(accepted.problem.rig))
+            why = f"this run makes them differ by {separation:.1f} times the noise"
+            settings = _as_excited(run, rig) | {"separation_times_noise": round(separation, 3)}
+            return Experiment(f"{cause} and {names} do as well on these data; {why}", settings)
+        most = max(most, separation)
+    return Experiment(
+        f"{cause} and {names} make the same motion under every excitation tried within the limits of rig and "
+        f"driver (at most {most:.2f} times the noise apart): "
+        "only a separate measurement distinguishes them, such as the spring stiffness by a known weight",
+        {},
+    )
 
 
 def unit_of_commands(rig: Rig) -> str:
@@ -82,71 +98,34 @@ def unit_of_commands(rig: Rig) -> str:
     return UNITS["command" if rig.loop is None else "reference"]
 
 
-def _worded(
-    cause: str, names: str, separation: float, best: ExcitationOption, present: float, unit: str
-) -> Experiment:
-    run: dict[str, float | str] = {
-        "kind": best.kind,
-        "amplitude": round(best.relative * present, 3),
-        "unit": unit,
-        "low": best.low,
-        "high": best.high,
-        "duration": _DURATION,
-        "separation_times_noise": round(separation, 3),
-    }
-    if separation > _ENOUGH:
-        return Experiment(
-            f"{cause} and {names} do as well on these data; "
-            f"this run makes them differ by {separation:.1f} times the noise",
-            run,
-        )
-    return Experiment(
-        f"{cause} and {names} make the same motion under every excitation tried "
-        f"(at most {separation:.2f} times the noise apart): "
-        "only a separate measurement distinguishes them, such as the spring stiffness by a known weight",
-        run,
-    )
+def _settings(option: ExcitationOption, rate: float) -> Settings:
+    """Return the settings of an option, of any amplitude."""
+    rate = playable_rate(rate)
+    return Settings(
+        rate=rate, duration=_DURATION, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
+        low=option.low, high=min(option.high, 0.45 * rate), period=4.0, seed=7,
+    )  # fmt: skip
 
 
-def _separation(
-    accepted: Solution, rival: Solution, option: ExcitationOption, present: float, rate: float
-) -> float:
-    """Return what a rival cannot follow of the accepted model under an excitation, over the noise."""
-    try:
-        case = _simulated(accepted, option, option.relative * present, rate)
-    except RseaError:
-        return 0.0
-    problem = replace(rival.problem, cases=(case,))
-    return _left_over(problem, rival.theta)
+def _as_excited(run: Run, rig: Rig) -> dict[str, float | str]:
+    """Return a run as parameters of the node excite, with its peak and the unit."""
+    s = run.settings
+    given: dict[str, float | str] = {
+        "kind": run.kind, "amplitude": s.amplitude, "unit": unit_of_commands(rig), "low": s.low,
+        "high": s.high, "duration": s.duration, "rate": s.rate, "seed": s.seed, "peak": round(run.peak, 3),
+    }  # fmt: skip
+    given |= {"noise": s.noise} if run.kind == "chirp" else {}
+    return given | ({"period": s.period} if run.kind in PERIODIC or run.kind == "steps" else {})
 
 
-def _simulated(accepted: Solution, option: ExcitationOption, amplitude: float, rate: float) -> Case:
-    """Return a case whose measurements are the accepted model's own, without noise."""
-    settings = Settings(
-        rate=rate,
-        duration=_DURATION,
-        amplitude=0.5 * amplitude,
-        noise=0.2 * amplitude,
-        low=option.low,
-        high=min(option.high, 0.45 * rate),
-        period=4.0,
-        seed=7,
-    )
-    values = excitation(option.kind, settings)
-    values = values * min(1.0, amplitude / float(np.max(np.abs(values))))
-    t = np.arange(len(values)) / rate
-    old = accepted.problem.cases[0]
-    blank = {n: Channel(t + 1.0 / rate, np.zeros(len(t))) for n in old.measured}
-    drive = drive_from(Record({"command": Channel(t, values), **blank}))
-    rig, _ = apply(accepted.problem.rig, accepted.problem.unknowns, accepted.theta)
-    outputs = simulate_drive(rig, drive)
-    return Case(
-        drive,
-        {n: c.t for n, c in blank.items()},
-        outputs,
-        old.noise,
-        {n: np.ones(len(t), bool) for n in outputs},
-    )
+def _model(solution: Solution) -> Rig:
+    """Return the rig of a fit."""
+    return apply(solution.problem.rig, solution.problem.unknowns, solution.theta)[0]
+
+
+def _separation(rival: Solution, case: Case) -> float:
+    """Return what a rival cannot follow of the accepted model's motion, over the noise."""
+    return _left_over(replace(rival.problem, cases=(case,)), rival.theta)
 
 
 def _left_over(problem: Problem, theta: FloatArray) -> float:
@@ -166,24 +145,33 @@ def _left_over(problem: Problem, theta: FloatArray) -> float:
     return float(min(max(rms), np.sqrt(np.mean(residual**2)) * len(rms)))
 
 
-def amplitude_series(amplitude: float, rig: Rig) -> Experiment:
+def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experiment | None:
     """Return the run that says of an unexplained residual whether it grows with the amplitude.
 
-    amplitude: of the present run, in the unit of what commands the rig.
+    times_noise: RMS of that residual over the noise. At half the amplitude it must still be seen; else twice
+    the amplitude would show it, within the limits; None where neither would.
     """
-    why = (
-        "nothing in the catalogue explains the residual: repeat at half the amplitude with an odd multisine, "
-        "whose empty lines show distortion apart from noise; "
-        "what scales with the command is linear, what does not is friction-like"
-    )
-    return Experiment(
-        why,
-        {
-            "kind": "multisine",
-            "amplitude": round(0.5 * amplitude, 3),
-            "unit": unit_of_commands(rig),
-            "low": 0.1,
-            "high": 120.0 if rig.loop is None else JOINT.high,
-            "duration": 60.0,
-        },
-    )
+    case, rig = model.problem.cases[0], _model(model)
+    if not isinstance(case.drive, Drive):  # it drifts: no simulation says how far another run would carry it
+        return Experiment(_SERIES_WHY.format("half", ""), {})
+    present = float(np.max(np.abs(case.drive.command)))
+    excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
+    for factor, words in ((0.5, "half"), (2.0, "twice")):
+        if math.hypot(1.0, factor * excess) < _VISIBLE:
+            continue
+        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate)), factor * present)
+        if run is not None and run.peak >= _NEARLY * factor * present:
+            return Experiment(_SERIES_WHY.format(words, _WITH_MULTISINE), _as_excited(run, rig))
+    return None
+
+
+_WITH_MULTISINE = " with an odd multisine, whose empty lines show distortion apart from noise"
+_SERIES_WHY = (
+    "nothing in the catalogue explains what is left: repeat at {} the amplitude{}; "
+    "what scales with the command is linear, what does not is friction-like"
+)
+
+
+def _series(rig: Rig, rate: float) -> Settings:
+    high = min(_SERIES_TOP if rig.loop is None else JOINT.high, 0.45 * rate)
+    return Settings(rate=rate, duration=_SERIES, amplitude=0.5, noise=0.0, low=0.1, high=high)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import importlib
 import os
 import pkgutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -19,6 +20,8 @@ _NOT_EFFECTS = {"effect", "catalogue", "guess", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
 """Environment variable: effect files or folders of them beside the package's own, separated like PATH."""
 
+_LENT: dict[str, Effect] = {}
+
 
 @lru_cache(maxsize=8)
 def _catalogue(extra: tuple[str, ...]) -> Mapping[str, Effect]:
@@ -30,7 +33,20 @@ def _catalogue(extra: tuple[str, ...]) -> Mapping[str, Effect]:
 
 def catalogue() -> Mapping[str, Effect]:
     """Return every effect by name, those of RSEA_EFFECTS included."""
-    return _catalogue(tuple(str(p) for p in plugin_files(os.environ.get(EXTRA_PATH, ""))))
+    known = _catalogue(tuple(str(p) for p in plugin_files(os.environ.get(EXTRA_PATH, ""))))
+    return MappingProxyType({**known, **_LENT}) if _LENT else known
+
+
+@contextmanager
+def lent(*effects: Effect) -> Iterator[None]:
+    """Have effects that lie in no file of the catalogue known within the block, such as one just written."""
+    before = dict(_LENT)
+    _LENT.update({e.name: e for e in effects})
+    try:
+        yield
+    finally:
+        _LENT.clear()
+        _LENT.update(before)
 
 
 def effect_named(name: str) -> Effect:

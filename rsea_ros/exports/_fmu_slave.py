@@ -33,7 +33,7 @@ from rsea_ros.model.step import OUTPUTS
 STEP = 1e-4
 """s, of the compiled step."""
 DURATION = 60.0
-"""s, over which drifts come to their full size."""
+"""s, over which drifts come to their full size unless the player sets another `duration`."""
 UNITS = {
     "N m": {"kg": 1, "m": 2, "s": -2},
     "N m/rad": {"kg": 1, "m": 2, "s": -2, "rad": -1},
@@ -57,7 +57,7 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
         self.description = (Path(self.resources) / "coverage.txt").read_text(encoding="utf-8")
         self.default_experiment = DefaultExperiment(start_time=0.0, stop_time=10.0, step_size=1e-3)
         self.register_units([Unit(name, **powers) for name, powers in UNITS.items()])
-        self._command, self._at = 0.0, 0
+        self._command, self._duration, self._at = 0.0, DURATION, 0
         self._out = np.zeros((1, len(OUTPUTS)))
         clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous}
         self.register_variable(Float64("time", unit="s", getter=self._time, **clock), nested=False)
@@ -88,6 +88,8 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
         return float(self._out[-1, at])
 
     def _declare_parameters(self) -> None:
+        get, change = partial(getattr, self, "_duration"), partial(setattr, self, "_duration")
+        self._parameter("duration", "s", get, change)
         for name, quantity in self._rig.quantities.items():
             if np.isfinite(quantity.value):
                 value, change = partial(self._value, name), partial(self._set, name)
@@ -130,7 +132,7 @@ class RseaActuator(Fmi3Slave):  # type: ignore[misc]
 
     def exit_initialization_mode(self) -> None:
         """Make the machine of the parameters that were set."""
-        self._machine = build(self._rig, STEP, DURATION, in_loop=self._rig.loop is not None)
+        self._machine = build(self._rig, STEP, self._duration, in_loop=self._rig.loop is not None)
         self._machine.begin()
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:

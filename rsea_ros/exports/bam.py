@@ -14,7 +14,7 @@ import json
 from collections.abc import Mapping
 
 from rsea_ros.exports.coverage import Export, Said, Unsaid
-from rsea_ros.exports.others import unsaid_effects, unsaid_parts
+from rsea_ros.exports.others import acting, sized, unsaid_effects, unsaid_parts
 from rsea_ros.model.rig import Rig
 
 ALPHA = 2.0
@@ -25,7 +25,8 @@ ANY_SPEED = 1e9
 
 def export_bam(rig: Rig, actuator: str = "") -> Export:
     """Return the parameters of a rig. actuator: BAM's name of the servo, which brings its control law."""
-    effects = {one.name: one.parameters for one in rig.effects}
+    rig = acting(rig)
+    effects = sized(rig)
     said = [
         Said("rotor.reflected_inertia", "armature"),
         Said("rotor.reflected_damping", "friction_viscous"),

@@ -6,7 +6,8 @@
     both free                    world -housing_end- housing -gear- chassis -spring- distal
 
 The rotor is a link in the housing whose joint mimics the gear's with the multiplier n of train.py, so n is -N
-for a harmonic drive with its circular spline held. Where the spring is rigid, chassis and distal are one.
+for a harmonic drive with its circular spline held. Where the spring is rigid, chassis and distal are one. The
+axis is x, level: gravity is along -z.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass, field
 from rsea_ros.errors import RigError
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.structure import structured
 
 GRAVITY = 9.80665
 WORLD = "world"
@@ -24,7 +26,7 @@ WORLD = "world"
 
 @dataclass(frozen=True)
 class Link:
-    """A body about the axis. weight: m g l, N m, hanging along -y at angle `turned`, rad."""
+    """A body about the axis, x. weight: m g l, N m, hanging along -z but for the angle `turned`, rad."""
 
     name: str
     inertia: float
@@ -38,20 +40,20 @@ class Link:
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Return where the mass is, m, x and y."""
+        """Return where the mass is, m, y and z."""
         arm = self.weight / (self.mass * GRAVITY) if self.weight else 0.0
-        return arm * math.sin(self.turned), -arm * math.cos(self.turned)
+        return arm * math.sin(self.turned), 0.0 - arm * math.cos(self.turned)
 
     @property
     def about_centre(self) -> float:
         """Return the inertia about the centre of mass, kg m^2."""
-        x, y = self.centre
-        return self.inertia - self.mass * (x * x + y * y)
+        y, z = self.centre
+        return self.inertia - self.mass * (y * y + z * z)
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint about z, or -z where it is turned round. mimics: another joint, `multiplier` times."""
+    """A joint about x, or -x where it is turned round. mimics: another joint, `multiplier` times."""
 
     name: str
     parent: str
@@ -73,19 +75,24 @@ class Chain:
 
 
 def chain_of(rig: Rig) -> Chain:
-    """Return the chain of a rig. Raises RigError for a lumped train, which no mechanism is."""
+    """Return the chain of a rig. Raises RigError for a lumped train, which no mechanism is, and a linear rig.
+
+    Of the rig's effects it has the weight of gravity_error.
+    """
+    check_rotary(rig)
     if rig.train == "lumped":
         raise RigError(f"rig {rig.name}: the lumped train cannot be exported, expected a real train")
-    spring = (0.0, 0.0) if rig.rigid_spring else (rig["spring.damping"], rig["spring.stiffness"])
+    rig = structured(rig.with_effects(*(one for one in rig.effects if one.name == "gravity_error")))
+    spring = _beside_gear(rig) if rig.rigid_spring else (rig["spring.damping"], rig["spring.stiffness"])
     b_m = rig["rotor.reflected_damping"]
     moves = rig.end_is_free("housing_end"), rig.end_is_free("spring_end")
-    chassis, housing = Link("chassis", _chassis_inertia(rig)), _end(rig, "housing_end", "housing")
+    chassis, housing = _chassis(rig), _end(rig, "housing_end", "housing")
     distal = _end(rig, "spring_end", "distal")
     links: list[Link] = []
     if not moves[0]:
         base = WORLD
         links += [chassis]
-        beside = (0.0, 0.0) if moves[1] else spring
+        beside = (0.0, 0.0) if moves[1] and not rig.rigid_spring else spring
         joints = [Joint("gear", base, "chassis", b_m + beside[0], beside[1])]
     elif moves[1]:
         base = "housing"
@@ -106,13 +113,26 @@ def chain_of(rig: Rig) -> Chain:
     return Chain(tuple(links), tuple(joints), _left_out(rig))
 
 
-def _chassis_inertia(rig: Rig) -> float:
-    """Return the chassis' inertia, the distal side's included where the spring is rigid."""
-    distal = rig["spring_end.inertia"] if rig.rigid_spring and rig.end_is_free("spring_end") else 0.0
-    inertia = rig["chassis.inertia"] + distal
+def check_rotary(rig: Rig) -> None:
+    """Raise RigError for a rig that moves along a line: the joints and bodies of exports turn."""
+    if rig.linear:
+        raise RigError(f"rig {rig.name}: moves along a line, expected a rotary rig for this target")
+
+
+def _beside_gear(rig: Rig) -> tuple[float, float]:
+    """Return damping and stiffness that a rigid spring's end has to the world, the gear's other side."""
+    return rig["spring_end.damping"], rig["spring_end.stiffness"]
+
+
+def _chassis(rig: Rig) -> Link:
+    """Return the chassis, with the distal side where the spring is rigid."""
+    inertia, load = rig["chassis.inertia"], None
+    if rig.rigid_spring and rig.end_is_free("spring_end"):
+        load = _end(rig, "spring_end", "distal")
+        inertia += load.inertia
     if not inertia > 0.0:
         raise RigError(f"rig {rig.name}: chassis has inertia {inertia:g} kg m^2, expected > 0 kg m^2")
-    return inertia
+    return Link("chassis", inertia, load.weight, load.turned) if load else Link("chassis", inertia)
 
 
 def _end(rig: Rig, end: str, name: str) -> Link:
@@ -131,7 +151,8 @@ def _left_out(rig: Rig) -> dict[str, str]:
     """Return what acts between parts that are no neighbours in the chain."""
     left = {}
     free = [end for end in ("housing_end", "spring_end") if rig.end_is_free(end)]
-    for end in free if len(free) == 1 else free[1:]:
+    far = free if len(free) == 1 else free[1:]
+    for end in far if not (rig.rigid_spring and free == ["spring_end"]) else ():
         for name, unit in (("stiffness", "N m/rad"), ("damping", "N m s/rad")):
             if rig[f"{end}.{name}"]:
                 size = f"{rig[f'{end}.{name}']:g} {unit}"
@@ -139,6 +160,4 @@ def _left_out(rig: Rig) -> dict[str, str]:
     for part in ("gear", "proximal_spring"):
         if math.isfinite(rig[f"{part}.stiffness"]):
             left[f"{part}.stiffness"] = "a further elastic joint; the chain has it rigid"
-    if rig.rigid_spring and free == ["spring_end"] and rig["spring_end.gravity"]:
-        left["spring_end.gravity"] = "chassis and load are one link on the axis"
     return left

@@ -14,6 +14,8 @@ from rsea_ros.signals import UNITS, Channel, FloatArray, Record
 
 RATE = 250.0
 """Hz, of the commands that are played."""
+REFINE = 4
+"""Our steps are so much shorter here: the difference is to be the export's, not that of the step."""
 CHANNELS = ("ft", "position", "velocity", "deflection")
 
 
@@ -42,7 +44,7 @@ def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
     driven = "command" if rig.loop is None else "reference"
     names = [name for name in CHANNELS if rig.measures(name)]
     asked = {name: Channel(t, np.zeros(len(t))) for name in names}
-    return simulate(rig, Record({driven: Channel(t, command), **asked}))
+    return simulate(rig, Record({driven: Channel(t, command), **asked}), refine=REFINE)
 
 
 def differences(

@@ -13,12 +13,16 @@ from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
 from rsea_ros.files import write_new
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import rig_text
+from rsea_ros.model.simulation import build
 
+STEP = 1e-4
+"""s. Any step will do to see whether the rig can be built."""
 SLAVE = Path(__file__).with_name("_fmu_slave.py")
 
 
 def export_fmu(rig: Rig) -> Export:
-    """Return the archive of a rig. Raises ParameterError without pythonfmu3."""
+    """Return the archive of a rig. Raises ParameterError without pythonfmu3, and as a simulation does."""
+    build(rig, STEP, 1.0, in_loop=rig.loop is not None)  # what it refuses, the FMU would only in its player
     try:
         from pythonfmu3 import FmuBuilder
     except ImportError:
@@ -27,6 +31,8 @@ def export_fmu(rig: Rig) -> Export:
         ) from None
     said = [Said("bench", "our own compiled step, co-simulation; the Python that plays it needs rsea_ros")]
     said += [Said(one.name, "in the step; its sizes are parameters") for one in rig.effects]
+    if rig.linear:
+        said.append(Said("linear rig", "m and N stand in the place of rad and N m"))
     unsaid = [Unsaid("sensor noise", "outputs are what perfect instruments read")] if rig.sensors else []
     with tempfile.TemporaryDirectory() as folder:
         files = {"rig.yaml": rig_text(rig), "coverage.txt": "\n".join(coverage_lines(said, unsaid))}

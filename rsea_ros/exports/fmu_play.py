@@ -21,6 +21,7 @@ def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatAr
     """
     try:
         from fmpy import simulate_fmu
+        from fmpy.fmi1 import FMICallException
     except ImportError:
         raise ParameterError(
             "playing the FMU needs the package fmpy, which is not installed: pip install fmpy, or --no-play"
@@ -32,8 +33,11 @@ def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatAr
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "rig.fmu"
         write_new(file, archive)
-        result = simulate_fmu(
-            str(file), stop_time=float(t[-1]), step_size=1.0 / RATE, output_interval=1.0 / RATE,
-            input=given, output=names, validate=True,
-        )  # fmt: skip
+        try:
+            result = simulate_fmu(
+                str(file), stop_time=float(t[-1]), step_size=1.0 / RATE, output_interval=1.0 / RATE,
+                input=given, output=names, validate=True, start_values={"duration": len(t) / RATE},
+            )  # fmt: skip
+        except FMICallException as error:
+            raise ParameterError(f"FMPy: {' '.join(str(error).split())}") from None
     return {name: np.asarray(result[name], np.float64) for name in names}

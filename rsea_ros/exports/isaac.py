@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 
 from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
-from rsea_ros.exports.others import unsaid_effects, unsaid_parts
+from rsea_ros.exports.others import acting, sized, unsaid_effects, unsaid_parts
 from rsea_ros.model.rig import Rig
 
 PHYSICS_STEP = 0.005
@@ -19,7 +19,8 @@ PHYSICS_STEP = 0.005
 
 def export_isaac(rig: Rig) -> Export:
     """Return the configuration of a rig's actuator."""
-    effects = {one.name: one.parameters for one in rig.effects}
+    rig = acting(rig)
+    effects = sized(rig)
     said: list[Said] = []
     delay = effects.get("command_delay", {}).get("delay", 0.0)
     fields = _joint(rig, said) | _loop(rig, said) | _friction(effects, said) | _limits(rig, effects, said)

@@ -10,23 +10,28 @@ from xml.etree import ElementTree as xml
 
 from rsea_ros.design.mjcf import model_element, text
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports.chain import check_rotary
 from rsea_ros.exports.coverage import CannotSay, Export, Said, Unsaid, coverage_lines
 from rsea_ros.exports.mjcf_effects import EFFECTS, STRUCTURES
 from rsea_ros.exports.mjcf_loop import say_loop
+from rsea_ros.exports.others import acting, sized
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.structure import structured
 
 
 def export_mjcf(rig: Rig) -> Export:
     """Return the model of a rig. Raises RigError for what no MJCF can be made of (see design/mjcf.py)."""
+    check_rotary(rig)
+    rig = acting(rig)
+    finite = sized(rig)
     root = model_element(structured(rig), play_of(rig))
-    said: list[Said] = []
-    unsaid: list[Unsaid] = []
-    for one in say_loop(rig, root):
-        (said if isinstance(one, Said) else unsaid).append(one)  # type: ignore[arg-type]
+    loop, unsaid = say_loop(rig, root)
+    said = [loop]
     for setting in sorted(rig.effects, key=lambda one: effect_named(one.name).order):
         parameters = effect_named(setting.name).complete(setting.parameters)
         try:
+            if setting.name not in finite:
+                raise CannotSay("a parameter of it is infinite")
             if setting.name in STRUCTURES:
                 said.append(Said(setting.name, STRUCTURES[setting.name]))
             elif setting.name in EFFECTS:

@@ -75,9 +75,10 @@ def _current_loop_lag(root: xml.Element, rig: Rig, p: Parameters) -> str:
 
 
 def _torque_saturation(root: xml.Element, rig: Rig, p: Parameters) -> str:
-    name = "ctrlrange" if motor(root).tag == "general" else "forcerange"
-    motor(root).set(name, f"{-p['limit']!r} {p['limit']!r}")
-    return f"actuator {name} {p['limit']:g} N m"
+    name = "forcerange" if motor(root).tag == "pid" else "ctrlrange"
+    limit = min(p["limit"], float(motor(root).get(name, "0 inf").split()[1]))
+    motor(root).set(name, f"{-limit!r} {limit!r}")
+    return f"actuator {name} {limit:g} N m"
 
 
 def _torque_constant_error(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -171,7 +172,7 @@ def _spring_hysteresis(root: xml.Element, rig: Rig, p: Parameters) -> str:
         element = beside(root, f"hysteresis_{k}", "spring")
         element.set("stiffness", repr(float(slope * p["torque"] / p["angle"])))
         element.set("springyield", repr(float(edge * p["angle"])))
-    return f"{ELEMENTS} elasto-plastic springs in parallel (springyield): its large loops, small ones nearly"
+    return f"{ELEMENTS} elasto-plastic springs (springyield): its large loops; small ones are too stiff"
 
 
 def _torque_ripple(root: xml.Element, rig: Rig, p: Parameters) -> str:
@@ -191,10 +192,10 @@ def _voltage_sag(root: xml.Element, rig: Rig, p: Parameters) -> str:
     first = motor(root)
     if first.tag != "general" or first.get("dyntype"):
         raise CannotSay("a dcmotor has no room for the rig's loop or lag beside it")
-    first.tag = "dcmotor"
-    gain = first.attrib.pop("gainprm", "1")
-    if float(gain) != 1.0:
+    if float(first.get("gainprm", "1")) != 1.0:
         raise CannotSay("a dcmotor has no room for a torque constant error beside it")
+    first.tag = "dcmotor"
+    del first.attrib["gainprm"]
     first.set("input", "ff")
     first.set("motorconst", "1")
     first.set("resistance", repr(p["no_load_speed"] / p["limit"]))

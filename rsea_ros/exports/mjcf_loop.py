@@ -11,11 +11,10 @@ from rsea_ros.exports.mjcf_effects import motor
 from rsea_ros.model.rig import Rig
 
 
-def say_loop(rig: Rig, root: xml.Element) -> Iterator[Said | Unsaid]:
-    """Turn the motor into the loop's actuator; yield what it says and what it leaves out."""
+def say_loop(rig: Rig, root: xml.Element) -> tuple[Said, list[Unsaid]]:
+    """Turn the motor into the loop's actuator; return what it says and what it leaves out."""
     if rig.loop is None:
-        yield Said("motor", "motor on the tendon output - housing")
-        return
+        return Said("motor", "motor on the tendon output - housing"), []
     gains = _gains(rig)
     first = motor(root)
     first.tag = "pid"
@@ -26,8 +25,8 @@ def say_loop(rig: Rig, root: xml.Element) -> Iterator[Said | Unsaid]:
     limit = rig["controller.torque_limit"]
     if math.isfinite(limit):
         first.set("forcerange", f"{-limit!r} {limit!r}")
-    yield Said(f"{rig.loop} loop", "pid actuator, " + ", ".join(f"{k} {v:g}" for k, v in gains.items()))
-    yield from _left_out(rig)
+    how = "pid actuator, " + ", ".join(f"{name} {value:g}" for name, value in gains.items())
+    return Said(f"{rig.loop} loop", how), list(_left_out(rig))
 
 
 def _gains(rig: Rig) -> dict[str, float]:

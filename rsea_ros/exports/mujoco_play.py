@@ -28,7 +28,8 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     try:
         model = mujoco.MjModel.from_xml_string(model_text)
     except ValueError as error:
-        raise ParameterError(f"MuJoCo {mujoco.__version__} refuses the model: {error}") from None
+        reason = " ".join(str(error).split())
+        raise ParameterError(f"MuJoCo {mujoco.__version__} refuses the model: {reason}") from None
     data, hold = mujoco.MjData(model), round(1.0 / RATE / STEP)
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.zeros(mujoco.mj_stateSize(model, kind))

@@ -5,14 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.coverage import Said, Unsaid
 from rsea_ros.model.rig import END_NAMES, Rig
 
 
+def acting(rig: Rig) -> Rig:
+    """Return the rig without the effects that have no size: all parameters at their null values."""
+    named = ((one, effect_named(one.name)) for one in rig.effects)
+    return rig.with_effects(*(one for one, e in named if e.complete(one.parameters) != e.null))
+
+
+def sized(rig: Rig) -> dict[str, dict[str, float]]:
+    """Return the parameters of the effects whose every size is a finite number, by name."""
+    complete = {one.name: effect_named(one.name).complete(one.parameters) for one in rig.effects}
+    return {name: p for name, p in complete.items() if all(map(math.isfinite, p.values()))}
+
+
 def unsaid_effects(rig: Rig, said: Sequence[Said], why: str) -> list[Unsaid]:
     """Return the rig's effects that are not said."""
-    names = {one.name for one in said}
-    return [Unsaid(one.name, why) for one in rig.effects if one.name not in names]
+    names, finite = {one.name for one in said}, sized(rig)
+    endless = "a parameter of it is infinite"
+    effects = (one.name for one in rig.effects if one.name not in names)
+    return [Unsaid(name, why if name in finite else endless) for name in effects]
 
 
 def unsaid_parts(rig: Rig, why: str) -> Iterator[Unsaid]:

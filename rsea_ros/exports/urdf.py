@@ -14,6 +14,7 @@ from xml.etree import ElementTree as xml
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.chain import WORLD, Chain, Joint, Link, chain_of
 from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
+from rsea_ros.exports.others import acting, sized
 from rsea_ros.model.rig import Rig
 
 NAMESPACE = "urn:rsea_ros:rig"
@@ -22,6 +23,7 @@ NAMESPACE = "urn:rsea_ros:rig"
 
 def export_urdf(rig: Rig) -> Export:
     """Return the URDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
+    rig = acting(rig)
     chain = chain_of(rig)
     said, unsaid = _coverage(rig, chain, has_springs=False)
     robot = xml.Element("robot", name=rig.name)
@@ -37,6 +39,7 @@ def export_urdf(rig: Rig) -> Export:
 
 def export_sdf(rig: Rig) -> Export:
     """Return the SDF of a rig. Raises RigError for one that is no chain of links (see chain.py)."""
+    rig = acting(rig)
     chain = chain_of(rig)
     said, unsaid = _coverage(rig, chain, has_springs=True)
     root = xml.Element("sdf", {"version": "1.11", "xmlns:rsea": NAMESPACE})
@@ -57,9 +60,12 @@ def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[tuple[Said,
     unsaid = [Unsaid(name, f"{why}; {only}") for name, why in chain.left_out.items()]
     if not has_springs and not rig.rigid_spring:
         unsaid.append(Unsaid("spring.stiffness", f"URDF joints have no spring; {only}"))
+    finite = sized(rig)
     for one in rig.effects:
         how = _EFFECTS.get(one.name)
-        if how is None or (one.name == "hard_stop" and not _stop(rig, chain)):
+        if one.name not in finite:
+            unsaid.append(Unsaid(one.name, f"a parameter of it is infinite; {only}"))
+        elif how is None or (one.name == "hard_stop" and not _stop(rig, chain)):
             unsaid.append(Unsaid(one.name, only))
         else:
             said.append(Said(one.name, how))
@@ -72,6 +78,7 @@ _EFFECTS = {
     "coulomb_friction": "dynamics friction of the gear",
     "torque_saturation": "limit effort of the gear",
     "hard_stop": "limits of the spring's joint",
+    "gravity_error": "mass of the free end",
 }
 
 
@@ -89,15 +96,14 @@ def _stop(rig: Rig, chain: Chain) -> dict[str, float]:
 
 
 def _parameters(rig: Rig, name: str) -> dict[str, float]:
-    found = [effect_named(name).complete(one.parameters) for one in rig.effects if one.name == name]
-    return found[0] if found else {}
+    return sized(rig).get(name, {})
 
 
 def _urdf_link(link: Link) -> xml.Element:
     element = xml.Element("link", name=link.name)
     inertial = xml.SubElement(element, "inertial")
-    x, y = link.centre
-    xml.SubElement(inertial, "origin", xyz=f"{x!r} {y!r} 0")
+    y, z = link.centre
+    xml.SubElement(inertial, "origin", xyz=f"0 {y!r} {z!r}")
     xml.SubElement(inertial, "mass", value=repr(link.mass))
     xml.SubElement(inertial, "inertia", _inertia(link))
     return element
@@ -113,7 +119,7 @@ def _urdf_joint(joint: Joint, rig: Rig) -> xml.Element:
     element = xml.Element("joint", name=joint.name, type="revolute" if stop else "continuous")
     xml.SubElement(element, "parent", link=joint.parent)
     xml.SubElement(element, "child", link=joint.child)
-    xml.SubElement(element, "axis", xyz="0 0 -1" if joint.is_turned else "0 0 1")
+    xml.SubElement(element, "axis", xyz="-1 0 0" if joint.is_turned else "1 0 0")
     xml.SubElement(element, "dynamics", damping=repr(joint.damping), friction=repr(_friction(joint, rig)))
     limits = {"lower": repr(-stop["angle"]), "upper": repr(stop["angle"])} if stop else {}
     effort = _effort(joint, rig)
@@ -136,8 +142,8 @@ def _effort(joint: Joint, rig: Rig) -> float:
 def _sdf_link(link: Link) -> xml.Element:
     element = xml.Element("link", name=link.name)
     inertial = xml.SubElement(element, "inertial")
-    x, y = link.centre
-    xml.SubElement(inertial, "pose").text = f"{x!r} {y!r} 0 0 0 0"
+    y, z = link.centre
+    xml.SubElement(inertial, "pose").text = f"0 {y!r} {z!r} 0 0 0"
     xml.SubElement(inertial, "mass").text = repr(link.mass)
     inertia = xml.SubElement(inertial, "inertia")
     for name, value in _inertia(link).items():
@@ -150,7 +156,7 @@ def _sdf_joint(joint: Joint, rig: Rig) -> xml.Element:
     xml.SubElement(element, "parent").text = joint.parent
     xml.SubElement(element, "child").text = joint.child
     axis = xml.SubElement(element, "axis")
-    xml.SubElement(axis, "xyz").text = "0 0 -1" if joint.is_turned else "0 0 1"
+    xml.SubElement(axis, "xyz").text = "-1 0 0" if joint.is_turned else "1 0 0"
     dynamics = {"damping": joint.damping, "friction": _friction(joint, rig)}
     if joint.stiffness:
         dynamics |= {"spring_reference": 0.0, "spring_stiffness": joint.stiffness}

@@ -71,9 +71,14 @@ def _fit_for_fit(run: Run, rig: Rig) -> Record:
 
 
 def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
-    """Fill in the diagnosis, and return its artefacts. One that cannot be made leaves its reason."""
+    """Fill in the diagnosis, and return its artefacts. One that cannot be made leaves its reason.
+
+    The parameters become those beside the causes: a fit without them takes dry friction for damping and
+    backlash for a softer spring, by as much as the work of the day makes of it (docs/fleet-trends.md).
+    """
     from rsea_ros.diagnosis.diagnose import diagnose
     from rsea_ros.report.diagnosis_json import diagnosis_json
+    from rsea_ros.report.diagnosis_page import final_values
 
     try:
         check_diagnosable(record)
@@ -81,7 +86,9 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     except RseaError as error:
         row["reason"] = f"no diagnosis: {error}"
         return {}
-    row |= {"diagnosis": result.verdict, "causes": [_cause(c) for c in result.causes]}
+    parameters = [_parameter(p) for p in final_values(result)]
+    causes = [_cause(c) for c in result.causes]
+    row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
     return {
         "diagnosis.json": json_text(diagnosis_json(result)),
         "extended.yaml": rig_text(result.extended_rig),

@@ -11,8 +11,9 @@ import math
 import os
 import queue
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import dask
@@ -23,6 +24,7 @@ from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, WorkerLost
 
 SETTINGS: Mapping[str, Any] = {
+    "distributed.worker.preload": ["rsea_ros.fleet.worker"],
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
@@ -30,6 +32,7 @@ SETTINGS: Mapping[str, Any] = {
     "distributed.scheduler.worker-saturation": 1.0,
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.work-stealing": False,
+    "distributed.deploy.lost-worker-timeout": "5s",
 }
 """Tasks wait at the scheduler, so that a worker that ends takes along what it ran and hardly more."""
 PER_WORKER = 3
@@ -40,10 +43,13 @@ COUNTED_EVERY = 10.0
 
 
 class OnDask:
-    """Runs jobs on a cluster; at most PER_WORKER for each worker are in flight."""
+    """Runs jobs on a cluster; at most PER_WORKER for each worker are in flight.
 
-    def __init__(self, client: Any) -> None:
-        self._client = client
+    refill: starts workers anew in the place of those that nobody restarts, killed before they were up.
+    """
+
+    def __init__(self, client: Any, refill: Callable[[], object] = lambda: None) -> None:
+        self._client, self._refill = client, refill
         self._done: queue.Queue[Any] = queue.Queue()
         self._jobs: dict[str, tuple[Job, Any]] = {}
         self._places, self._counted = 0, -math.inf
@@ -53,6 +59,7 @@ class OnDask:
         """How many jobs may be in flight at once."""
         if time.monotonic() - self._counted > COUNTED_EVERY:
             self._counted = time.monotonic()
+            self._refill()
             self._places = PER_WORKER * max(1, self._client.scheduler_info(n_workers=0)["n_workers"])
         return self._places
 
@@ -122,7 +129,7 @@ def on_this_machine(workers: int, memory: int, dashboard: str) -> Iterator[tuple
         )
         client = distributed.Client(cluster, set_as_default=False)  # type: ignore[no-untyped-call]
         with cluster, client:
-            yield OnDask(client), cluster.dashboard_link
+            yield OnDask(client, partial(cluster.scale, workers)), cluster.dashboard_link
 
 
 def cores() -> int:

@@ -59,9 +59,6 @@ def _plain(column: pa.Array) -> npt.NDArray[Any]:
     if pa.types.is_boolean(column.type):
         return np.asarray(column.fill_null(False), np.bool_)
     values = np.empty(len(column), object)
-    values[:] = [item or "" for item in column.to_pylist()] if pa.types.is_string(column.type) else _lists(column)
+    none: Any = "" if pa.types.is_string(column.type) else []
+    values[:] = [none if value is None else value for value in column.to_pylist()]
     return values
-
-
-def _lists(column: pa.Array) -> list[list[dict[str, Any]]]:
-    return [item or [] for item in column.to_pylist()]

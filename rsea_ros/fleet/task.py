@@ -5,6 +5,7 @@ It needs the recording and nothing else: rig and topics come along, the row and 
 
 from __future__ import annotations
 
+import os
 import resource
 import time
 import traceback
@@ -114,7 +115,11 @@ def _fault(error: Exception) -> str:
 def _forget_peak() -> None:
     """Let the system count this process's peak of memory anew, where it can."""
     with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+        switch = os.open("/proc/self/clear_refs", os.O_WRONLY)
+        try:
+            os.write(switch, b"5")
+        finally:
+            os.close(switch)
 
 
 def _peak() -> int:

@@ -1,15 +1,15 @@
 """Changes of a joint against its model: alarms, the cause of each, and the model as the joint is now.
 
-A cause that is sure becomes part of the model, so that a second change is compared with the joint as it is. One
-that is not sure is said with its probability, and asked for again when more has been seen: play on one flank is
-a shifted zero until the torque changes its sign.
+A cause that is sure becomes part of the model, so that a second change is compared with the joint as it is.
+One that is not sure is said with its probability, and asked for again when more has been seen: play on one
+flank is a shifted zero until the torque changes its sign.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,9 @@ EXPLAINED = 0.5
 SIMPLER = 5.0
 """Cost by which one cause in place of the last may be worse than that and another one beside it."""
 LOUD, LOUDER = 2.0, 5.0
-"""Standard deviations of a look's loudness: up to the first it is usual, from the second on it is a change."""
+"""Standard deviations of a look's loudness: up to the first it is usual, beyond the second it is a change."""
+PATIENT = 6
+"""Looks that a fit has waited for, from which a change that no cause explains is said to be unexplained."""
 REMEMBERED = 64
 
 
@@ -49,10 +51,14 @@ class _Base:
 
 @dataclass(frozen=True)
 class Answer:
-    """Causes beside the model as it is, and in place of the last one that was taken over."""
+    """Causes beside the model as it is, and in place of the last one that was taken over.
+
+    The second are fitted to some looks more, right after that one: first is what the model leaves of these.
+    """
 
     beside: Sequence[Cause]
     instead: Sequence[Cause]
+    first: float
 
 
 Job = Callable[[], Answer]
@@ -62,10 +68,12 @@ class Changes:
     """Give looks with `take`; when `job` is there, run it and give its result to `conclude`."""
 
     def __init__(
-        self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], scatter: Scatter, settings: Settings
-    ) -> None:
+        self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], models: Mapping[str, float],
+        scatter: Scatter, settings: Settings,
+    ) -> None:  # fmt: skip
+        """models: values of the last model by name, against which sizes are said."""
         self._noise, self._scatter, self._settings = noise, scatter, settings
-        self._models = {h.name: h.value for h in hypotheses}
+        self._models = dict(models)
         self._looks: deque[Look] = deque(maxlen=REMEMBERED)
         self._before: _Base | None = None
         self.found: dict[str, Finding] = {}
@@ -107,24 +115,27 @@ class Changes:
         since = min(max(self._cusum.since, 1), len(self._looks))
         recent = list(self._looks)[-since:]
         self._began = recent[0].t[0] + SETTLE
-        first = [k for k in self._looks if self._before is not None and k.t[0] >= self._base.since]
-        looks = list({look.end: look for look in (*first[:2], *_spread(recent, self._settings.fitted))}.values())
-        base, before, scale = self._base, self._before, self._scatter.scale
+        looks = _spread(recent, self._settings.fitted)
+        first = [look for look in self._looks if self._base.since <= look.t[0] < recent[0].t[0]][:2]
+        base, before = self._base, self._before
 
         def fit() -> Answer:
-            def causes(of: _Base) -> Sequence[Cause]:
-                fitter = Fitter(of.rig, self._noise, self._settings.hold, looks, scale)
-                return fitter.causes(of.hypotheses, starts)
-
-            return Answer(causes(base), causes(before) if before is not None else ())
+            beside = self._fitter(base, looks).causes(base.hypotheses, starts)
+            if before is None:
+                return Answer(beside, (), 0.0)
+            instead = self._fitter(before, (*first, *looks)).causes(before.hypotheses, starts)
+            return Answer(beside, instead, self._fitter(base, first).now())
 
         self.job = fit
+
+    def _fitter(self, base: _Base, looks: Sequence[Look]) -> Fitter:
+        return Fitter(base.rig, self._noise, self._settings.hold, looks, self._scatter.scale)
 
     def conclude(self, answer: Answer) -> Finding | None:
         """Take the result of the job; return the finding that is new, if one is."""
         self.job = None
-        best = answer.beside[0]
-        if self._before is not None and answer.instead and answer.instead[0].cost < best.cost + SIMPLER:
+        both = answer.beside[0].cost + answer.first
+        if self._before is not None and answer.instead and answer.instead[0].cost < both + SIMPLER:
             self.found.pop(self._before.last, None)
             self._base, self._before = replace(self._before, since=self._base.since), None
             return self._weigh(answer.instead)
@@ -135,11 +146,12 @@ class Changes:
         best, code = causes[0], causes[0].hypothesis.code
         confidence = sum(c.probability for c in causes if c.hypothesis.code == code)
         if best.explained < EXPLAINED:
-            return self._later(unexplained(self._began, 1.0 - max(best.explained, 0.0)))
+            finding = unexplained(self._began, 1.0 - max(best.explained, 0.0))
+            return self._later(finding if self._patience >= PATIENT else None)
         self.found.pop(UNEXPLAINED, None)
         finding = self._finding(best, confidence)
         if confidence < SURE:
-            return self._later(finding)
+            return self._later(finding if _is_change(best.hypothesis, finding.size) else None)
         return self._adopt(best, finding)
 
     def _finding(self, cause: Cause, confidence: float) -> Finding:
@@ -148,13 +160,15 @@ class Changes:
         since = self.found[h.name].since if h.name in self.found else self._began
         return Finding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
 
-    def _later(self, finding: Finding) -> Finding | None:
+    def _later(self, finding: Finding | None) -> Finding | None:
         """Say what is not sure, and ask again after as many looks as were waited for before, twice over."""
         self._patience = min(2 * self._patience + 2, REMEMBERED)
         self._wait = self._patience
+        if finding is None:
+            return None
+        known = finding.name in self.found
         for name in [n for n, f in self.found.items() if f.confidence < SURE]:
             del self.found[name]
-        known = finding.name in self.found
         self.found[finding.name] = finding
         return None if known else finding
 
@@ -165,14 +179,19 @@ class Changes:
         hypotheses = tuple(adopted if other.name == h.name else other for other in self._base.hypotheses)
         for name in [n for n, f in self.found.items() if f.confidence < SURE]:
             del self.found[name]
-        self._before = self._base
-        self._before = replace(self._base, last=h.name)
+        changed = _is_change(h, finding.size)
+        self._before = replace(self._base, last=h.name) if changed else None
         self._begin(_Base(h.changed(self._base.rig, cause.change), hypotheses, self._began - SETTLE))
-        if abs(finding.size) <= h.inner + 0.5 * h.least:
+        if not changed:
             self.found.pop(h.name, None)
             return None
         self.found[h.name] = finding
         return finding
+
+
+def _is_change(hypothesis: Hypothesis, size: float) -> bool:
+    """Tell whether a parameter that is so far off the last model is beyond that model's doubt."""
+    return abs(size) > hypothesis.inner + 0.5 * hypothesis.least
 
 
 def _spread(looks: Sequence[Look], count: int) -> list[Look]:

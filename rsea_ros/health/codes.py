@@ -18,7 +18,10 @@ class Code(NamedTuple):
 
 TABLE = (
     Code("RSEA_STIFFNESS", "stiffness of the spring changed", "change, N m/rad"),
-    Code("RSEA_FRICTION", "viscous or Coulomb friction of the gear changed", "change, N m s/rad or N m"),
+    Code(
+        "RSEA_FRICTION", "viscous or Coulomb friction of the gear changed",
+        "change, N m s/rad, N m, or of the factor of both, 1",
+    ),
     Code("RSEA_BACKLASH", "play between gear and spring appeared or changed", "change of the gap, rad"),
     Code("RSEA_DELAY", "commands take effect later, or sooner, than they did", "change, s"),
     Code("RSEA_FT_GAIN", "calibration of the F/T sensor changed", "change of the gain, 1"),

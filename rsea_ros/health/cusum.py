@@ -6,8 +6,8 @@ for each parameter and each sign, a look adds
     s = ((outer - inner) c - (outer^2 - inner^2) A / 2) / phi,    g = max(0, g + s)
 
 and E exp(s) <= 1 for every change up to inner. Hence (Lorden 1971) the mean number of looks to a false alarm
-is at least exp(h): with m such sums and looks T apart false alarms come at most every exp(h) T / m. A look that
-nothing moves has c = A = 0 and adds nothing. phi is how many times the scores scatter more than white
+is at least exp(h): with m such sums and looks T apart false alarms come at most every exp(h) T / m. A look
+that nothing moves has c = A = 0 and adds nothing. phi is how many times the scores scatter more than white
 innovations let them. A single look adds at most a share of h: a knock or an outlier is no change.
 Sources: Page, Biometrika 41, 1954; Lorden, Annals of Mathematical Statistics 42, 1971, theorem 2.
 """
@@ -21,8 +21,8 @@ import numpy as np
 from rsea_ros.signals import FloatArray
 
 HOUR = 3600.0
-SHARE = 1.0 / 3.0
-"""Of the threshold that one look can add."""
+SHARE = 0.34
+"""Of the threshold that one look can add: three looks must agree."""
 SUSPECT = 0.25
 """Of the threshold, from which a sum is a suspicion."""
 
@@ -36,9 +36,13 @@ class Cusum:
     """The sums of changes, both signs. inner, outer: shape (p,), in the unit of each. h: threshold."""
 
     def __init__(self, inner: FloatArray, outer: FloatArray, h: float) -> None:
+        self._inner, self._outer, self.h = inner, outer, h
         self._linear, self._square = outer - inner, 0.5 * (outer**2 - inner**2)
-        self.h = h
         self.clear()
+
+    def like(self, h: float) -> Cusum:
+        """Return the same sums with another threshold."""
+        return Cusum(self._inner, self._outer, h)
 
     def clear(self) -> None:
         """Begin anew."""

@@ -1,10 +1,11 @@
-"""Recursive estimates of all parameters together: forgetting where a look tells something, a hold where not.
+"""Recursive estimates of each parameter: forgetting where a look tells something, a hold where not.
 
-    F <- D F D + A / phi,   r <- D r + c / phi,   change = (F + F_0)^-1 r
+    F <- l F + A / phi,   r <- l r + c / phi,   change = r / (F + F_0)
 
-F_0 is a weak prior, so what looks alike to the data gets a wide interval. D forgets a parameter only by as
-much as the look tells of it: what is not excited keeps what was known, and the look is said to hold it.
-Source: Cao, Schwartz, Automatica 36, 2000 (directional forgetting).
+of each parameter alone, the others as the model has them: together, calibrations and stiffness would follow
+the smallest misfit. l forgets only by as much as the look tells of a parameter: what is not excited keeps
+what was known, and the look is said to hold it. F_0 is a weak prior.
+Source: Cao, Schwartz, Automatica 36, 2000 (forgetting where there is excitation).
 """
 
 from __future__ import annotations
@@ -40,18 +41,17 @@ class Estimates:
     def __init__(self, hypotheses: Sequence[Hypothesis]) -> None:
         self._hypotheses = tuple(hypotheses)
         p = len(self._hypotheses)
-        self._information, self._score = np.zeros((p, p)), np.zeros(p)
-        self._prior = np.diag([1.0 / (WEAK * max(h.step, h.outer)) ** 2 for h in self._hypotheses])
+        self._information, self._score = np.zeros(p), np.zeros(p)
+        self._prior = np.array([1.0 / (WEAK * max(h.step, h.outer)) ** 2 for h in self._hypotheses])
         self._held = np.ones(p, dtype=bool)
 
     def take(self, score: FloatArray, information: FloatArray, phi: FloatArray) -> None:
         """Take in a look: c (p,), A (p, p), dispersion (p,)."""
         own = np.diag(information) / phi
-        self._held = own < np.diag(self._prior)
-        told = own / np.maximum(np.diag(self._information) / MEMORY, np.maximum(own, 1e-300))
-        forget = np.sqrt(1.0 - told / MEMORY)
-        root = np.sqrt(phi)
-        self._information = forget[:, None] * self._information * forget + information / np.outer(root, root)
+        self._held = own < self._prior
+        told = own / np.maximum(self._information / MEMORY, np.maximum(own, 1e-300))
+        forget = 1.0 - told / MEMORY
+        self._information = forget * self._information + own
         self._score = forget * self._score + score / phi
 
     def hold(self) -> None:
@@ -60,8 +60,9 @@ class Estimates:
 
     def estimates(self) -> list[Estimate]:
         """Return value and interval of each parameter."""
-        covariance = np.linalg.inv(self._information + self._prior)
-        change, half = covariance @ self._score, SURE * np.sqrt(np.diag(covariance))
+        variance = 1.0 / (self._information + self._prior)
+        common = np.array([h.common for h in self._hypotheses])
+        change, half = variance * self._score, SURE * np.sqrt(variance + common**2)
         return [
             Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
             for h, c, d, held in zip(

@@ -11,6 +11,11 @@ from rsea_ros.model.rig import EffectSetting, Rig
 
 SURE = 1.96
 """Standard deviations on either side of a 95 % interval."""
+FACTOR = "friction.factor"
+GAINS = ("torque_constant_error.gain", "ft_gain_error.gain")
+"""Calibrations, which no record of the joint alone can tell from its stiffness and inertia."""
+GAIN_DOUBT = 0.01
+"""Relative one-sigma doubt of the calibration of F/T sensor and torque constant, for which a model stands."""
 EFFECT_DOUBT = 0.1
 """Relative one-sigma doubt of an effect's parameter in a model.yaml, which states none."""
 
@@ -21,7 +26,8 @@ class Hypothesis:
 
     value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
     alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
-    below which the data cannot show it, as a delay within a sample.
+    below which the data cannot show it, as a delay within a sample. relative: `apply` takes the new value
+    over the old one. common: one sigma of the value that every look has in common, as that of a calibration.
     """
 
     code: str
@@ -35,6 +41,8 @@ class Hypothesis:
     high: float
     apply: Callable[[Rig, float], Rig]
     grain: float = 0.0
+    relative: bool = False
+    common: float = 0.0
 
     @property
     def inner(self) -> float:
@@ -48,25 +56,51 @@ class Hypothesis:
 
     def changed(self, rig: Rig, change: float) -> Rig:
         """Return the rig with the parameter changed, within its bounds."""
-        return self.apply(rig, min(max(self.value + change, self.low), self.high))
+        value = min(max(self.value + change, self.low), self.high)
+        return self.apply(rig, value / self.value if self.relative else value)
 
 
 def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
     """Return what may change in a joint. period: s, between measurements."""
-    friction = _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5)
-    found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25), friction]
+    found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
+    found.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
+    found.append(_friction(rig))
     delay = _effect(rig, "command_delay", "delay", "RSEA_DELAY", 0.25, 0.5 * period, period)
     found.append(replace(delay, grain=period))
-    found.append(_effect(rig, "torque_constant_error", "gain", "RSEA_TORQUE_CONSTANT", 0.0, 0.05, 0.05))
+    gain = _effect(rig, "torque_constant_error", "gain", "RSEA_TORQUE_CONSTANT", 0.0, 0.05, 0.05)
+    found.append(replace(gain, doubt=GAIN_DOUBT))
     if not rig.rigid_spring:
         found.append(_field(rig, "spring.stiffness", "RSEA_STIFFNESS", 0.05))
         if rig.ft_end == "spring_end":
             found.append(_effect(rig, "backlash", "gap", "RSEA_BACKLASH", 0.25, 1e-3, 2e-3))
     if "ft" in rig.sensors and not rig.rigid_spring:
         sigma = max(rig.sensors["ft"].noise, rig.sensors["ft"].quantum)
-        found.append(_effect(rig, "ft_gain_error", "gain", "RSEA_FT_GAIN", 0.0, 0.03, 0.05))
+        gain = _effect(rig, "ft_gain_error", "gain", "RSEA_FT_GAIN", 0.0, 0.03, 0.05)
+        found.append(replace(gain, doubt=GAIN_DOUBT))
         found.append(_effect(rig, "ft_bias", "bias", "RSEA_FT_BIAS", 0.0, 10.0 * sigma, 10.0 * sigma))
     return tuple(h for h in found if h is not None)
+
+
+def nuisances_of(rig: Rig) -> tuple[Hypothesis, ...]:
+    """Return what no code stands for and the model may have a little wrong: inertia, the spring's damping."""
+    names = ["rotor.reflected_inertia", *([] if rig.rigid_spring else ["spring.damping"])]
+    found = (_field(rig, name, "", 0.1) for name in names)
+    return tuple(h for h in found if h is not None)
+
+
+def _friction(rig: Rig) -> Hypothesis:
+    """Return the hypothesis that viscous and Coulomb friction grow together, as in a cold or a worn gear."""
+    name = "rotor.reflected_damping"
+    dry = _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.0, 0.0, 0.0)
+
+    def scaled(rig: Rig, factor: float) -> Rig:
+        torque = next((e.parameters["torque"] for e in rig.effects if e.name == "coulomb_friction"), 0.0)
+        return dry.apply(rig.with_values({name: factor * rig[name]}), factor * torque)
+
+    return Hypothesis(
+        "RSEA_FRICTION", FACTOR, "1", 1.0, EFFECT_DOUBT, 0.2, 0.2, 0.05, 20.0, scaled,
+        relative=True,
+    )  # fmt: skip
 
 
 def _field(rig: Rig, name: str, code: str, part: float) -> Hypothesis | None:

@@ -17,8 +17,8 @@ FEWEST = 20
 
 
 class Look(NamedTuple):
-    """Events by stamp: t (s, shape (n,)), kind (of observer/log.py), values (n, 2): position and motor torque,
-    or ft, or command. judged: where the innovations count, shape (n,).
+    """Events by stamp: t (s, shape (n,)), kind (of observer/log.py), values (n, 2): position and motor
+    torque, or ft, or command. judged: where the innovations count, shape (n,).
     """
 
     t: FloatArray

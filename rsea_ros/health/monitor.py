@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.health.bank import Bank, Evidence
+from rsea_ros.errors import RigError
+from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import Answer, Changes
 from rsea_ros.health.estimates import Estimate
 from rsea_ros.health.finding import Finding, sensor_findings
-from rsea_ros.health.hypotheses import hypotheses_of
+from rsea_ros.health.hypotheses import FACTOR, GAINS, Hypothesis, hypotheses_of, nuisances_of
 from rsea_ros.health.look import FEWEST, Cutter, Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
 from rsea_ros.health.settings import Settings
+from rsea_ros.health.tuning import tuned
 from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
@@ -23,6 +26,8 @@ from rsea_ros.signals import FloatArray, IntArray
 
 JUMP = 1.0
 """s. Stamps that jump so far, either way, are of another run or of a clock that was set: looks begin anew."""
+USUAL = 1e-3
+"""s between measurements where a look has too few to tell."""
 STILL = 30.0
 """Standard deviations of the position within which a look moved nothing that could tell of the joint."""
 
@@ -34,17 +39,25 @@ class Monitor:
     """
 
     def __init__(self, rig: Rig, noise: Noise, settings: Settings | None = None) -> None:
+        """Raises RigError for a rig that the observer cannot follow."""
+        if rig.loop is not None:
+            raise RigError(f"rig {rig.name}: a position loop commands it, expected torques as commands")
         self._rig, self._noise, self._settings = rig, noise, settings or Settings()
+        Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold)
+        self._least = STILL * noise.position if math.isfinite(noise.position) else 0.0
         self.sensors = Sensors(rig)
-        self._cutter = Cutter(self._settings.every)
-        self._bank: Bank | None = None
-        self._first: list[tuple[Look, Evidence]] = []
-        self.changes: Changes | None = None
         self.looks = self.still = self.jumps = self.late = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Learn anew how the joint is."""
+        self._cutter = Cutter(self._settings.every)
+        self._first: list[Look] = []
+        self.changes: Changes | None = None
         self.now = -math.inf
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
-        """Take in events (see Look), sorted by stamp; those before what was taken are counted and left out."""
+        """Take in events (see Look), sorted by stamp; those before what was taken are counted, not used."""
         if len(t) and math.isfinite(self.now) and abs(t[0] - self.now) > JUMP:
             self.jumps += 1
             self._cutter.clear()
@@ -87,7 +100,7 @@ class Monitor:
 
     def _judge(self, look: Look) -> None:
         self.looks += 1
-        if self.sensors.frozen or look.travel() < STILL * self._noise.position:
+        if self.sensors.frozen or look.travel() < self._least:
             self.still += 1
             if self.changes is not None:
                 self.changes.estimates.hold()
@@ -97,17 +110,27 @@ class Monitor:
             self._learn(look)
 
     def _learn(self, look: Look) -> None:
-        """Gather the first looks; then begin, with what they showed."""
-        if self._bank is None:
-            t = look.t[look.kind == STATE]
-            period = float(np.median(np.diff(t))) if len(t) > FEWEST else 1e-3
-            self._hypotheses = hypotheses_of(self._rig, period)
-            self._bank = Bank(self._rig, self._noise, self._hypotheses, self._settings.hold)
-        self._first.append((look, self._bank.judge(look)))
+        """Gather the first looks; then begin, with the values and the scatter that they show."""
+        self._first.append(look)
         if len(self._first) < self._settings.learn:
             return
-        scatter = scatter_of([evidence for _, evidence in self._first])
-        self.changes = Changes(self._rig, self._noise, self._hypotheses, scatter, self._settings)
-        for first in self._first:
-            self.changes.take(*first)
-        self._first = []
+        t = look.t[look.kind == STATE]
+        period = float(np.median(np.diff(t))) if len(t) > FEWEST else USUAL
+        models = hypotheses_of(self._rig, period)
+        single = (*(h for h in models if h.name not in (FACTOR, *GAINS)), *nuisances_of(self._rig))
+        rig, now = tuned(self._rig, self._noise, single, self._first, self._settings.hold)
+        known = {h.name: h for h in now}
+        hypotheses = tuple(
+            replace(h, value=known[h.name].value, common=known[h.name].common) if h.name in known else h
+            for h in models
+        )
+        self._start(rig, hypotheses, {h.name: h.value for h in models})
+
+    def _start(self, rig: Rig, hypotheses: tuple[Hypothesis, ...], models: dict[str, float]) -> None:
+        """Watch for changes from a rig, and from the first looks on."""
+        bank = Bank(rig, self._noise, hypotheses, self._settings.hold)
+        first, self._first = [(look, bank.judge(look)) for look in self._first], []
+        scatter = scatter_of([evidence for _, evidence in first])
+        self.changes = Changes(rig, self._noise, hypotheses, models, scatter, self._settings)
+        for each in first:
+            self.changes.take(*each)

@@ -62,7 +62,7 @@ class _Fit:
 
 
 class Fitter:
-    """Fits over some looks. scale: standard deviation of the innovations by channel when all is right, (3,)."""
+    """Fits over some looks. scale: standard deviation of the innovations by channel when all is right."""
 
     def __init__(self, rig: Rig, noise: Noise, hold: float, looks: Sequence[Look], scale: FloatArray) -> None:
         self._rig, self._noise, self._hold = rig, noise, hold
@@ -81,13 +81,17 @@ class Fitter:
         phi = max(1.0, min(f.cost for f in fits) / usual)
         gains = np.array([(cost(before) - f.cost) / phi for f in fits])
         weights = np.exp(np.clip(gains - gains.max(), -700.0, 0.0))
+        shares = (weights / weights.sum()).tolist()
+        explained = [(excess + usual - f.cost) / max(excess, 1.0) for f in fits]
         found = [
-            Cause(
-                f.hypothesis, f.change, _interval(f, phi), p, (excess + usual - f.cost) / max(excess, 1.0), f.cost
-            )  # fmt: skip
-            for f, p in zip(fits, (weights / weights.sum()).tolist(), strict=True)
+            Cause(f.hypothesis, f.change, _interval(f, phi), share, part, f.cost)
+            for f, share, part in zip(fits, shares, explained, strict=True)
         ]
         return sorted(found, key=lambda cause: -cause.probability)
+
+    def now(self) -> float:
+        """Return what the rig as it is leaves of the looks; zero without any."""
+        return cost(self._innovations(self._rig)) if self._looks else 0.0
 
     def _start(self, hypothesis: Hypothesis, start: float) -> _Point:
         """Return the best of some changes to begin with."""

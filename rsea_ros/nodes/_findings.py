@@ -1,4 +1,4 @@
-"""Findings of the health of a joint as statuses on /diagnostics, one for each code, whether it holds or no."""
+"""Findings of a joint's health as statuses on /diagnostics, one for each code, whether it holds or not."""
 
 from __future__ import annotations
 

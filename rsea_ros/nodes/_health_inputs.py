@@ -23,7 +23,7 @@ Keep = Callable[[str, str, int, bytes], None]
 
 
 class Inputs:
-    """Best-effort subscriptions that nothing waits for. keep: gets topic, type, arrival (ns) and bytes of all."""
+    """Best-effort subscriptions; nothing waits for them. keep: gets topic, type, arrival (ns), bytes."""
 
     def __init__(self, node: Node, axis: str, joint: str, keep: Keep) -> None:
         self._sign, along = sign_and_index(axis)

@@ -48,7 +48,7 @@ class Ring:
 
 
 class Keeper:
-    """Writes bags in a thread. folder: of the bags; most: that it may hold; after: s from an alarm to a bag."""
+    """Writes bags in a thread. folder: of the bags; most: that it may hold; after: s from alarm to bag."""
 
     def __init__(self, ring: Ring, folder: Path, most: int, after: float) -> None:
         self._ring, self._folder, self._most, self._after = ring, folder, most, after
@@ -87,7 +87,7 @@ class Keeper:
         (_, code, since), self._due = self._due, None
         held = len([p for p in self._folder.iterdir() if p.is_dir()]) if self._folder.is_dir() else 0
         if held >= self._most:
-            self.trouble = f"no bag kept: {self._folder} holds {held}, expected fewer than {self._most} (bags)"
+            self.trouble = f"no bag kept: {self._folder} holds {held}, expected less than {self._most} (bags)"
             return
         path = unused(self._folder / f"{time.strftime('%Y%m%d-%H%M%S')}-{code}")
         self._writing = self._pool.submit(_write, path, self._ring.messages(), since)

@@ -45,7 +45,7 @@ class Mailbox:
         """fields: name and index of each number; one that a message does not have is nan.
 
         joint: name that a message with names must have; empty: any. most: names that it may have.
-        keep: gets arrival (ns) and bytes of all.
+        keep: gets arrival (ns), bytes of what is read.
         """
         self._node, self._topic, self._refuse, self._admit = node, topic, refuse, admit
         self._keep = keep
@@ -68,12 +68,12 @@ class Mailbox:
                     return
                 if self._admit is not None and not self._admit(message[1]["publisher_gid"]["data"]):
                     continue
-                if self._keep is not None:
-                    self._keep(message[1]["received_timestamp"], message[0])
                 try:
                     stamp, numbers = self._reader.read(message[0])
                 except ParameterError as error:
                     self._refuse()
                     self._node.get_logger().error(f"{self._topic}: {error}", throttle_duration_sec=1.0)
                 else:
+                    if self._keep is not None:
+                        self._keep(message[1]["received_timestamp"], message[0])
                     yield stamp, numbers, message[1]["received_timestamp"]

@@ -21,6 +21,8 @@ from rsea_ros.watch.command import Bounds, Commander
 
 LEAD = SECOND // 50
 """ns by which a command is published before it takes effect: longer than this process is held up."""
+MARGIN = SECOND // 200
+"""A command that has less than this left until it takes effect is left out, as by excite."""
 LIMITS = ("torque_limit", "slew_limit", "soft_start")
 """Parameters of a driver; a plant has none."""
 LOOK = 0.5
@@ -73,8 +75,9 @@ class WatchCommand:
 
     def _step(self, stamp: int) -> None:
         assert self._cycle is not None
-        torque = self.commander.torque((stamp - self._cycle.anchor.offset) / SECOND)
-        if torque is not None:
+        anchor = self._cycle.anchor
+        torque = self.commander.torque((stamp - anchor.offset) / SECOND)
+        if torque is not None and stamp + LEAD - anchor.now() > MARGIN:
             self._publisher.publish(self._writer.write(stamp + LEAD, [torque]))
 
     def _first(self) -> int:

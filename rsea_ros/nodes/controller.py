@@ -34,7 +34,10 @@ CLOSING_ZEROS = 3
 
 
 class Controller:
-    """One command for each measurement, stamped with the instant of the next: one sample of delay, always."""
+    """One command for each measurement, stamped with the place of the next: one sample of delay, always.
+
+    Not with the measurement's own stamp and a period: one that is late would act in the cycle after.
+    """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
@@ -106,7 +109,7 @@ class Controller:
         if fault := self._judge.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
         self._torque = torque
-        self._publish(stamp + round(self._period))
+        self._publish(self._grid.next)
         self._last = stamp
         self._steps, self._missed = self._steps + 1, self._missed + missed
         self._limited += self._controller.share.limited

@@ -20,11 +20,11 @@ from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._findings import FindingsPublisher, instant, sentence
 from rsea_ros.nodes._health import OK, STEADY, WARN, Health, Report
-from rsea_ros.nodes._health_inputs import Inputs
+from rsea_ros.nodes._health_inputs import Events, Inputs
 from rsea_ros.nodes._kept import Keeper, Ring
 from rsea_ros.nodes._model_noise import noise_from
 from rsea_ros.nodes._parameters import AXIS, JOINT, Parameter
-from rsea_ros.nodes._run import run_node
+from rsea_ros.nodes._run import NAMESPACE, run_node
 
 TABLE = (
     Parameter(
@@ -56,7 +56,7 @@ class HealthNode:
     """Reads the topics four times a second; a thread fits causes, another one writes bags."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
-        self._node, self._rig_name = node, values["rig"]
+        self._node, self._rig_name, self._axis = node, values["rig"], values["axis"]
         rig = load_rig(values["rig"])
         settings = Settings(
             rate=values["false_alarms"], every=values["every"], learn=values["learn"], hold=WATCHDOG / SECOND
@@ -79,15 +79,25 @@ class HealthNode:
         events = self._inputs.take()
         if len(events[0]):
             self._heard = time.monotonic()
+        try:
+            self._judge(events)
+        except (ArithmeticError, ValueError) as error:
+            self._node.get_logger().error(f"begins anew: {type(error).__name__}: {error}")
+            self._monitor.begin()
+        if (path := self._keeper.poll()) is not None:
+            self._node.get_logger().warning(f"kept {path}: {self._command(path)}")
+            self._health.publish()
+
+    def _judge(self, events: Events) -> None:
+        """Give what came to the monitor, and its fits to the thread."""
         self._monitor.take(*events)
         if self._fit is None and self._monitor.job is not None:
             self._fit = self._pool.submit(self._monitor.job)
         elif self._fit is not None and self._fit.done():
             done, self._fit = self._fit, None
-            self._told(self._monitor.conclude(done.result()))
-        if (path := self._keeper.poll()) is not None:
-            self._node.get_logger().warning(f"kept {path}: {self._command(path)}")
-            self._health.publish()
+            answer = done.result()
+            if self._monitor.job is not None:
+                self._told(self._monitor.conclude(answer))
 
     def _told(self, finding: Finding | None) -> None:
         """Say what is new, and keep a bag of it."""
@@ -99,7 +109,10 @@ class HealthNode:
         self._statuses.publish()
 
     def _command(self, path: Path) -> str:
-        return f"rsea diagnose {path / 'after'} --rig {self._rig_name}"
+        name = self._node.get_namespace()
+        elsewhere = f" --namespace {name}" if name != f"/{NAMESPACE}" else ""
+        axis = f" --axis={self._axis}" if self._axis != AXIS.default else ""
+        return f"rsea diagnose {path / 'after'} --rig {self._rig_name}{elsewhere}{axis}"
 
     def _report(self) -> Report:
         monitor, inputs = self._monitor, self._inputs

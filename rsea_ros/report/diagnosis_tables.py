@@ -12,7 +12,7 @@ from rsea_ros.report import words
 from rsea_ros.report.page import code, paragraph, section
 from rsea_ros.signals import UNITS
 
-_EXCITE = ("kind", "amplitude", "noise", "low", "high", "duration")
+_EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")
 """Settings that are parameters of the node excite."""
 
 
@@ -54,13 +54,14 @@ def experiment_section(experiment: Experiment) -> str:
     """Return what the next run would tell, its settings, and the command that plays it."""
     settings = words.sentence(say.excitation(experiment.excitation))
     run = paragraph(f"{settings}.") if settings else ""
-    why = paragraph(say.prose(experiment.why))
-    return section("The run that would decide", why, run, _command(experiment))
+    title = "The run that would decide" if experiment.excitation else "What would decide"
+    return section(title, paragraph(say.prose(experiment.why)), run, _command(experiment))
 
 
 def _command(experiment: Experiment) -> str:
-    settings = {k: v for k, v in experiment.excitation.items() if k in _EXCITE}
-    if "kind" not in settings:
-        return ""
+    given = experiment.excitation
+    settings = {k: given[k] for k in _EXCITE if k in given}
+    if "kind" not in settings or given.get("unit") != UNITS["command"]:
+        return ""  # excite plays torques, no positions
     options = " ".join(f"-p {k}:={v}" for k, v in settings.items())
     return f"<p class='under'>{code(f'ros2 run rsea_ros excite --ros-args {options}')}</p>"

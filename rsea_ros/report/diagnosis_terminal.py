@@ -43,7 +43,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
     for sentence in (*say.confusions(d), *d.statements):
         yield "unclear", sentence
     if d.next_experiment is not None:
-        yield "next run", _next(d.next_experiment)
+        yield "next run" if d.next_experiment.excitation else "decides", _next(d.next_experiment)
     for line in fault_lines(d.faults):
         yield "data", line
 

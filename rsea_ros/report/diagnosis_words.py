@@ -109,12 +109,16 @@ def confusions(diagnosis: Diagnosis) -> list[str]:
     ]
 
 
+_BY_THE_WAY = ("rate", "seed", "period")
+"""Settings of an experiment that only the command that plays it needs."""
+
+
 def excitation(settings: Mapping[str, float | str]) -> str:
     """Return `chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s` of an experiment."""
-    known = {k: v if isinstance(v, str) else f"{v:.3g}" for k, v in settings.items()}
+    known = {k: v if isinstance(v, str) else f"{v:.3g}" for k, v in settings.items() if k not in _BY_THE_WAY}
     parts = [known.pop("kind", "")]
     torque = words.unit(known.pop("unit", "N m"))
-    parts += [f"{k} {known.pop(k)} {torque}" for k in ("amplitude", "noise") if k in known]
+    parts += [f"{k} {known.pop(k)} {torque}" for k in ("amplitude", "noise", "peak") if k in known]
     if {"low", "high"} <= set(known):
         parts.append(f"{known.pop('low')} to {known.pop('high')} Hz")
     parts += [f"{known.pop('duration')} s"] if "duration" in known else []

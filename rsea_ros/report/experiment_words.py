@@ -31,8 +31,9 @@ def verdict(advice: Advice) -> str:
         return f"No run within the limits tells {listed(names)} apart"
     if len(names) == 1:
         times = 2.718281828**p.sharpened
-        return f"A {shape_words(p)} narrows what is known of {names[0]} {times:.3g} times"
-    return f"A {shape_words(p)} is expected to decide between {listed(names)} in {p.decided:.0%} of cases"
+        return f"The next run narrows what is known of {names[0]} {times:.3g} times: {shape_words(p)}"
+    share = f"{100.0 * p.decided:.0f} %"
+    return f"The next run is expected to decide between {listed(names)} in {share} of cases: {shape_words(p)}"
 
 
 def proof_words(proof: Proof) -> str:

@@ -51,17 +51,17 @@ def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT)
     return alarms_of(fleet_trends(history, recordings, settings), recordings)
 
 
-def alarms_of(found: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
+def alarms_of(fleet: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
     """Return the alarms of what is known of a fleet's course."""
-    appeared = {(a.joint, a.about) for a in found.appearances if a.kind == "cause"}
-    made = [_of_appearance(a, recordings) for a in found.appearances]
-    for trend in found.trends.values():
+    appeared = {(a.joint, a.about) for a in fleet.appearances if a.kind == "cause"}
+    made = [_of_appearance(a, recordings) for a in fleet.appearances]
+    for trend in fleet.trends.values():
         made += _of_trend(trend)
-    for (joint, name), trend in found.sizes.items():
+    for (joint, name), trend in fleet.sizes.items():
         if (joint, name.split(".")[0]) not in appeared:
             made += _of_trend(trend)
     changed = {(a.joint, a.about) for a in made}
-    made += [_of_outlier(o) for o in found.outliers if (o.joint, o.parameter) not in changed]
+    made += [_of_outlier(o) for o in fleet.outliers if (o.joint, o.parameter) not in changed]
     return tuple(sorted(made, key=lambda a: (a.joint, -a.confidence, a.key)))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from rsea_ros.trends.result import Appearance, Interval
 from rsea_ros.trends.settings import DAY, TrendSettings
 from rsea_ros.trends.significance import adjusted
 
+_LESS_BEFORE = 3.0
+"""Log likelihood ratio, odds of 20, from which a joint is said to have been without it before."""
+_MOSTLY, _RARELY = 0.5, 0.25
+"""Share of the days that name what a joint always had, at least, and in its fleet, at most."""
 _SURE = 0.98
 """Highest share of days that is assumed to name anything: a diagnosis may miss."""
 
@@ -22,31 +26,33 @@ class Scan:
     """The days of a naming: mean time (days since 1970) and whether most recordings name it, shape (n,).
 
     ratio: log likelihood of `named more often from this day on` over `as often as before`, shape (n,).
+    always: that of `named all the time` over `as often as in the fleet`.
     """
 
     naming: Naming
     t: FloatArray
     named: FloatArray
     ratio: FloatArray
+    always: float
     p: float
 
 
-def appearances(found: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
+def appearances(every: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
     """Return what appeared, or was in one joint from the first and not in the fleet.
 
     joints: how many the fleet has. p values are bounded by the number of days times exp(-ratio).
     """
-    usual = _usual(found, joints, settings)
-    scans = [_scan(n, usual[n.kind, n.about], settings) for n in found]
+    usual = _usual(every, joints, settings)
+    scans = [_scan(n, usual[n.kind, n.about], settings) for n in every]
     q = adjusted(np.array([s.p for s in scans]))
-    sure = [_appeared(s, rate, settings) for s, rate in zip(scans, q, strict=True)]
+    sure = [_appeared(s, float(rate), settings) for s, rate in zip(scans, q, strict=True)]
     return tuple(a for a in sure if a is not None)
 
 
-def _usual(found: Sequence[Naming], joints: int, settings: TrendSettings) -> dict[tuple[str, str], float]:
+def _usual(every: Sequence[Naming], joints: int, settings: TrendSettings) -> dict[tuple[str, str], float]:
     """Return by kind and name the share of recordings that name it in the median joint."""
     shares: dict[tuple[str, str], list[float]] = {}
-    for n in found:
+    for n in every:
         shares.setdefault((n.kind, n.about), []).append(float(np.mean(n.named)))
     lacking = {key: [0.0] * (joints - len(values)) for key, values in shares.items()}
     alone = joints < settings.fewest_joints
@@ -67,7 +73,19 @@ def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
     ratio = _ratios(named, min(usual, _SURE))
     later = np.cumsum(named[::-1])[::-1]
     ratio[later < settings.fewest_named] = 0.0
-    return Scan(n, t, named, ratio, float(min(1.0, len(t) * np.exp(-np.max(ratio, initial=0.0)))))
+    always = _always(named, usual) if np.sum(named) >= settings.fewest_named else 0.0
+    most = max(float(np.max(ratio, initial=0.0)), always)
+    return Scan(n, t, named, ratio, always, float(min(1.0, len(t) * np.exp(-most))))
+
+
+def _always(named: FloatArray, usual: float) -> float:
+    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 if not clear."""
+    share = float(np.mean(named))
+    if share < _MOSTLY or usual > _RARELY:
+        return 0.0
+    return float(
+        _likelihood(np.sum(named), len(named), share) - _likelihood(np.sum(named), len(named), usual)
+    )
 
 
 def _ratios(named: FloatArray, usual: float) -> FloatArray:
@@ -78,33 +96,40 @@ def _ratios(named: FloatArray, usual: float) -> FloatArray:
     share = np.clip(after / after_n, 1e-9, _SURE)
     earlier = np.maximum(before / np.maximum(before_n, 1.0), usual)
     whole = max(float(np.mean(named)), usual) if n else usual
-
-    def likelihood(k: FloatArray | float, m: FloatArray | float, p: FloatArray | float) -> FloatArray:
-        q = np.clip(p, 1e-9, _SURE)
-        value: FloatArray = k * np.log(q) + (m - k) * np.log(1.0 - q)
-        return value
-
-    split = likelihood(after, after_n, share) + likelihood(before, before_n, earlier)
-    ratio: FloatArray = split - likelihood(float(np.sum(named)), float(n), whole)
+    split = _likelihood(after, after_n, share) + _likelihood(before, before_n, earlier)
+    ratio: FloatArray = split - _likelihood(float(np.sum(named)), float(n), whole)
     return np.where(share > earlier, np.maximum(ratio, 0.0), 0.0)
+
+
+def _likelihood(k: FloatArray | float, n: FloatArray | float, p: FloatArray | float) -> FloatArray:
+    """Return the log likelihood of k days of n that name it, each with probability p."""
+    q = np.clip(p, 1e-9, _SURE)
+    value: FloatArray = k * np.log(q) + (n - k) * np.log(1.0 - q)
+    return value
 
 
 def _appeared(scan: Scan, q: float, settings: TrendSettings) -> Appearance | None:
     if q > settings.false_discovery or not len(scan.t):
         return None
-    n, best = scan.naming, int(np.argmax(scan.ratio))
+    n, t = scan.naming, scan.t
+    from_first = float(np.max(scan.ratio)) < _LESS_BEFORE
+    best = 0 if from_first else int(np.argmax(scan.ratio))
     first = best + int(np.argmax(scan.named[best:] > 0.0))
-    likely = np.flatnonzero(scan.ratio >= scan.ratio[best] - 0.5 * settings.date_doubt)
-    earliest = scan.t[max(0, min(likely[0], best) - 1)]
-    since = 0.5 * (scan.t[max(0, first - 1)] + scan.t[first])
-    row = int(n.row[np.flatnonzero((n.time_s >= np.floor(scan.t[first]) * DAY) & n.named)[0]])
-    found = Appearance(
-        n.joint, n.about, n.kind, since * DAY, min(earliest, since) * DAY,
-        max(scan.t[likely[-1]], since) * DAY, first == 0, float(np.mean(scan.named[first:])), float(q), row,
+    earliest, since, latest = (t[first],) * 3 if from_first else _dates(scan, best, first, settings)
+    row = int(n.row[np.flatnonzero((n.time_s >= np.floor(t[first]) * DAY) & n.named)[0]])
+    return Appearance(
+        n.joint, n.about, n.kind, since * DAY, earliest * DAY, latest * DAY, from_first,
+        float(np.mean(scan.named[first:])), q, row, n.parameter, n.unit, _size_now(n), n.limit, n.status,
     )  # fmt: skip
-    return replace(
-        found, parameter=n.parameter, unit=n.unit, size=_size_now(n), limit=n.limit, status=n.status
-    )
+
+
+def _dates(scan: Scan, best: int, first: int, settings: TrendSettings) -> tuple[float, float, float]:
+    """Return the earliest, the likeliest and the latest beginning, days since 1970."""
+    t = scan.t
+    likely = np.flatnonzero(scan.ratio >= scan.ratio[best] - 0.5 * settings.date_doubt)
+    since = 0.5 * float(t[max(0, first - 1)] + t[first])
+    earliest = float(t[max(0, int(likely[0]) - 1)])
+    return min(earliest, since), since, max(float(t[likely[-1]]), since)
 
 
 def _size_now(n: Naming, last: int = 9) -> Interval | None:

@@ -18,6 +18,8 @@ ENDLESS = frozenset({"stiffness", "limit", "angle", "frequency"})
 """Parameters that grow without an end where the cause vanishes: no zero stands for its absence."""
 _LIKELY = 0.5
 """Probability from which a name counts that has rivals."""
+_BEST = 0.1
+"""Quantile of the recordings, by how small a size they show."""
 _LEAST_GAIN = 0.1
 """Gain below which a diagnosis names no cause (diagnosis/settings.py, acceptance.fall)."""
 
@@ -70,8 +72,8 @@ def _causes(joint: str, rows: np.ndarray, time_s: FloatArray, causes: npt.NDArra
     stated = [[_stated(c) for c in (causes[i] if causes[i] is not None else ())] for i in rows]
     of_row = [{c["name"]: c for c in row if _counts(c)} for row in stated]
     for name in sorted(set().union(*of_row)):
-        found = [row.get(name) for row in of_row]
-        yield _cause(joint, str(name), rows, time_s[rows], found)
+        of_recording = [row.get(name) for row in of_row]
+        yield _cause(joint, str(name), rows, time_s[rows], of_recording)
 
 
 def _stated(cause: Any) -> Mapping[str, Any]:
@@ -86,18 +88,22 @@ def _counts(cause: Mapping[str, Any]) -> bool:
 
 
 def _cause(
-    joint: str, name: str, rows: np.ndarray, time_s: FloatArray, found: Sequence[Mapping[str, Any] | None]
+    joint: str,
+    name: str,
+    rows: np.ndarray,
+    time_s: FloatArray,
+    of_recording: Sequence[Mapping[str, Any] | None],
 ) -> Naming:
-    main = next((c["sizes"][0] for c in found if c is not None and len(c["sizes"])), None)
-    named = np.array([c is not None for c in found])
-    statuses = [c["status"] for c in found if c is not None]
+    main = next((c["sizes"][0] for c in of_recording if c is not None and len(c["sizes"])), None)
+    named = np.array([c is not None for c in of_recording])
+    statuses = [c["status"] for c in of_recording if c is not None]
     status = max(set(statuses), key=statuses.count)
     if main is None:
         return Naming(joint, name, "cause", rows, time_s, named, status=status)
     null = NULLS.get(main["name"], 0.0)
-    sizes = np.array([_size(c, main["name"]) if c is not None else (np.nan,) * 3 for c in found])
+    sizes = np.array([_size(c, main["name"]) if c is not None else (np.nan,) * 3 for c in of_recording])
     size, sd = sizes[:, 0] - null, (sizes[:, 2] - sizes[:, 1]) / 3.92
-    gain = np.array([float(c["gain"]) if c is not None else np.nan for c in found])
+    gain = np.array([float(c["gain"]) if c is not None else np.nan for c in of_recording])
     limit = np.nan if main["name"] in ENDLESS else _limit(np.abs(size), gain)
     return Naming(
         joint, name, "cause", rows, time_s, named, main["name"], str(main["unit"]), size, sd, status, limit
@@ -114,14 +120,16 @@ def _size(cause: Mapping[str, Any], parameter: str) -> tuple[float, float, float
 def _limit(size: FloatArray, gain: FloatArray) -> float:
     """Return the detection limit: the size that would have had the least gain that is named.
 
-    A cause of size s leaves a residual of sqrt(noise² + (k s)²) where it is not modelled; k from its gain.
+    A cause of size s leaves a residual of sqrt(noise² + (k s)²) where it is not modelled; k from its gain, in
+    the recordings that show it best: beside other causes a gain says less. No larger than what was named.
     """
     usable = np.isfinite(size) & (gain > _LEAST_GAIN) & (gain < 1.0)
     if not np.any(usable):
         return float("nan")
     of_noise = np.sqrt(1.0 / (1.0 - gain[usable]) ** 2 - 1.0)
     least = np.sqrt(1.0 / (1.0 - _LEAST_GAIN) ** 2 - 1.0)
-    return float(np.median(size[usable] / of_noise) * least)
+    smallest = np.quantile(size[usable] / of_noise, _BEST) * least
+    return float(min(smallest, np.quantile(size[usable], _BEST)))
 
 
 def temperatures(history: Table, recordings: Table) -> FloatArray:
@@ -140,7 +148,7 @@ def size_series(naming: Naming, recordings: Table, temperature: FloatArray) -> S
     if naming.size is None or naming.sd is None:
         return None
     rows = naming.row[naming.named]
-    told = np.isfinite(naming.size) & np.isfinite(naming.sd)
+    determined = np.isfinite(naming.size) & np.isfinite(naming.sd)
     return Series(
         naming.joint,
         f"{naming.about}.{naming.parameter}",
@@ -148,7 +156,7 @@ def size_series(naming: Naming, recordings: Table, temperature: FloatArray) -> S
         naming.time_s[naming.named],
         naming.size[naming.named],
         np.maximum(naming.sd, 1e-9)[naming.named],
-        told[naming.named],
+        determined[naming.named],
         temperature[rows],
         np.asarray(recordings["recording"])[rows],
         np.asarray(recordings["artefacts"])[rows],

@@ -11,6 +11,8 @@ from rsea_ros.trends.days import Days
 from rsea_ros.trends.settings import TrendSettings
 
 _COARSE, _FINE = 24, 9
+_SHORTEST, _BLOCKS = 4, 6
+"""Days of a block, and blocks, of a short series: one long block would take a step for scatter."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ def day_effect(days: Days, settings: TrendSettings, taken: FloatArray | float = 
     Restricted likelihood (Patterson and Thompson 1971) with a level for each block and a temperature slope.
     """
     n = len(days.t)
-    blocks = np.linspace(0, n, max(1, n // settings.block_days) + 1).astype(int)[:-1]
+    length = min(settings.block_days, max(_SHORTEST, n // _BLOCKS))
+    blocks = np.linspace(0, n, max(1, n // length) + 1).astype(int)[:-1]
     y = days.y - taken
     columns = 0 if days.warmth is None else 1
     freedom = n - len(blocks) - columns

@@ -34,8 +34,8 @@ class Days:
 
 
 def day_means(series: Series, settings: TrendSettings) -> Days:
-    """Return the weighted means of the days on which the parameter was told, lone outliers left out."""
-    s = series.kept(series.told)
+    """Return the weighted means of the days that determine the parameter, lone outliers left out."""
+    s = series.kept(series.identifiable)
     s = s.kept(~outlying(s.value, s.sd, settings.outlier_days))
     scale = _scale(s.value)
     day = np.floor(s.time_s / DAY)

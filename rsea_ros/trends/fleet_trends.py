@@ -18,7 +18,7 @@ from rsea_ros.trends.series import RECORDINGS, Series, Table, all_series, check_
 from rsea_ros.trends.settings import DEFAULT, TrendSettings
 from rsea_ros.trends.significance import adjusted
 from rsea_ros.trends.temperature import fleet_prior
-from rsea_ros.trends.told import trend_of
+from rsea_ros.trends.trend import trend_of
 
 Key = tuple[str, str]
 
@@ -30,21 +30,21 @@ def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DE
     joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.
     """
     check_columns(recordings, RECORDINGS, "recordings")
-    found, own = list(namings(recordings)), list(all_series(history))
+    every, parameters = list(namings(recordings)), list(all_series(history))
     warm = temperatures(history, recordings)
-    sized = [s for n in found if n.kind == "cause" and (s := size_series(n, recordings, warm)) is not None]
-    trends, priors = _trends([*own, *sized], settings)
-    mine = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in own}
-    others = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
-    joints = len({n.joint for n in found} | {s.joint for s in own})
+    sized = [s for n in every if n.kind == "cause" and (s := size_series(n, recordings, warm)) is not None]
+    trends, priors = _trends([*parameters, *sized], settings)
+    of_parameters = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in parameters}
+    of_causes = {(s.joint, s.parameter): trends[s.joint, s.parameter] for s in sized}
+    joints = len({n.joint for n in every} | {s.joint for s in parameters})
     return FleetTrends(
-        mine,
-        others,
-        tuple(found),
-        appearances(found, joints, settings),
-        outliers(mine.values(), settings),
+        of_parameters,
+        of_causes,
+        tuple(every),
+        appearances(every, joints, settings),
+        outliers(of_parameters.values(), settings),
         settings.false_discovery,
-        sum(t.state != "untold" for t in trends.values()),
+        sum(t.state != "undetermined" for t in trends.values()),
         priors,
     )
 
@@ -64,7 +64,7 @@ def _trends(
     for series in all_of:
         days = day_means(series, settings)
         if len(days.t) < settings.fewest_days:
-            out[series.joint, series.parameter] = _untold(series, len(days.t), settings)
+            out[series.joint, series.parameter] = _undetermined(series, len(days.t), settings)
             continue
         ready.append(_Prepared(series, days, day_effect(days, settings)))
     priors = {name: fleet_prior([r.effect for r in group]) for name, group in _by_parameter(ready).items()}
@@ -81,11 +81,11 @@ def _trend(series: Series, test: Tested, q: float, settings: TrendSettings) -> T
     return trend_of(series, test, course, q, settings)
 
 
-def _untold(series: Series, days: int, settings: TrendSettings) -> Trend:
-    many = len(series.told)
-    told = f"{int(np.sum(series.told))} of {many} recordings could tell it, on {days} days"
-    reason = f"{told}; {settings.fewest_days} days are needed"
-    return Trend(series, "untold", days, reason=reason)
+def _undetermined(series: Series, days: int, settings: TrendSettings) -> Trend:
+    many = len(series.identifiable)
+    determined = f"{int(np.sum(series.identifiable))} of {many} recordings determine it, on {days} days"
+    reason = f"{determined}; {settings.fewest_days} days are needed"
+    return Trend(series, "undetermined", days, reason=reason)
 
 
 def _by_parameter(ready: Iterable[_Prepared]) -> Mapping[str, list[_Prepared]]:

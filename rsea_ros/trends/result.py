@@ -6,12 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.series import Series
+from rsea_ros.trends.settings import DAY
 
-State = Literal["steady", "changed", "trending", "untold"]
-"""untold: the recordings do not excite the parameter enough to say anything of its course."""
+State = Literal["steady", "changed", "trending", "undetermined"]
+"""undetermined: the recordings do not excite the parameter enough to say anything of its course."""
+
+
+_MANY, _LONG = 10, 28 * DAY
+"""Recordings, and s, that make silence."""
 
 
 class Interval(NamedTuple):
@@ -63,12 +70,12 @@ class Trend:
     of the day effect. detectable: the least step in mid-series that these recordings would show. q: false
     discovery rate at which the series is more than noise. by_day: means of the days at the mean temperature,
     with the recordings' own intervals. to_limit_s: POSIX s at which `limit` is reached.
-    told_days: days with an estimate. reason: of a series that is untold.
+    days_used: days with an estimate. reason: of a series that is undetermined.
     """
 
     series: Series
     state: State
-    told_days: int
+    days_used: int
     q: float = 1.0
     first: Interval | None = None
     now: Interval | None = None
@@ -84,8 +91,17 @@ class Trend:
     reason: str = ""
 
     @property
+    def silent_since_s(self) -> float:
+        """Return since when many recordings could not tell the parameter, POSIX s; NaN where they can."""
+        determined = self.series.time_s[self.series.identifiable]
+        last = float(determined[-1]) if len(determined) else -np.inf
+        later = self.series.time_s[self.series.time_s > last]
+        long = len(later) >= _MANY and float(later[-1]) - last > _LONG
+        return last if long and np.isfinite(last) else float("nan")
+
+    @property
     def relative(self) -> float:
-        """Return the change from the first level to the last, relative to the first; NaN where untold."""
+        """Return the change from the first level to the last, relative to the first, or NaN."""
         if self.first is None or self.now is None or not self.first.value:
             return float("nan")
         return self.now.value / self.first.value - 1.0

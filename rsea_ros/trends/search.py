@@ -46,9 +46,19 @@ def described(test: Tested, settings: TrendSettings) -> Course:
     rate = settings.false_discovery
     price = scan_threshold(rate, _share(days, settings), test.effect.freedom) ** 2
     best = min(_candidates(test.course, price, settings), key=lambda c: cost(c, price))
+    days = _at_level(best)
     effect = day_effect(days, settings, best.fitted())
     anew = replace(course_of(days, effect.variance, test.prior), slope=best.slope, terms=best.terms)
     return _completed(anew, price, settings)
+
+
+def _at_level(course: Course) -> Days:
+    """Return the days with their warmth in proportion to the level: a kelvin makes a share of that."""
+    days = course.days
+    if days.warmth is None:
+        return days
+    level = course.regression().coefficients[0] + course.fitted()
+    return replace(days, warmth=days.warmth * np.maximum(level, 0.0))
 
 
 def _candidates(course: Course, price: float, settings: TrendSettings) -> Iterator[Course]:

@@ -17,6 +17,8 @@ Table = Mapping[str, npt.NDArray[Any]]
 """Columns of equal length by name."""
 BoolArray = npt.NDArray[np.bool_]
 
+CLOCKS = ("clock.", "clock_rate.")
+"""What the names of the sensors' clocks begin with: another in every recording, no property of a joint."""
 _HALF = 1.959964
 """Standard deviations from the middle of a 95 % interval to its end."""
 HISTORY = (
@@ -40,8 +42,8 @@ RECORDINGS = (
 class Series:
     """Estimates of a parameter, sorted by time, each array of shape (n,).
 
-    time_s: POSIX s. value, sd: in `unit`; sd from the 95 % interval. told: whether the recording could tell
-    the parameter. temperature: °C, NaN where unknown. artefacts: path of the recording's results.
+    time_s: POSIX s. value, sd: in `unit`; sd from the 95 % interval. identifiable: whether the recording
+    determines the parameter. temperature: °C, NaN where unknown. artefacts: path of the recording's results.
     """
 
     joint: str
@@ -50,14 +52,14 @@ class Series:
     time_s: FloatArray
     value: FloatArray
     sd: FloatArray
-    told: BoolArray
+    identifiable: BoolArray
     temperature: FloatArray
     recording: npt.NDArray[Any]
     artefacts: npt.NDArray[Any]
 
     def kept(self, rows: BoolArray) -> Series:
         """Return the series of some of its rows."""
-        arrays = ("time_s", "value", "sd", "told", "temperature", "recording", "artefacts")
+        arrays = ("time_s", "value", "sd", "identifiable", "temperature", "recording", "artefacts")
         return Series(self.joint, self.parameter, self.unit, **{n: getattr(self, n)[rows] for n in arrays})
 
 
@@ -72,7 +74,7 @@ def check_columns(table: Table, columns: tuple[str, ...], name: str) -> None:
 
 
 def all_series(history: Table) -> Iterator[Series]:
-    """Yield the series of a history; rows whose time is not known are left out.
+    """Yield the series of a history; rows without a time and clocks of sensors are left out.
 
     Raises ParameterError for a history without its columns.
     """
@@ -86,6 +88,8 @@ def all_series(history: Table) -> Iterator[Series]:
     other = (joint[1:] != joint[:-1]) | (parameter[1:] != parameter[:-1])
     edges = [0, *(np.flatnonzero(other) + 1), len(joint)] if len(joint) else []
     for a, b in itertools.pairwise(edges):
+        if str(parameter[a]).startswith(CLOCKS):
+            continue
         part = {n: c[a:b] for n, c in columns.items()}
         yield _series(str(joint[a]), str(parameter[a]), part)
 

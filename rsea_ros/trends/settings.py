@@ -13,7 +13,7 @@ YEAR = 365.25
 
 @dataclass(frozen=True)
 class TrendSettings:
-    """What counts as told, as a change and as an alarm.
+    """What counts as determined, as a change and as an alarm.
 
     false_discovery: share of the findings of one look that may be false, over all joints and parameters
         (Benjamini and Hochberg 1995). 0.01: the weekly looks of a year then bring less than one in two.

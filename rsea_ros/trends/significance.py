@@ -12,6 +12,8 @@ from scipy.stats import t
 from rsea_ros.signals import FloatArray
 
 _SMALLEST = 1e-280
+_SUREST = 37.0
+"""Normal score whose tail is the least that a double holds: rarer ones count as that rare."""
 _KINDS = 2
 """A scan looks for steps and for ramps."""
 
@@ -22,7 +24,7 @@ def scan_p(largest: float, share: float, freedom: int) -> float:
     share: of the days at each end where no change is looked for. freedom: of the estimated noise.
     Tail of the maximum of a standardised bridge (Miller and Siegmund 1982), for each kind of term.
     """
-    b = _as_normal(abs(largest), freedom)
+    b = min(_as_normal(abs(largest), freedom), _SUREST)
     if b < 1.5:
         return 1.0
     density = np.exp(-0.5 * b * b) / np.sqrt(2.0 * np.pi)

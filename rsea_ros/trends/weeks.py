@@ -12,8 +12,8 @@ from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.settings import DAY
 
 _Z = 1.959964
-_WEEK, _MOST = 7.0, 110
-"""Days; steps of a picture: more are no longer told apart."""
+_WEEK, _SHORT, _MOST = 7.0, 70.0, 110
+"""Days of a week; days up to which a step is a day; steps of a picture: more are no longer distinguished."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,12 @@ class Steps:
     def days(self) -> float:
         """Return how long a step is."""
         return float(self.edges[1] - self.edges[0]) / DAY
+
+    @property
+    def name(self) -> str:
+        """Return what a step is called."""
+        weeks = round(self.days / _WEEK)
+        return "day" if self.days < _WEEK else "week" if weeks == 1 else f"{weeks} weeks"
 
     @property
     def middle(self) -> FloatArray:
@@ -47,21 +53,24 @@ class Steps:
 
 @dataclass(frozen=True)
 class Binned:
-    """Means of a parameter by step, NaN where no recording told it, each shape (n,).
+    """Means of a parameter by step, NaN where no recording determines it, each shape (n,).
 
-    low, high: 95 % interval, day effects included. told, asked: recordings that told it, and all of them.
+    low, high: 95 % interval, day effects included. identifiable, recorded: recordings that determine it, and
+    all of them.
     """
 
     value: FloatArray
     low: FloatArray
     high: FloatArray
-    told: np.ndarray
-    asked: np.ndarray
+    identifiable: np.ndarray
+    recorded: np.ndarray
 
 
 def steps_over(first_s: float, last_s: float) -> Steps:
-    """Return steps of whole weeks, from Monday on, that hold both times; few enough for a picture."""
+    """Return steps that hold both times: days of a short history, else whole weeks from Monday on."""
     day = np.floor(first_s / DAY)
+    if last_s / DAY - day < _SHORT:
+        return Steps((day + np.arange(int(np.floor(last_s / DAY) - day) + 2)) * DAY)
     monday = day - (day + 3.0) % _WEEK
     weeks = max(1, int(np.floor((last_s / DAY - monday) / _WEEK)) + 1)
     length = -(-weeks // _MOST)
@@ -72,10 +81,10 @@ def steps_over(first_s: float, last_s: float) -> Steps:
 def binned(trend: Trend, steps: Steps) -> Binned:
     """Return a trend's days at the mean temperature, averaged by step with their weights."""
     s, n = trend.series, len(steps)
-    told, asked = steps.count(s.time_s[s.told]), steps.count(s.time_s)
+    identifiable, recorded = steps.count(s.time_s[s.identifiable]), steps.count(s.time_s)
     empty = np.full(n, np.nan)
     if trend.by_day is None or not len(trend.by_day.time_s):
-        return Binned(empty, empty, empty, told, asked)
+        return Binned(empty, empty, empty, identifiable, recorded)
     d, place = trend.by_day, steps.place(trend.by_day.time_s)
     w = 1.0 / (((d.high - d.low) / (2.0 * _Z)) ** 2 + trend.day_sd**2)
     total = np.bincount(place, w, n)
@@ -83,4 +92,4 @@ def binned(trend: Trend, steps: Steps) -> Binned:
     safe = np.where(some, total, 1.0)
     value = np.where(some, np.bincount(place, w * d.value, n) / safe, np.nan)
     half = np.where(some, _Z / np.sqrt(safe), np.nan)
-    return Binned(value, value - half, value + half, told, asked)
+    return Binned(value, value - half, value + half, identifiable, recorded)

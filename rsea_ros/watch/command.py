@@ -1,7 +1,7 @@
 """Torque that a page commands: soft start, a limit, and zero as soon as nobody holds it.
 
 torque(t) = envelope(t) · shape(t), |shape| ≤ 1. The envelope grows and shrinks by at most `growth` and
-falls to zero within RELEASE when the hold ends. Another shape begins when the envelope of the one before is zero.
+falls to zero within RELEASE when the hold ends. Another shape begins when that of the one before is zero.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.ioloop import IOLoop, PeriodicCallback
+from tornado.ioloop import PeriodicCallback
 from tornado.web import Application
 
 from rsea_ros.errors import RseaError
@@ -48,7 +48,7 @@ class Server:
         self.access = Access(f"rsea_watch_{self.port}")  # a cookie belongs to a host, not to a port
         self.addresses: Sequence[str] = addresses(host, self.port, self.access.token)
         self.error: Exception | None = None
-        self._loop: IOLoop | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
         self._state_due = 0.0
         self.thread = threading.Thread(target=self._run, daemon=True)
@@ -61,7 +61,7 @@ class Server:
     def stop(self) -> None:
         """End: sockets closed, so that nobody holds the command."""
         if self._loop is not None and self.thread.is_alive():
-            self._loop.add_callback(self._loop.stop)
+            self._loop.call_soon_threadsafe(self._stopping.set)
             self.thread.join()
         self._socket.close()
         self._runs.close()
@@ -73,21 +73,26 @@ class Server:
         return self.thread.is_alive()
 
     def _run(self) -> None:
-        asyncio.set_event_loop(asyncio.new_event_loop())
         try:
-            self._loop = IOLoop.current()
-            web = Application(routes(self.access, self.desk, self._runs), **_SETTINGS)
-            http = HTTPServer(web, max_body_size=_LARGEST, max_header_size=_LARGEST)
-            http.add_socket(self._socket)
-            PeriodicCallback(self._tick, 1e3 * FRAME).start()
-            self._loop.add_callback(self._ready.set)
-            self._loop.start()
-            http.stop()
+            asyncio.run(self._serve())
         except Exception as error:  # handed to the main thread by `running`
             self.error = error
         finally:
             self.desk.leave_all()
             self._ready.set()
+
+    async def _serve(self) -> None:
+        self._loop, self._stopping = asyncio.get_running_loop(), asyncio.Event()
+        web = Application(routes(self.access, self.desk, self._runs), **_SETTINGS)
+        http = HTTPServer(web, max_body_size=_LARGEST, max_header_size=_LARGEST)
+        http.add_socket(self._socket)
+        ticking = PeriodicCallback(self._tick, 1e3 * FRAME)
+        ticking.start()
+        self._ready.set()
+        await self._stopping.wait()
+        ticking.stop()
+        http.stop()
+        await http.close_all_connections()
 
     def _tick(self) -> None:
         """Send what has come to who looks at it."""

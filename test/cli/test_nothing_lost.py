@@ -120,7 +120,7 @@ WRITERS = {
     "simulate to a directory": (["simulate", RIG, "--duration", "1", "--out", "out/new"], ["new"]),
     "import": (["import", "run.csv", "--map", "map.yaml", "--out", "out/new.mcap"], ["new.mcap"]),
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
-    "export": (["export", "--mjcf", RIG, "--out", "out/new.xml"], ["new.xml"]),
+    "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
     "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(results.NAMES)),
     "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(diagnosis_files.NAMES)),

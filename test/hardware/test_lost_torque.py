@@ -14,6 +14,8 @@ import pytest
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware import supervisor
+from rsea_ros.hardware.device import PortLost
+from rsea_ros.hardware.dynamixel.port import Port
 from rsea_ros.hardware.supervised import SupervisorLost
 from test.hardware.conftest import Loop, well_behaved
 
@@ -128,6 +130,7 @@ def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
         os.killpg(login.pid, signal.SIGKILL)
         login.wait()
     _until(lambda: bench.torque() == (0, False))
+    _until(lambda: _is_free(bench.port))  # the supervisor has it until it ends
 
 
 def test_a_service_lets_the_port_go_and_its_death_is_a_fault(benches, service):
@@ -146,6 +149,16 @@ def test_a_service_that_is_not_there_is_refused(benches, tmp_path):
     well_behaved(benches())
     with pytest.raises(SupervisorLost, match="expected a supervisor that listens there"):
         Loop(benches(), supervisor=str(tmp_path / "nobody"))
+
+
+def _is_free(path):
+    port = Port(path, 4_000_000, 0.01)
+    try:
+        port.open()
+    except PortLost:
+        return False
+    port.close()
+    return True
 
 
 def _until(condition):

@@ -72,6 +72,11 @@ def address(watch, listener):
     return listener.until(lambda: next((line[5:] for line in watch.output if line.startswith("open ")), None))
 
 
+def recorded(state):
+    """What the node record says that it has got."""
+    return {key for each in state["health"] if "record" in each["name"] for key, _ in each["values"]}
+
+
 def test_a_page_sees_commands_and_records(bench, listener):
     """One story, as it is played: look, record, command, stop, be left."""
     watch, out = bench
@@ -87,6 +92,7 @@ def test_a_page_sees_commands_and_records(bench, listener):
         page.held = HOLD
         await page.until(lambda: page.last["motor"] > 0.9 * AMPLITUDE)
         await page.until(lambda: page.last["command"] == AMPLITUDE)
+        await page.until(lambda: {"torque_command", "ft"} <= recorded(page.state))
         assert page.state["rates"]["ft"] > 100 and not page.errors
         page.close()  # the phone is gone while it holds the command
         left = time.monotonic()
@@ -103,8 +109,6 @@ def test_a_page_sees_commands_and_records(bench, listener):
     (bag,) = out.iterdir()
     record = read_record(bag)
     assert record["command"].y.max() == AMPLITUDE
-    late = [f for f in record.faults if f.kind == "late_commands"]
-    assert not late, late
 
 
 def test_nobody_commands_beside_another(bench, listener):
@@ -113,7 +117,7 @@ def test_nobody_commands_beside_another(bench, listener):
 
     async def refused():
         page = await Page(address(watch, listener), asyncio.get_running_loop()).connect()
-        await page.until(lambda: "listener commands already" in page.state.get("command", {}).get("why_not", ""))
+        await page.until(lambda: "listener commands already" in str(page.state.get("command")))
         await page.send(**HOLD)
         await page.until(lambda: page.errors)
         page.close()

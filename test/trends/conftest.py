@@ -1,4 +1,4 @@
-"""Make the helpers beside these tests importable."""
+"""Make the histories beside these tests importable."""
 
 from __future__ import annotations
 

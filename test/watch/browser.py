@@ -93,7 +93,10 @@ class Browser:
 
     def close(self):
         """End it."""
-        self._socket.close()
+        async def leave():
+            self._socket.close()
+
+        self._done(leave)
         self._loop.close()
         self._process.terminate()
         self._process.wait(10)

@@ -57,7 +57,8 @@ def test_it_draws_without_an_error_and_asks_only_its_server(page, server):
 
 
 @pytest.mark.parametrize(
-    "leave", [HIDDEN % "true", "socket.close()", "document.getElementById('go').click()", "location = 'about:blank'"]
+    "leave",
+    [HIDDEN % "true", "socket.close()", "document.getElementById('go').click()", "location = 'about:blank'"],
 )
 def test_the_torque_is_zero_when_the_page_is_left(page, commander, leave):
     page.until("!document.getElementById('go').disabled && !document.getElementById('command').hidden")

@@ -1,6 +1,7 @@
 """The server: who has no token, or comes from another page, gets nothing; who leaves, lets go."""
 
 import asyncio
+import http.client
 import json
 import socket
 import time
@@ -8,7 +9,7 @@ import urllib.error
 import urllib.request
 
 import pytest
-from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from rsea_ros.errors import RseaError
@@ -32,7 +33,7 @@ def cookie(server):
     return f"{server.access.cookie}={server.access.token}"
 
 
-@pytest.mark.parametrize("path", ["/", "/?token=wrong", "/watch.js", "/plot.js", "/socket", "/report/x/identify"])
+@pytest.mark.parametrize("path", ["/", "/?token=wrong", "/watch.js", "/plot.js", "/socket", "/report/x/y"])
 def test_without_the_token_nothing_is_served(server, path):
     assert status(server, path)[0] == 403
     assert status(server, path, Cookie=f"{server.access.cookie}=wrong")[0] == 403
@@ -47,7 +48,7 @@ def test_the_printed_address_gives_the_cookie_and_forbids_all_that_is_elsewhere(
     assert status(server, "/watch.js", Cookie=cookie(server))[0] == 200
 
 
-@pytest.mark.parametrize("path", ["/report/../x", "/report/none/identify", "/page/index.html", "/..%2fserver.py"])
+@pytest.mark.parametrize("path", ["/report/../x", "/report/none/identify", "/page/index.html", "/..%2fa.py"])
 def test_only_pages_that_were_made_are_served(server, path):
     assert status(server, path, Cookie=cookie(server))[0] == 404
 
@@ -82,9 +83,9 @@ def test_a_port_that_is_taken_is_said_in_one_line(server, tmp_path):
         Server(None, Runs(tmp_path), None, port=server.port)
 
 
-async def connected(server, origin=None):
+async def connected(server):
     host = f"localhost:{server.port}"
-    head = {"Cookie": cookie(server), "Origin": origin or f"http://{host}"}
+    head = {"Cookie": cookie(server), "Origin": f"http://{host}"}
     return await websocket_connect(HTTPRequest(f"ws://{host}/socket", headers=head))
 
 
@@ -96,10 +97,22 @@ async def answer(page, key):
             return message
 
 
-def test_a_socket_gets_frames_and_state_and_another_origin_none(server):
+UPGRADE = {
+    "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null"])
+def test_a_socket_of_another_page_is_refused(server, origin):
+    client = http.client.HTTPConnection("localhost", server.port)
+    client.request("GET", "/socket", headers={"Cookie": cookie(server), "Origin": origin, **UPGRADE})
+    assert client.getresponse().status == 403
+    client.close()
+
+
+def test_a_socket_gets_frames_and_state(server):
     async def talk():
-        with pytest.raises(HTTPClientError, match="403"):
-            await connected(server, "http://evil.example")
         page = await connected(server)
         frame = await answer(page, "ft")
         state = (await answer(page, "state"))["state"]

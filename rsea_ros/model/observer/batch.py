@@ -32,7 +32,7 @@ MEASURED, TORQUE = range(2)
 """Columns of innovations: position or ft, whichever the event brings; motor torque."""
 
 ALIKE = 1e-6
-"""s. Steps this near to each other are one, whose transition is known: a clock of double seconds makes them."""
+"""s. Steps this near to each other are one, whose transition is known: stamps in double seconds make them."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

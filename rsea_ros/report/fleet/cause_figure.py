@@ -28,7 +28,7 @@ def cause_figure(naming: Naming, appearance: Appearance | None, steps: Steps) ->
     )
     return Figure(
         title=_title(naming, appearance),
-        caption="Median of each week's sizes, with the middle half of them. Grey at zero: recordings that do "
+        caption=f"Median size of each {steps.name}, with the middle half. Grey at zero: recordings that do "
         "not name it; below the detection limit they could not.",
         data=[_sizes(naming, steps, factor, unit), _zeros(naming, steps)],
         layout=layout(
@@ -57,7 +57,7 @@ def share_figure(naming: Naming, appearance: Appearance | None, steps: Steps) ->
     }  # fmt: skip
     return Figure(
         title=_title(naming, appearance),
-        caption="Share of each week's recordings that name it.",
+        caption=f"Share of the recordings of each {steps.name} that name it.",
         data=[bars],
         layout=layout(
             xaxis=date_axis(steps),

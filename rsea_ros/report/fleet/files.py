@@ -34,14 +34,14 @@ def write_fleet_report(
     from, `out` by default. Raises ParameterError for a table without its columns, OutputError for a name
     that is taken, OSError where something cannot be written.
     """
-    found = fleet_trends(history, recordings, settings)
-    alarms = alarms_of(found, recordings)
+    fleet = fleet_trends(history, recordings, settings)
+    alarms = alarms_of(fleet, recordings)
     steps, groups = _steps(recordings), by_joint(alarms)
     with NewFiles(out) as new:
-        links = Links(new.folder, Path(store) if store is not None else new.folder, page_names(found.joints))
+        links = Links(new.folder, Path(store) if store is not None else new.folder, page_names(fleet.joints))
         for joint, name in links.pages.items():
-            new.write(name, joint_page(joint, found, groups.get(joint, []), recordings, steps, links))
-        return new.write(INDEX, fleet_page(found, alarms, recordings, steps, links))
+            new.write(name, joint_page(joint, fleet, groups.get(joint, []), recordings, steps, links))
+        return new.write(INDEX, fleet_page(fleet, alarms, recordings, steps, links))
 
 
 def _steps(recordings: Table) -> Steps:

@@ -1,14 +1,20 @@
-"""The page of a fleet: worst joints first, what changed since when, joints × weeks, what cannot be told."""
+"""The page of a fleet: worst joints first, what changed since when, joints × weeks, what is undetermined."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.report.fleet.fleet_tables import alarm_table, joint_table, untold_table
+from rsea_ros.report.fleet.fleet_tables import (
+    alarm_table,
+    joint_table,
+    undetermined_table,
+    undetermined_trends,
+)
 from rsea_ros.report.fleet.fleet_words import about, day, name, percent
-from rsea_ros.report.fleet.heat_map import heat_map, naming_map
+from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.page import Block, bullets, folded, key_numbers, page, paragraph, section
@@ -24,90 +30,100 @@ _ROWS = 60
 
 
 def fleet_page(
-    found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
 ) -> str:
     """Return the page as HTML that opens without a network."""
-    blocks = list(_blocks(found, alarms, recordings, steps, links))
+    blocks = list(_blocks(fleet, alarms, recordings, steps, links))
     footer = [_period(recordings), "rsea fleet report. All values in SI, all times UTC."]
-    kicker = f"Fleet of {len(found.joints)} joints · {_period(recordings)}"
-    return page(_headline(found, alarms), kicker, blocks, footer)
+    kicker = f"Fleet of {len(fleet.joints)} joints · {_period(recordings)}"
+    return page(_headline(fleet, alarms), kicker, blocks, footer)
 
 
 def _blocks(
-    found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
 ) -> Iterator[Block]:
     groups = by_joint(alarms)
     ranked = [a for group in groups.values() for a in group]
-    joints = worst_first(found.joints, alarms)
-    yield key_numbers(_keys(found, groups, recordings))
-    figure = timeline(ranked, steps)
-    if figure is not None:
-        yield figure
+    joints = worst_first(fleet.joints, alarms)
+    yield key_numbers(_keys(fleet, groups, recordings))
+    yield f"<style>{(Path(__file__).parent / 'fleet.css').read_text(encoding='utf-8')}{shades()}</style>"
+    yield timeline(ranked, steps, links)
+    if ranked:
         yield section("Worst joints first", alarm_table(ranked, links))
-    for parameter in _mapped(found):
-        yield heat_map(parameter, joints[:_ROWS], found, steps)
-    for kind, what in dict.fromkeys((a.kind, a.about) for a in found.appearances):
-        yield naming_map(what, kind, _naming(found, kind, what, joints)[:_ROWS], found, steps)
-    yield section("All joints", joint_table(joints, found, groups, recordings, links))
-    yield _untold(found, links)
-    yield folded("How sure this is", bullets(_sure(found)))
+    for parameter in _mapped(fleet):
+        yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
+    for kind, what in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
+        yield naming_map(what, kind, _naming(fleet, kind, what, joints)[:_ROWS], fleet, steps, links)
+    yield section("All joints", joint_table(joints, fleet, groups, recordings, links))
+    yield _undetermined(fleet, links)
+    yield folded("How sure this is", bullets(_sure(fleet)))
 
 
-def _mapped(found: FleetTrends) -> list[str]:
+def _mapped(fleet: FleetTrends) -> list[str]:
     """Return the parameters that have a map, those that moved most first; of causes the usual ones."""
-    sized = [p for _, p in found.sizes]
-    usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(found.joints)]
-    courses = {**found.trends, **found.sizes}
+    sized = [p for _, p in fleet.sizes]
+    usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
+    courses = {**fleet.trends, **fleet.sizes}
 
     def moved(parameter: str) -> float:
         here = [t for (_, p), t in courses.items() if p == parameter and t.changes]
         return -max((abs(t.relative) for t in here), default=0.0)
 
-    return sorted([*dict.fromkeys(p for _, p in found.trends), *usual], key=moved)
+    return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=moved)
 
 
-def _headline(found: FleetTrends, alarms: Sequence[Alarm]) -> str:
-    if not any(t.state != "untold" for t in found.trends.values()):
+def _headline(fleet: FleetTrends, alarms: Sequence[Alarm]) -> str:
+    if not any(t.state != "undetermined" for t in fleet.trends.values()):
         return "These recordings are too few to say how the joints fare"
     groups = by_joint(alarms)
     if not groups:
-        return f"All {len(found.joints)} joints are steady"
+        return f"All {len(fleet.joints)} joints are steady"
     first = next(iter(groups))
-    number = f"{len(groups)} of {len(found.joints)} joints need" if len(groups) > 1 else "One joint needs"
+    number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
     return f"{number} a look, {first} first: {about(groups[first][0])}"
 
 
-def _keys(found: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
+def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
     kinds = [a.kind for group in groups.values() for a in group]
-    untold = sum(t.state == "untold" for t in found.trends.values())
     done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
     return [
-        (f"{len(groups)} of {len(found.joints)}", "joints need a look"),
-        (str(kinds.count("trend")), "trends that go on"),
+        (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
+        (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
         (str(kinds.count("cause")), "causes that appeared"),
-        (f"{done:,}".replace(",", " "), f"recordings used, of {len(recordings['joint'])}"),
-        (str(untold), f"of {len(found.trends)} courses cannot be told"),
+        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (
+            str(len(undetermined_trends(fleet))),
+            f"of {len(fleet.trends)} courses cannot be determined, or no more",
+        ),
     ]
 
 
-def _naming(found: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:
-    naming = {n.joint for n in found.namings if (n.kind, n.about) == (kind, what)}
+def _grouped(number: int) -> str:
+    """Return a number with its thousands apart."""
+    return f"{number:,}".replace(",", " ")
+
+
+def _naming(fleet: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:
+    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, what)}
     return [j for j in joints if j in naming]
 
 
-def _untold(found: FleetTrends, links: Links) -> str:
-    untold = [t for t in found.trends.values() if t.state == "untold"]
-    if not untold:
-        return section("Nothing was left untold", paragraph("Every joint's recordings tell every parameter."))
-    title = f"{len(untold)} courses cannot be told: not enough excitation"
-    return section(title, untold_table(found, links))
+def _undetermined(fleet: FleetTrends, links: Links) -> str:
+    undetermined = undetermined_trends(fleet)
+    if not undetermined:
+        return section(
+            "Nothing was left undetermined", paragraph("Every joint's recordings tell every parameter.")
+        )
+    number = "One course" if len(undetermined) == 1 else f"{len(undetermined)} courses"
+    title = f"{number} cannot be determined: not enough excitation"
+    return section(title, undetermined_table(undetermined, links))
 
 
-def _sure(found: FleetTrends) -> list[str]:
-    rate = f"{100.0 * found.false_discovery:g}"
-    warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in found.per_kelvin.items() if m]
+def _sure(fleet: FleetTrends) -> list[str]:
+    rate = f"{100.0 * fleet.false_discovery:g}"
+    warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in fleet.per_kelvin.items() if m]
     lines = [
-        f"{found.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
+        f"{fleet.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
         f"and Hochberg, over all joints and parameters of this look).",
         "Recordings of one day count as one draw: what a day does to a joint (mounting, grease, zeros) is "

@@ -1,20 +1,26 @@
-"""Tables of a fleet: findings, joints, what could not be told."""
+"""Tables of a fleet: findings, joints, what could not be determined."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 
 from rsea_ros.report import words
-from rsea_ros.report.fleet.fleet_words import doubt_of_date, name, percent, sentence, value
+from rsea_ros.report.fleet.fleet_words import day, doubt_of_date, name, percent, sentence, value
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import Table
 
-_STATES = {"steady": "steady", "changed": "changed", "trending": "going on", "untold": "cannot be told"}
+_STATES = {
+    "steady": "steady",
+    "changed": "changed",
+    "trending": "going on",
+    "undetermined": "cannot be determined",
+}
 
 
 def rows_of(head: Sequence[tuple[str, bool]], rows: Sequence[Sequence[str]]) -> str:
@@ -49,29 +55,29 @@ def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) 
 
 def joint_table(
     joints: Sequence[str],
-    found: FleetTrends,
+    fleet: FleetTrends,
     alarmed: Mapping[str, Sequence[Alarm]],
     recordings: Table,
     links: Links,
 ) -> str:
     """Return a row for each joint."""
     head = [("Joint", False), ("State", False), ("Recordings", True), ("Refused or broken", True),
-            ("Parameters told", True), ("Largest change", True)]  # fmt: skip
+            ("Parameters determined", True), ("Largest change", True)]  # fmt: skip
     of = np.asarray(recordings["joint"], str)
     done = np.asarray(recordings["outcome"], str) == "done"
     rows = []
     for joint in joints:
-        trends = [t for (j, _), t in found.trends.items() if j == joint]
-        told = [t for t in trends if t.state != "untold"]
+        trends = [t for (j, _), t in fleet.trends.items() if j == joint]
+        determined = [t for t in trends if t.state != "undetermined"]
         here = of == joint
-        moved = max((t.relative for t in told if t.changes), key=abs, default=float("nan"))
+        moved = max((t.relative for t in determined if t.changes), key=abs, default=float("nan"))
         rows.append(
             (
                 links.joint(joint),
                 escape(", ".join(dict.fromkeys(a.kind for a in alarmed.get(joint, ())))) or "steady",
                 str(int(np.sum(here))),
                 str(int(np.sum(here & ~done))),
-                f"{len(told)} of {len(trends)}",
+                f"{len(determined)} of {len(trends)}",
                 percent(moved) if moved == moved else "–",
             )
         )
@@ -82,7 +88,7 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
     """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
     head = [("Parameter", False), ("State", False), ("Now, 95 %", True), ("A year", True),
             ("A day scatters", True),
-            ("Least step seen", True), ("Told", True)]  # fmt: skip
+            ("Least step seen", True), ("Determined by", True)]  # fmt: skip
     rows = []
     for t in trends:
         unit, s = t.series.unit, t.series
@@ -97,21 +103,30 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
                 shares[0],
                 shares[1].lstrip("+") if t.day_sd else "–",
                 shares[2].lstrip("+"),
-                f"{int(np.sum(s.told))} of {len(s.told)}",
+                f"{int(np.sum(s.identifiable))} of {len(s.identifiable)}",
             )
         )
     return rows_of(head, rows)
 
 
-def untold_table(found: FleetTrends, links: Links) -> str:
-    """Return what could not be told, and why."""
-    untold = [t for t in found.trends.values() if t.state == "untold"]
+def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
+    """Return the courses of which nothing can be determined, or no more."""
+    return [t for t in fleet.trends.values() if t.state == "undetermined" or math.isfinite(t.silent_since_s)]
+
+
+def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
+    """Return what could not be determined, and why."""
     head = [("Joint", False), ("Parameter", False), ("Why", False)]
     rows = [
-        (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(words.sentence(t.reason)))
-        for t in untold
+        (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in undetermined
     ]
     return rows_of(head, rows)
+
+
+def _why(trend: Trend) -> str:
+    if trend.state != "undetermined":
+        return f"Determined until {day(trend.silent_since_s)}, by none of the recordings since"
+    return words.sentence(trend.reason)
 
 
 def _sure(confidence: float) -> str:

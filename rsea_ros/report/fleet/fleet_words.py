@@ -110,14 +110,21 @@ def doubt_of_date(alarm: Alarm) -> str:
     """Return between which dates it began, empty where that is not known."""
     if not math.isfinite(alarm.since_s):
         return ""
-    first, last = short_day(alarm.earliest_s), short_day(alarm.latest_s)
-    return first if first == last else f"{first} to {last}"
+    first, last = short_day(alarm.earliest_s).split(), short_day(alarm.latest_s).split()
+    while first and first[-1] == last[len(first) - 1]:
+        first.pop()
+    return f"{' '.join(first)} to {' '.join(last)}" if first else " ".join(last)
 
 
 def finding(trend: Trend) -> str:
     """Return the title of a parameter's figure."""
+    silent = trend.silent_since_s
+    return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
+
+
+def _finding(trend: Trend) -> str:
     plain, unit = name(trend.series.parameter), trend.series.unit
-    if trend.state == "untold":
+    if trend.state == "undetermined":
         return f"{plain}: not enough excitation to tell"
     if trend.state == "steady":
         factor, shown = words.scaled(trend.detectable, unit)

@@ -1,148 +1,161 @@
-"""Joints × weeks: how far a parameter is from where each joint began."""
+"""Joints × weeks: how far a parameter is from where each joint began, how often a cause is named."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from html import escape
 
 import numpy as np
 
-from rsea_ros.report.figure import Figure, Json, axis, layout, numbers
-from rsea_ros.report.fleet.fleet_words import dates, name, percent
-from rsea_ros.report.fleet.marks import date_axis
-from rsea_ros.report.palette import AFTER, BEFORE, GRID, NOISE, QUIET, faint
+from rsea_ros.report.fleet.dates_below import months
+from rsea_ros.report.fleet.fleet_words import name, percent, short_day
+from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.page import section
+from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.weeks import Steps, binned
 
-_ROW, _MARGIN = 17, 92
-_QUANTILE = 0.995
-_NOISE = 8.0
-"""Times the median change."""
-_OFTEN = 50.0
-"""% of a week's recordings."""
-_LEAST = 0.01
-"""Relative change at which the colours are full, at least."""
+_ROW = 17
+"""Pixels of a row, as in fleet.css."""
+_SHADES = 8
+_QUANTILE, _NOISE, _LEAST = 0.995, 8.0, 0.01
+"""Colours are full at this quantile of the changes, at so many times their median, and at 1 %, at least."""
+_OFTEN = 0.5
+"""Share of the recordings of a step that counts as often."""
 
 
-def heat_map(parameter: str, joints: Sequence[str], found: FleetTrends, steps: Steps) -> Figure:
-    """Return the map of a parameter, the first joint on top; grey where recordings could not tell."""
-    rows = [found.trends.get((joint, parameter), found.sizes.get((joint, parameter))) for joint in joints]
+def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links) -> str:
+    """Return the section of a parameter, the first joint on top; grey where recordings could not tell."""
+    rows = [fleet.trends.get((joint, parameter), fleet.sizes.get((joint, parameter))) for joint in joints]
     shown = [_row(trend, steps) for trend in rows]
-    change = np.array([c for c, _ in shown]) * 100.0
-    untold = np.array([u for _, u in shown])
-    finite = np.abs(change[np.isfinite(change)])
-    full = _full(finite) if finite.size else 1.0
-    x, names = dates(steps.middle), list(joints)
-    return Figure(
-        title=_title(parameter, rows),
-        caption="Mean of each week against the joint's first level, at its mean temperature. Orange: higher. "
-        "Blue: lower. Grey: recordings, but none that could tell. Empty: no recording.",
-        data=[_untold(untold, x, names), _changes(change, x, names, full)],
-        layout=layout(
-            xaxis=date_axis(steps),
-            yaxis=axis("", type="category", autorange="reversed", showgrid=False, ticks="", dtick=1),
-            hovermode="closest",
-            margin={"l": 60, "r": 84, "t": 8, "b": 36},
-        ),
-        height=_MARGIN + _ROW * len(joints),
+    change, undetermined = np.array([c for c, _ in shown]), np.array([u for _, u in shown])
+    full = _full(np.abs(change[np.isfinite(change)]))
+    picture = _picture(
+        change / full, undetermined, joints, steps, links, lambda i, j: percent(float(change[i, j]))
+    )
+    return section(
+        _title(parameter, rows),
+        picture,
+        _key(percent(-full), "as on the first day", percent(full), (-1.0, 1.0)),
+        caption=f"Mean of each {steps.name} against the joint's first level, at its mean temperature. Grey: "
+        "recordings, but none that could tell. Empty: no recording.",
     )
 
 
-def _full(change: np.ndarray) -> float:
-    """Return the change, %, at which the colours are full: noise alone stays pale."""
-    return float(max(100.0 * _LEAST, np.quantile(change, _QUANTILE), _NOISE * np.median(change)))
-
-
-def naming_map(about: str, kind: str, joints: Sequence[str], found: FleetTrends, steps: Steps) -> Figure:
-    """Return the map of a cause or a fault: the share of each week's recordings that name it."""
-    of = {n.joint: n for n in found.namings if (n.about, n.kind) == (about, kind)}
-    share = np.array([_share(of.get(joint), steps) for joint in joints]) * 100.0
+def naming_map(
+    about: str, kind: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links
+) -> str:
+    """Return the section of a cause or a fault: the share of each week's recordings that name it."""
+    of = {n.joint: n for n in fleet.namings if (n.about, n.kind) == (about, kind)}
+    share = np.array([_share(of[joint], steps) for joint in joints])
+    often = sum(bool(np.nanmax(row, initial=0.0) >= _OFTEN) for row in share)
+    picture = _picture(
+        share,
+        np.zeros(share.shape, bool),
+        joints,
+        steps,
+        links,
+        lambda i, j: f"{share[i, j]:.0%} of its recordings",
+    )
     plain = name(about) + ("" if kind == "cause" else " in the data")
-    often = [j for j, row in zip(joints, share, strict=True) if np.nanmax(row, initial=0.0) >= _OFTEN]
-    return Figure(
-        title=f"{plain}: {len(often)} of {len(joints)} joints",
-        caption=f"Share of the recordings of each week that name it, for joints that do at all; "
-        f"counted: {_OFTEN:g} % or more in some week.",
-        data=[_shares(share, dates(steps.middle), list(joints))],
-        layout=layout(
-            xaxis=date_axis(steps),
-            yaxis=axis("", type="category", autorange="reversed", showgrid=False, ticks="", dtick=1),
-            hovermode="closest",
-            margin={"l": 60, "r": 84, "t": 8, "b": 36},
-        ),
-        height=_MARGIN + _ROW * len(joints),
+    return section(
+        f"{plain}: often in {often} of {len(fleet.joints)} joints",
+        picture,
+        _key("no recording", "", f"all recordings of the {steps.name}", (0.0, 1.0)),
+        caption=f"Share of the recordings of each {steps.name} that name it, for the joints that do at all.",
     )
 
 
-def _share(naming: Naming | None, steps: Steps) -> np.ndarray:
-    if naming is None:
-        return np.full(len(steps), np.nan)
-    asked, named = steps.count(naming.time_s), steps.count(naming.time_s[naming.named])
-    return np.where(asked > 0, named / np.maximum(asked, 1), np.nan)
+def shades() -> str:
+    """Return the style of the cells: orange above, blue below, by steps of the change."""
+    opacity = [0.04 + 0.96 * (k / _SHADES) ** 1.4 for k in range(1, _SHADES + 1)]
+    return "".join(
+        f".heat .{side}{k},.key .{side}{k}{{fill:var(--{tone});fill-opacity:{o:.2f}}}"
+        for side, tone in (("u", "before"), ("d", "after"))
+        for k, o in enumerate(opacity, 1)
+    )
 
 
-def _shares(share: np.ndarray, x: list[str], names: list[str]) -> Json:
-    scale = [[0.0, faint(GRID, 0.5)], [1.0, BEFORE]]
-    map_ = _changes(share, x, names, 100.0)
-    hover = "%{y}, week of %{x}: named in %{z:.0f} %<extra></extra>"
-    return {**map_, "zmin": 0.0, "colorscale": scale, "hovertemplate": hover}
+def _full(change: FloatArray) -> float:
+    """Return the change at which the colours are full: noise alone stays pale."""
+    if not change.size:
+        return 1.0
+    return float(max(_LEAST, np.quantile(change, _QUANTILE), _NOISE * np.median(change)))
 
 
-def _row(trend: Trend | None, steps: Steps) -> tuple[np.ndarray, np.ndarray]:
-    """Return the relative change of each week, and which weeks were recorded and not told."""
+def _row(trend: Trend | None, steps: Steps) -> tuple[FloatArray, BoolArray]:
+    """Return the relative change of each week, and which weeks were recorded and not determined."""
     empty = np.full(len(steps), np.nan)
     if trend is None:
         return empty, np.zeros(len(steps), bool)
     bins = binned(trend, steps)
     if trend.first is None or not trend.first.value:
-        return empty, bins.asked > 0
-    change = (bins.value - trend.first.value) / abs(trend.first.value)
-    return change, (bins.asked > 0) & ~np.isfinite(change)
+        return empty, bins.recorded > 0
+    change: FloatArray = (bins.value - trend.first.value) / abs(trend.first.value)
+    return change, (bins.recorded > 0) & ~np.isfinite(change)
 
 
-def _changes(change: np.ndarray, x: list[str], names: list[str], full: float) -> Json:
-    return {
-        "type": "heatmap",
-        "x": x,
-        "y": names,
-        "z": [numbers(row) for row in change],
-        "zmin": -full,
-        "zmax": full,
-        "colorscale": [[0.0, AFTER], [0.5, faint(GRID, 0.5)], [1.0, BEFORE]],
-        "xgap": 1,
-        "ygap": 2,
-        "hoverongaps": False,
-        "hovertemplate": "%{y}, week of %{x}: %{z:+.2f} %<extra></extra>",
-        "colorbar": {
-            "thickness": 8, "len": 0.9, "outlinewidth": 0, "ticksuffix": " %", "x": 1.01, "nticks": 5,
-            "tickfont": {"size": 11, "color": QUIET},
-        },
-    }  # fmt: skip
+def _share(naming: Naming, steps: Steps) -> FloatArray:
+    asked, named = steps.count(naming.time_s), steps.count(naming.time_s[naming.named])
+    share: FloatArray = np.where(asked > 0, named / np.maximum(asked, 1), np.nan)
+    return share
 
 
-def _untold(untold: np.ndarray, x: list[str], names: list[str]) -> Json:
-    return {
-        "type": "heatmap",
-        "x": x,
-        "y": names,
-        "z": [[1.0 if u else None for u in row] for row in untold],
-        "colorscale": [[0.0, faint(NOISE, 0.55)], [1.0, faint(NOISE, 0.55)]],
-        "showscale": False,
-        "xgap": 1,
-        "ygap": 2,
-        "hoverongaps": False,
-        "hovertemplate": "%{y}, week of %{x}: not enough excitation to tell<extra></extra>",
-    }
+def _picture(
+    depth: FloatArray, undetermined: BoolArray, joints: Sequence[str], steps: Steps, links: Links,
+    text: Callable[[int, int], str],
+) -> str:  # fmt: skip
+    """Return the cells. depth: -1 to 1, NaN for none, shape (joints, steps). text: of a cell."""
+    weeks = [short_day(float(t)) for t in steps.edges[:-1]]
+    cells = []
+    for i, joint in enumerate(joints):
+        for j in np.flatnonzero(np.isfinite(depth[i]) | undetermined[i]):
+            blank = bool(undetermined[i, j])
+            said = "not enough excitation to tell" if blank else text(i, int(j))
+            cells.append(
+                _cell(i, int(j), "n" if blank else _class(float(depth[i, j])), f"{joint}, {weeks[j]}: {said}")
+            )
+    height = _ROW * len(joints)
+    labels = "".join(f"<li>{links.joint(j)}</li>" for j in joints)
+    return (
+        f'<div class="heat"><ol>{labels}</ol>'
+        f'<svg viewBox="0 0 {len(steps)} {len(joints)}" preserveAspectRatio="none" style="height:{height}px" '
+        f'role="img">{"".join(cells)}</svg>{months(steps)}</div>'
+    )
+
+
+def _cell(row: int, column: int, kind: str, text: str) -> str:
+    of_class = f' class="{kind}"' if kind else ""
+    place = f'x="{column}" y="{row}" width=".92" height=".86"'
+    return f"<rect {place}{of_class}><title>{escape(text)}</title></rect>"
+
+
+def _class(depth: float) -> str:
+    shade = round(min(1.0, abs(depth)) * _SHADES)
+    return f"{'u' if depth > 0.0 else 'd'}{shade}" if shade else ""
+
+
+def _key(low: str, middle: str, high: str, ends: tuple[float, float]) -> str:
+    """Return the scale of colours with its ends."""
+    steps = np.linspace(*ends, 2 * _SHADES + 1)
+    cells = "".join(
+        f'<rect x="{k}" width="1" height="1" class="{_class(float(v)) or "z"}"/>' for k, v in enumerate(steps)
+    )
+    scale = f'<svg viewBox="0 0 {len(steps)} 1" preserveAspectRatio="none">{cells}</svg>'
+    inner = f", middle: {escape(middle)}" if middle else ""
+    return f'<div class="key">{escape(low)}{scale}{escape(high)}{inner}</div>'
 
 
 def _title(parameter: str, rows: Sequence[Trend | None]) -> str:
-    told = [t for t in rows if t is not None and t.state != "untold"]
-    moved = [t for t in told if t.state != "steady"]
+    determined = [t for t in rows if t is not None and t.state != "undetermined"]
+    moved = [t for t in determined if t.state != "steady"]
     plain = name(parameter)
-    if not told:
+    if not determined:
         return f"{plain}: not enough excitation to tell in any joint"
     if not moved:
-        return f"{plain} is steady in all {len(told)} joints that tell it"
+        return f"{plain} is steady in all {len(determined)} joints that tell it"
     most = max(moved, key=lambda t: abs(t.relative))
-    where = f"{len(moved)} of {len(told)} joints, most in {most.series.joint}"
+    where = f"{len(moved)} of {len(determined)} joints, most in {most.series.joint}"
     return f"{plain} moved in {where}: {percent(most.relative)}"

@@ -29,55 +29,55 @@ _USUAL = 0.8
 
 
 def joint_page(
-    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
 ) -> str:
     """Return the page as HTML that opens without a network. alarms: of this joint, the most urgent first."""
     rows = np.flatnonzero(np.asarray(recordings["joint"], str) == joint)
-    title = f"{joint}: {sentence(alarms[0])}" if alarms else f"{joint}: {_quiet(found, joint)}"
-    blocks = list(_blocks(joint, found, alarms, recordings, rows, steps, links))
+    title = f"{joint}: {sentence(alarms[0])}" if alarms else f"{joint}: {_quiet(fleet, joint)}"
+    blocks = list(_blocks(joint, fleet, alarms, recordings, rows, steps, links))
     footer = ["rsea fleet report. All values in SI, all times UTC."]
     return page(title, f"Joint {joint} · {len(rows)} recordings", blocks, footer)
 
 
 def _blocks(
-    joint: str, found: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray,
+    joint: str, fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, rows: np.ndarray,
     steps: Steps, links: Links,
 ) -> Iterator[Block]:  # fmt: skip
-    trends = [t for (j, _), t in found.trends.items() if j == joint]
+    trends = [t for (j, _), t in fleet.trends.items() if j == joint]
     yield '<p class="next"><a href="index.html">All joints</a></p>'
     yield key_numbers(_keys(trends, recordings, rows))
     if alarms:
         yield section("What to look at", alarm_table(alarms, links, with_joint=False))
-    yield from _pictures(joint, trends, found, steps)
+    yield from _pictures(joint, trends, fleet, steps)
     yield section("All parameters", parameter_rows(trends))
     yield folded("The latest recordings", _recordings(recordings, rows, links))
 
 
-def _pictures(joint: str, trends: Sequence[Trend], found: FleetTrends, steps: Steps) -> Iterator[Block]:
-    """Yield what moved and what appeared, then what is steady, what is usual, and what cannot be told."""
-    sized = [t for (j, p), t in found.sizes.items() if j == joint and _is_usual(p, joint, found)]
+def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
+    """Yield what moved and what appeared, then what is steady, usual, and undetermined."""
+    sized = [t for (j, p), t in fleet.sizes.items() if j == joint and _is_usual(p, joint, fleet)]
     moved = [t for t in (*trends, *sized) if t.state in ("trending", "changed")]
     yield from (parameter_figure(t, steps) for t in sorted(moved, key=lambda t: -_size(t)))
-    yield from _namings(joint, found, steps, appeared=True)
+    yield from _namings(joint, fleet, steps, appeared=True)
     yield from (parameter_figure(t, steps) for t in (*trends, *sized) if t.state == "steady")
-    yield from _namings(joint, found, steps, appeared=False)
-    untold = [t for t in trends if t.state == "untold"]
-    yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in untold)
+    yield from _namings(joint, fleet, steps, appeared=False)
+    undetermined = [t for t in trends if t.state == "undetermined"]
+    yield from (section(finding(t), paragraph(f"{capital(t.reason)}.")) for t in undetermined)
 
 
 def _size(trend: Trend) -> float:
     return abs(trend.relative) if trend.relative == trend.relative else 0.0
 
 
-def _is_usual(parameter: str, joint: str, found: FleetTrends) -> bool:
+def _is_usual(parameter: str, joint: str, fleet: FleetTrends) -> bool:
     """Return whether nearly every recording names a cause: its size is a parameter like any other then."""
     cause = parameter.partition(".")[0]
-    return any(n.joint == joint and n.about == cause and np.mean(n.named) > _USUAL for n in found.namings)
+    return any(n.joint == joint and n.about == cause and np.mean(n.named) > _USUAL for n in fleet.namings)
 
 
-def _namings(joint: str, found: FleetTrends, steps: Steps, appeared: bool) -> Iterator[Block]:
-    appearances = {(a.joint, a.about, a.kind): a for a in found.appearances}
-    for naming in sorted((n for n in found.namings if n.joint == joint), key=lambda n: n.kind):
+def _namings(joint: str, fleet: FleetTrends, steps: Steps, appeared: bool) -> Iterator[Block]:
+    appearances = {(a.joint, a.about, a.kind): a for a in fleet.appearances}
+    for naming in sorted((n for n in fleet.namings if n.joint == joint), key=lambda n: n.kind):
         appearance = appearances.get((joint, naming.about, naming.kind))
         share = np.mean(naming.named)
         if (appearance is not None) != appeared or (appearance is None and not _RARE <= share <= _USUAL):
@@ -94,22 +94,22 @@ def _has_size(naming: Naming) -> bool:
 
 
 def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray) -> list[tuple[str, str]]:
-    told = sum(t.state != "untold" for t in trends)
+    determined = sum(t.state != "undetermined" for t in trends)
     done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
     faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
     return [
-        (f"{told} of {len(trends)}", "parameters that the recordings tell"),
+        (f"{determined} of {len(trends)}", "parameters that the recordings tell"),
         (str(done), f"recordings used, of {len(rows)}"),
         (str(faulty), "recordings with faults in the data"),
     ]
 
 
-def _quiet(found: FleetTrends, joint: str) -> str:
-    trends = [t for (j, _), t in found.trends.items() if j == joint]
-    told = [t for t in trends if t.state != "untold"]
+def _quiet(fleet: FleetTrends, joint: str) -> str:
+    trends = [t for (j, _), t in fleet.trends.items() if j == joint]
+    determined = [t for t in trends if t.state != "undetermined"]
     return (
-        f"steady in all {len(told)} parameters that its recordings tell"
-        if told
+        f"steady in all {len(determined)} parameters that its recordings tell"
+        if determined
         else "its recordings tell nothing yet"
     )
 

@@ -29,7 +29,7 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
     return Figure(
         title=finding(trend),
         caption=_caption(trend),
-        data=[*_course(trend, factor), *ahead, _weeks(bins, steps, factor, unit), _untold(bins, steps)],
+        data=[*_course(trend, factor), *ahead, _weeks(bins, steps, factor, unit), _undetermined(bins, steps)],
         layout=layout(
             xaxis=date_axis(steps, until),
             yaxis=axis(f"{name(trend.series.parameter)}, {unit}".rstrip(", "), hoverformat=".4g"),
@@ -45,11 +45,10 @@ def parameter_figure(trend: Trend, steps: Steps) -> Figure:
 def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
     some = np.isfinite(bins.value)
     y, half = bins.value[some] * factor, (bins.high - bins.low)[some] * factor / 2.0
-    title = "week" if steps.days < 8 else f"{steps.days / 7:.0f} weeks"
     return points(
         steps.middle[some],
         numbers(y),
-        title,
+        steps.name,
         marker={"color": MEASURED, "size": 5},
         error_y={
             "type": "data",
@@ -58,18 +57,20 @@ def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
             "thickness": 1,
             "width": 0,
         },
-        customdata=[[int(a), int(b)] for a, b in zip(bins.told[some], bins.asked[some], strict=True)],
+        customdata=[
+            [int(a), int(b)] for a, b in zip(bins.identifiable[some], bins.recorded[some], strict=True)
+        ],
         hovertemplate=f"%{{y:.5g}} {unit}, %{{customdata[0]}} of %{{customdata[1]}} recordings",
     )
 
 
-def _untold(bins: Binned, steps: Steps) -> Json:
+def _undetermined(bins: Binned, steps: Steps) -> Json:
     """Return a mark at the bottom for each week whose recordings could not tell the parameter."""
-    none = (bins.asked > 0) & (bins.told == 0)
+    none = (bins.recorded > 0) & (bins.identifiable == 0)
     return points(
         steps.middle[none],
         [0.02] * int(np.sum(none)),
-        "could not be told",
+        "could not be determined",
         yaxis="y2",
         marker={"symbol": "x-thin-open", "size": 7, "color": NOISE},
         hovertemplate="not enough excitation to tell",
@@ -137,7 +138,7 @@ def _caption(trend: Trend) -> str:
     if trend.per_kelvin is not None:
         parts[0] += f", at the mean temperature; a kelvin makes {percent(trend.per_kelvin.value)} of it"
     level = abs(trend.now.value) if trend.now else 0.0
-    if level:
+    if level and trend.day_sd > 0.0:
         parts.append(f"Days scatter by {amount(trend.day_sd / level)}")
-    parts.append(f"{int(np.sum(s.told))} of {len(s.told)} recordings could tell it")
+    parts.append(f"{int(np.sum(s.identifiable))} of {len(s.identifiable)} recordings determine it")
     return ". ".join(p for p in parts if p) + "."

@@ -1,69 +1,45 @@
-"""What changed since when: a row for each finding, from the day on which it began."""
+"""What changed since when: a rail for each finding, from the day on which it began."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from html import escape
 
-from rsea_ros.report.figure import Figure, Json, axis, label, layout
-from rsea_ros.report.fleet.fleet_words import about, dates, doubt_of_date, short_day
-from rsea_ros.report.fleet.marks import date_axis
-from rsea_ros.report.palette import AFTER, BEFORE, INK, MEASURED, faint
+from rsea_ros.report.fleet.dates_below import months, share
+from rsea_ros.report.fleet.fleet_words import about, doubt_of_date, short_day
+from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.page import section
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.weeks import Steps
 
-_ROW = 40
 _MOST = 24
-_COLOUR = {"trend": BEFORE, "cause": BEFORE, "change": AFTER, "fault": MEASURED}
 
 
-def timeline(alarms: Sequence[Alarm], steps: Steps) -> Figure | None:
-    """Return the figure of the findings that have a date, in the order given; None without one."""
+def timeline(alarms: Sequence[Alarm], steps: Steps, links: Links) -> str:
+    """Return the section of the findings that have a date, in the order given; empty without one."""
     dated = [a for a in alarms if math.isfinite(a.since_s)]
     shown = dated[:_MOST]
     if not shown:
-        return None
+        return ""
+    first = min(shown, key=lambda a: a.since_s)
+    number = "one finding" if len(dated) == 1 else f"{len(dated)} findings"
     more = f" The first {_MOST} of {len(dated)} findings." if len(dated) > _MOST else ""
-    return Figure(
-        title=f"What changed since when: {_earliest(shown)}",
-        caption="A bar begins on the day of the change, pale where that day is in doubt, and ends with the "
-        "recordings. Orange: it goes on, or it has a name. Blue: a step that is over. Grey: bad data." + more,
-        data=[t for i, a in enumerate(shown) for t in _bar(a, i, float(steps.edges[-1]))],
-        layout=layout(
-            xaxis=date_axis(steps),
-            yaxis=axis("", visible=False, range=[len(shown) - 0.2, -0.8], fixedrange=True),
-            annotations=[_text(a, i, steps) for i, a in enumerate(shown)],
-            hovermode="closest",
-            margin={"l": 12, "r": 12, "t": 8, "b": 36},
-        ),
-        height=70 + _ROW * len(shown),
+    rows = "".join(_row(a, steps, links) for a in shown)
+    return section(
+        f"What changed since when: {number}, the earliest of {short_day(first.since_s)}",
+        f'<div class="spans">{rows}{months(steps)}</div>',
+        caption="A bar begins on the day of the change, pale where that day is in doubt. Orange: it goes on, "
+        f"or has a name. Blue: the change is over, its level stays. Grey: bad data.{more}",
     )
 
 
-def _bar(alarm: Alarm, row: int, end: float) -> list[Json]:
-    colour = _COLOUR.get(alarm.kind, MEASURED)
-    hover = f"{alarm.joint}: {about(alarm)}<br>began {doubt_of_date(alarm)}<extra></extra>"
-    common = {"type": "scatter", "mode": "lines", "hovertemplate": hover, "y": [row, row]}
-    doubt = dates([alarm.earliest_s, alarm.latest_s])  # type: ignore[arg-type]
-    certain = dates([alarm.since_s, end])  # type: ignore[arg-type]
-    return [
-        {**common, "x": doubt, "line": {"color": faint(colour, 0.35), "width": 11}},
-        {**common, "x": certain, "line": {"color": colour, "width": 5 if alarm.kind != "change" else 2}},
-        {**common, "mode": "markers", "x": certain[:1], "y": [row], "marker": {"color": colour, "size": 9}},
-    ]
-
-
-def _text(alarm: Alarm, row: int, steps: Steps) -> Json:
-    """Return the label above a bar: from its beginning on, or up to it in the later half."""
-    text = f"<b>{_escaped(alarm.joint)}</b>  {_escaped(about(alarm))}"
-    first = dates([steps.edges[0]])[0]  # type: ignore[arg-type]
-    return label(text, first, row, INK, yshift=13, font={"size": 12, "color": INK})  # type: ignore[arg-type]
-
-
-def _earliest(alarms: Sequence[Alarm]) -> str:
-    first = min(alarms, key=lambda a: a.since_s)
-    return f"{len(alarms)} findings, the earliest of {short_day(first.since_s)}"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;")
+def _row(alarm: Alarm, steps: Steps, links: Links) -> str:
+    begin, end = share(alarm.since_s, steps), 100.0
+    early, late = share(alarm.earliest_s, steps), share(alarm.latest_s, steps)
+    return (
+        f'<div class="span {alarm.kind}"><p>{links.joint(alarm.joint)} {escape(about(alarm))}'
+        f"<small>began {escape(doubt_of_date(alarm))}</small></p>"
+        f'<div class="rail"><i class="doubt" style="left:{early:.1f}%;width:{late - early:.1f}%"></i>'
+        f'<i style="left:{begin:.1f}%;width:{end - begin:.1f}%"></i></div></div>'
+    )

@@ -99,14 +99,16 @@ function health(statuses) {
   }));
 }
 
-function recordings(list) {
-  const running = list.find((r) => r.running);
+function recorder(running) {
   $("record").textContent = running ? `Stop (${running.seconds.toFixed(0)} s)` : "Record";
   $("record").className = running ? "on" : "";
+}
+
+function recordings(list) {
   const busy = list.some((r) => Object.values(r.jobs).some((j) => j.state === "running"));
   $("recordings").replaceChildren(...list.map((r) => {
     const item = element("li"), head = item.appendChild(element("div"));
-    head.append(element("span", r.name), element("span", `${r.seconds.toFixed(1)} s`, { className: "quiet" }));
+    head.append(element("span", r.name), element("span", r.running ? "recording" : `${r.seconds.toFixed(1)} s`, { className: "quiet" }));
     if (r.words) item.append(element("p", r.words));
     if (r.running || r.words) return item;
     const acts = item.appendChild(element("div", undefined, { className: "acts" }));
@@ -117,7 +119,7 @@ function recordings(list) {
         const act = acts.appendChild(element("button", job?.state === "running" ? `${verb} …` : verb, { type: "button", disabled: busy }));
         act.addEventListener("click", () => send({ do: "evaluate", recording: r.name, verb }));
       }
-      if (job?.words) item.append(element("p", job.words, { className: job.state === "failed" ? "" : "quiet" }));
+      if (job?.words) item.append(element("p", job.words.split("; next:")[0], { className: job.state === "failed" ? "" : "quiet" }));
     }
     return item;
   }));
@@ -127,7 +129,8 @@ function onState({ bench, health: statuses, rates, command: may, recordings: lis
   $("bench").textContent = bench;
   $("rates").textContent = Object.entries(rates).map(([topic, hz]) => `${topic} ${hz} Hz`).join(" · ");
   if (statuses.length) onceChanged("health", statuses, health);
-  onceChanged("recordings", list, recordings);
+  recorder(list.find((r) => r.running));
+  onceChanged("recordings", list.map((r) => (r.running ? { ...r, seconds: 0 } : r)), recordings);
   onceChanged("command", may, command.show);
 }
 

@@ -160,6 +160,16 @@ def test_an_array_that_promises_more_than_the_file_holds(tmp_path):
         read_columns(tmp_path / "run.npz", ["t"])
 
 
+@pytest.mark.parametrize("header", [b"{'descr': '<f8', 'shape': (6,), ", b"{'descr': ((((((", b"\x00\xff('"])
+def test_a_header_that_is_no_header_is_one_line(tmp_path, header):
+    """Damaged files in bench/inputs.py brought an error of the tokenizer that nobody had thought of."""
+    with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
+        text = header.ljust(117) + b"\n"
+        archive.writestr("t.npy", b"\x93NUMPY\x01\x00v\x00" + text + T.tobytes())
+    with pytest.raises(ImportMapError, match=r"run.npz: array 't' has no header that can be read"):
+        read_columns(tmp_path / "run.npz", ["t"])
+
+
 def test_npy_of_one_matrix_and_of_fields(tmp_path):
     np.save(tmp_path / "run.npy", Q)
     assert read_columns(tmp_path / "run.npy", ["2"])["2"].tolist() == Q[:, 1].tolist()

@@ -1,0 +1,195 @@
+"""What the watch over a joint reaches: asked beside measured.
+
+Run: python bench/health.py [SECTION …] [--hours 1] [--seeds 0 1 2] [--seconds 60]
+white   false alarms of the sums on scores drawn at the edge of the doubt: stated, measured
+alarms  false alarms over hours of clean work of test/independent, at several stated rates on the same looks
+faults  each fault switched on after two minutes of work: named, delay, size
+cost    CPU of the monitor alone, and of the node with plant and excite, as a share of one core
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from bench.health_runs import FAULTS, drawn, faulty, monitor_of, pieces, watch, work
+from bench.sections import chosen, parser_of
+from rsea_ros.cli._node_process import start, stop
+from rsea_ros.health.cusum import Cusum, threshold
+from rsea_ros.health.look import events_of
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+EVERY, RATES = 3.0, (100.0, 10.0, 1.0, 1e-3)
+CLEAN, WORN, START = 120.0, 60.0, 120.0
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def white(args: argparse.Namespace) -> Iterator[str]:
+    """Draw scores at the edge of the doubt, the worst that is no change, and count alarms."""
+    yield f"{'stated, 1/h':>14}{'measured, 1/h':>16}{'hours':>8}"
+    inner, outer, looks = np.full(10, 1.0), np.full(10, 2.0), 60_000
+    for rate in (100.0, 30.0, 10.0):
+        rng, count = np.random.default_rng(0), 0
+        cusum = Cusum(inner, outer, threshold(rate, 20, EVERY))
+        for _ in range(looks):
+            information = rng.uniform(0.0, 4.0, 10)
+            score = information * inner + np.sqrt(information) * rng.standard_normal(10)
+            if cusum.take(score, information, np.ones(10)):
+                count += 1
+                cusum.clear()
+        hours = looks * EVERY / 3600.0
+        yield f"{rate:14g}{count / hours:16.3g}{hours:8.0f}"
+
+
+def alarms(args: argparse.Namespace) -> Iterator[str]:
+    """Watch clean work of another bench each seed; the sums run again on its looks at other thresholds."""
+    hours, findings, seen = 0.0, 0, dict.fromkeys(RATES, 0)
+    for seed in args.seeds:
+        rng = np.random.default_rng([seed, 1])
+        bench, rig = drawn(rng)
+        with _noted() as rows:
+            found = list(watch(monitor_of(rig), pieces(bench, 3600.0 * args.hours, rng)))
+        hours, findings = hours + args.hours, findings + len(found)
+        for rate in RATES:
+            seen[rate] += _again(rows, rate)
+        told = "; ".join(f"{f.code} {f.name} {f.size:.3g} at {at:.0f} s" for at, f in found)
+        yield f"seed {seed}: {args.hours:g} h, findings: {told or 'none'}"
+    yield f"{hours:g} h of work, {findings} false findings at {RATES[-1]:g} an hour"
+    for rate, count in seen.items():
+        yield f"stated {rate:8g} an hour: sums over their threshold {count / hours:.3g} an hour"
+
+
+class _noted:
+    """Note what every CUSUM is given meanwhile: (inner, outer, score, information, phi)."""
+
+    def __enter__(self) -> list[tuple[Cusum, tuple[np.ndarray, ...]]]:
+        rows: list[tuple[Cusum, tuple[np.ndarray, ...]]] = []
+        self._take = take = Cusum.take
+
+        def noting(cusum: Cusum, *args: np.ndarray) -> bool:
+            rows.append((cusum, args))
+            return take(cusum, *args)
+
+        Cusum.take = noting  # type: ignore[method-assign]
+        return rows
+
+    def __exit__(self, *_: object) -> None:
+        Cusum.take = self._take  # type: ignore[method-assign]
+
+
+def _again(rows: list[tuple[Cusum, tuple[np.ndarray, ...]]], rate: float) -> int:
+    """Return how often sums of another threshold reach it on the same looks."""
+    count, last, sums = 0, None, None
+    for given, args in rows:
+        if given is not last or sums is None:
+            sums, last = given.like(threshold(rate, given.sums.size, EVERY)), given
+        if sums.take(*args):
+            count += 1
+            sums.clear()
+    return count
+
+
+def faults(args: argparse.Namespace) -> Iterator[str]:
+    """Switch a fault on after clean work; the last name within a minute counts, and the delay to it."""
+    rows: dict[str, list[tuple[bool, float, float, str]]] = {name: [] for name in FAULTS}
+    for seed in args.seeds:
+        for name, fault in FAULTS.items():
+            rng = np.random.default_rng([seed, 2])
+            bench, rig = drawn(rng)
+            monitor = monitor_of(rig)
+            early = list(watch(monitor, pieces(bench, CLEAN, rng)))
+            found = list(watch(monitor, pieces(faulty(bench, fault), WORN, rng, START)))
+            names = [f.code for f in monitor.changes.found.values()] if monitor.changes else []
+            times = [at - START for at, f in found if f.code == fault.code]
+            sizes = [f.size for _, f in found if f.code == fault.code]
+            right = set(names) == {fault.code}
+            told = ", ".join(f"{f.code} {f.name} {f.size:.4g} after {at - START:.1f} s" for at, f in found)
+            yield f"seed {seed} {name}: {'right' if right else 'WRONG'}; {told or 'nothing'}"
+            if early:
+                yield f"  false before: {', '.join(f.code for _, f in early)}"
+            rows[name].append((right, min(times, default=np.inf), sizes[-1] if sizes else np.nan, told))
+    for name, each in rows.items():
+        delays = [delay for _, delay, _, _ in each]
+        line = f"{name:22} right {sum(r for r, *_ in each)} of {len(each)}"
+        yield f"{line}, delay median {np.median(delays):.1f} s, longest {max(delays):.1f} s"
+
+
+def cost(args: argparse.Namespace) -> Iterator[str]:
+    """Measure CPU time over the time of the joint, after learning."""
+    for rate in (280.0, 1000.0):
+        rig = load_rig("paper_high_impedance")
+        t = np.arange(round(150.0 * rate)) / rate
+        rng = np.random.default_rng(3)
+        record = synthesize(rig, Channel(t, work(150.0, rng, rate)), seed=1)
+        monitor, before = monitor_of(rig), 0.0
+        events = events_of(record)
+        step = round(0.75 * rate)
+        for k in range(0, len(events[0]), step):
+            if monitor.now < 90.0:
+                before = time.process_time()
+            monitor.take(*(part[k : k + step] for part in events))
+        share = (time.process_time() - before) / 60.0
+        yield f"monitor alone, {rate:g} Hz: {100.0 * share:.2f} % of a core"
+        node = 100.0 * _node_share(rate, args.seconds)
+        yield f"node, {rate:g} Hz: {node:.2f} % of a core (asked at 280 Hz: < 5)"
+
+
+def _node_share(rate: float, seconds: float) -> float:
+    """Return the CPU share of the node's process beside plant and excite, after learning."""
+    def arguments(**values: object) -> list[str]:
+        return ["--ros-args", *(w for n, v in values.items() for w in ("-p", f"{n}:={v}"))]
+
+    work = {"kind": "multisine", "low": 0.2, "high": 6.0, "amplitude": 6.0, "duration": seconds + 45.0}
+    excite = arguments(**work, subscribers=2, rate=rate)
+    options = {"stdout": -3, "stderr": -3}  # subprocess.DEVNULL
+    nodes = [start("plant", arguments(rate=rate), **options), start("excite", excite, **options)]
+    health = start("health", arguments(out="/nonexistent", bags=0), **options)
+    try:
+        time.sleep(40.0)
+        begin, at = _cpu(health.pid), time.monotonic()
+        time.sleep(seconds)
+        return (_cpu(health.pid) - begin) / (time.monotonic() - at)
+    finally:
+        health.send_signal(signal.SIGINT)
+        stop([*nodes, health])
+
+
+def _cpu(pid: int) -> float:
+    """Return the CPU time of a process, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+SECTIONS: dict[str, Callable[[argparse.Namespace], Iterable[str]]] = {
+    "white": white, "alarms": alarms, "faults": faults, "cost": cost,
+}  # fmt: skip
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--hours", type=float, default=0.5, help="of clean work for each seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2])
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the node's CPU")
+    args, sections = chosen(parser, SECTIONS)
+    with threadpool_limits(1):
+        for name, section in sections:
+            print(f"== {name}")
+            for line in section(args):
+                print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""`rsea law`: a law for what a model leaves unexplained, as an effect file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._progress import progress
+from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
+
+HELP = "what is left when every known cause is named: the law of it, as an effect file"
+EXAMPLE = "rsea law run.mcap --rig results/model.yaml --out law"
+RIG = "paper_high_impedance"
+FILES = ("law.json", "base.yaml", "model.yaml", "report.html")
+FINDINGS = ("law", "no_law", "at_noise_floor")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the verb's arguments."""
+    add = parser.add_argument
+    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
+    add("--rig", default=RIG, help="model.yaml of a diagnosis, or any rig (default %(default)s)")
+    add("--out", help=f"directory for the effect file, {', '.join(FILES)} (default out/law-BAG, -2, …)")
+    add_force(parser)
+    add("--json", action="store_true", help="print law.json to stdout and nothing else")
+    add_fail_on(parser, FINDINGS)
+    add_topic_options(parser)
+    add_window_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Look for a law and write it."""
+    from rsea_ros.model.rig_file import load_rig
+
+    place = results_place(args, Path("out") / f"law-{Path(args.bags[0]).stem}", FILES, [*args.bags, args.rig])
+    rig, topics = load_rig(args.rig), topic_map(args)
+    with progress("law") as tell:
+        tell("reading", 0.0)
+        from rsea_ros.cli._checks import checked
+        from rsea_ros.cli.diagnose import readable
+
+        records = [readable(bag, topics, args) for bag in each_once(args.bags)]
+        records = checked(records, rig, topics.axis, quiet=args.json, masks=True)
+        from rsea_ros.cli._provenance import provenance
+        from rsea_ros.laws.learn import learn
+        from rsea_ros.laws.writing import Provenance
+        from rsea_ros.report.law_files import write_law
+
+        where = provenance("law", args.bags, args.rig)
+        bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
+        result = learn(records, rig, Provenance(where.date, where.version, bags, ""), tell)
+        report = write_law(result, place, where)
+    if args.json:
+        print((report.parent / "law.json").read_text(encoding="utf-8"), end="")
+    else:
+        from rsea_ros.report.law_words import gain_sentence, headline, law_lines
+
+        print(headline(result))
+        for line in law_lines(result):
+            print(f"  {line}")
+        if result.laws:
+            print(gain_sentence(result))
+            print(f"effect      {', '.join(str(report.parent / (w.law.name + '.py')) for w in result.laws)}")
+        print(f"report      {report}")
+    finding = "law" if result.laws else "at_noise_floor" if result.at_floor else "no_law"
+    return FOUND if finding in args.fail_on else 0

@@ -1,0 +1,10 @@
+"""What a worker process of this machine does first; Dask calls it (SETTINGS in cluster.py)."""
+
+from __future__ import annotations
+
+import signal
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C to the client, which ends the workers: each would print where it was."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,85 @@
+"""From chosen columns to a law: coefficients in SI, one law a place; or the curve that a spline makes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.laws.candidates import SPLINES, Candidate, basis_of, spline_knots
+from rsea_ros.laws.columns import Bench
+from rsea_ros.laws.dependence import Dependence
+from rsea_ros.laws.gram import SELECTION, Gram
+from rsea_ros.laws.law import Curve, Law, Part, joined
+from rsea_ros.laws.reading import ranges_of
+from rsea_ros.laws.selection import Model
+
+_POINTS = 41
+"""Of a learnt curve, evenly apart."""
+_RIDGE = 1e-4
+
+
+def law_of(
+    gram: Gram, candidates: Sequence[Candidate], benches: Sequence[Bench], models: Sequence[Model]
+) -> list[Law]:
+    """Return the laws of some models fitted together, those of one place as one."""
+    first = len(gram.prior)
+    columns = [k for m in models for k in m.columns]
+    if not columns:
+        return []
+    beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]
+    parts: dict[str, list[Part]] = {}
+    for k, b in zip(columns, beta, strict=True):
+        candidate = candidates[k - first]
+        assert candidate.term is not None
+        parts.setdefault(candidate.place, []).append(
+            Part(candidate.term, float(b / gram.scale[k]), candidate.shape)
+        )
+    laws = []
+    for place, items in parts.items():
+        regressor = joined(list(dict.fromkeys(p.term.regressor for p in items)))
+        law = Law(
+            f"law_of_{_slug(items[0].term.regressor)}", items[0].term.place, regressor, tuple(items), {}
+        )
+        laws.append(replace(law, ranges=ranges_of(law, _all_letters(benches)), name=_placed(law.name, place)))
+    return laws
+
+
+def curve_of(
+    gram: Gram, candidates: Sequence[Candidate], benches: Sequence[Bench], dependence: Dependence
+) -> Law:
+    """Return the learnt law of a dependence: its spline, as points of a curve."""
+    first, place = len(gram.prior), dependence.place
+    columns = [first + k for k, c in enumerate(candidates)
+               if c.part and (c.place, c.regressor) == (place, dependence.regressor)]  # fmt: skip
+    beta = gram.fit(np.array(columns), SELECTION, _RIDGE)[first:] / gram.scale[columns]
+    spline = next(s for s in SPLINES if (s.place, s.regressor) == (place, dependence.regressor))
+    knots = spline_knots(benches, spline)
+    x = np.linspace(knots[0], knots[-1], _POINTS)
+    used = [c.part[2] for k in columns if (c := candidates[k - first]).part]
+    curve = Curve(spline.over, spline.factor, x, beta @ basis_of(x, knots)[used])
+    law = Law(
+        _placed(f"learnt_law_of_{_slug(dependence.regressor)}", place),
+        place,
+        dependence.regressor,
+        (),
+        {},
+        curve,
+    )
+    return replace(law, ranges=ranges_of(law, _all_letters(benches)))
+
+
+def _all_letters(benches: Sequence[Bench]) -> dict[str, np.ndarray]:
+    return {
+        n: np.concatenate([b.variables.letters[n] for b in benches]) for n in benches[0].variables.letters
+    }
+
+
+def _slug(text: str) -> str:
+    words = text.replace("'s", "").replace(",", "").replace(" at the ", " ").replace("the ", "").split()
+    return "_".join(w for w in words if w != "a").replace("sensor_sensor", "sensor")
+
+
+def _placed(name: str, place: str) -> str:
+    return name if place == "gear" or name.endswith(place) else f"{name}_at_{place}"

@@ -1,0 +1,71 @@
+"""The base model whose residual is looked at, fitted to all blocks but the test blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
+from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.identification.identify import fit
+from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.steady import steadied
+from rsea_ros.model.extent import bounded
+from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray, Record
+
+FITTED = (*TRAIN, *VALIDATION)
+
+
+@dataclass(frozen=True)
+class Base:
+    """The model whose residual is looked at, fitted to all blocks but the test blocks. cases: all samples."""
+
+    solution: Solution
+    cases: tuple[Case, ...]
+    outputs: list[dict[str, FloatArray]]
+
+    @property
+    def problem(self) -> Problem:
+        """The base model on all samples."""
+        return replace(self.solution.problem, cases=self.cases)
+
+    def score(self, sets: tuple[int, ...]) -> Score:
+        """Return the base's score on some sets of blocks."""
+        return score_on(self.problem, self.cases, sets, self.outputs)
+
+
+def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
+    """Fit a rig to all blocks of records but the test blocks."""
+    rig = rig.with_effects(*(e for e in rig.effects if not e.guess))
+    records = [bounded(commanded(r, rig)) for r in records]
+    checked = [check(r, rig) for r in records]
+    steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
+    checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
+    problem = nominal_problem(checked, rig)
+    parts = [part(c, FITTED) for c in problem.cases]
+    start = joint_start(checked[0].record, rig) if rig.loop is not None else None
+    solution, known, _ = fit(parts, rig, start=start)
+    cases = tuple(replace(c, noise=_finer(c, k)) for c, k in zip(problem.cases, known, strict=True))
+    return Base(solution, cases, replace(solution.problem, cases=cases).outputs(solution.theta))
+
+
+def _finer(case: Case, known: Case) -> dict[str, float]:
+    """Return the noise of each channel: what a fit takes for noise may be a misfit."""
+    return {n: min(v, known.noise[n]) for n, v in case.noise.items()}
+
+
+def levels_of(
+    problem: Problem, outputs: Sequence[dict[str, FloatArray]], cases: Sequence[Case]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the RMS of each channel's residual on the test blocks, and its noise."""
+    score = score_on(problem, cases, TEST, list(outputs))
+    noise = {n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in score.sums}
+    return {n: score.ratio(n) * noise[n] for n in score.sums}, noise

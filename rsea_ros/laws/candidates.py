@@ -1,0 +1,201 @@
+"""All that a law may be made of, as columns of one fit: physical terms, and splines that know no form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from rsea_ros.laws.columns import Bench, Rows
+from rsea_ros.laws.repeats import lines, modes, periods
+from rsea_ros.laws.terms import (
+    COMMAND_TERMS,
+    CREEP,
+    ENCODER_TERMS,
+    GEAR_TERMS,
+    LOAD_TERMS,
+    MOTOR_TERMS,
+    SENSOR_TERMS,
+    SPRING_TERMS,
+    Place,
+    Term,
+    hum_terms,
+    mode_terms,
+    wave_terms,
+)
+from rsea_ros.laws.variables import Variables
+from rsea_ros.signals import FloatArray
+
+_DEGREE = 2
+_WAVES = (1, 2, 3)
+"""Harmonics of a periodic law that knows no form."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One column: a term with a shape, or one part of a spline over a variable (times another).
+
+    part: (variable, factor, number) of a spline's part.
+    """
+
+    place: Place
+    regressor: str
+    term: Term | None = None
+    shape: float = 0.0
+    part: tuple[str, str, int] | None = None
+
+
+@dataclass(frozen=True)
+class Spline:
+    """A spline without a form over one variable, of so many parts, times a factor."""
+
+    place: Place
+    regressor: str
+    over: str
+    factor: str = ""
+    parts: int = 8
+
+
+SPLINES = (
+    Spline("gear", "speed", "w", parts=9),
+    Spline("gear", "speed and load", "w", "T", 5),
+    Spline("gear", "speed and command", "w", "u", 5),
+    Spline("gear", "position", "q", parts=9),
+    Spline("gear", "speed and position", "q", "w", 5),
+    Spline("gear", "time", "t", parts=5),
+    Spline("gear", "speed and time", "t", "w", 5),
+    Spline("command", "command", "u", parts=9),
+    Spline("command", "command and speed", "w", "u", 5),
+    Spline("command", "command and time", "t", "u", 5),
+    Spline("motor", "command", "u", parts=9),
+    Spline("motor", "command and speed", "w", "u", 5),
+    Spline("motor", "command and time", "t", "u", 5),
+    Spline("spring", "deflection", "d", parts=9),
+    Spline("spring", "deflection and time", "t", "d", 5),
+    Spline("ft", "the sensor's torque", "T", parts=7),
+    Spline("ft", "time, at the sensor", "t", parts=5),
+    Spline("ft", "the sensor's torque and time", "t", "T", 5),
+    Spline("encoder", "the load, at the encoder", "T", parts=7),
+)
+
+
+def spline_parts(variables: Variables, spline: Spline, knots: FloatArray) -> FloatArray:
+    """Return the parts of a spline along a record, shape (parts, n)."""
+    basis = basis_of(variables.letters[spline.over], knots)
+    return basis * factor_of(variables, spline.place, spline.over, spline.factor)
+
+
+def factor_of(variables: Variables, place: Place, over: str, factor: str) -> FloatArray | float:
+    """Return what a spline is multiplied by: loads act on friction by their size, speeds by their sign."""
+    if not factor:
+        return 1.0
+    values = variables.letters[factor]
+    if factor == "w":
+        return values if over == "t" else np.tanh(values / CREEP)
+    return np.abs(values) if place == "gear" else values
+
+
+def spline_knots(benches: Sequence[Bench], spline: Spline) -> FloatArray:
+    """Return the knots of a spline over what all records show of its variable."""
+    return knots_of(np.concatenate([b.variables.letters[spline.over] for b in benches]), spline.parts)
+
+
+def knots_of(x: FloatArray, parts: int) -> FloatArray:
+    """Return the knots of a spline of so many parts, most where the data are, none beyond them."""
+    inner = parts - _DEGREE + 1
+    low, high = np.quantile(x, [0.001, 0.999])
+    even, dense = np.linspace(low, high, inner), np.quantile(x, np.linspace(0.001, 0.999, inner))
+    knots = 0.5 * (even + dense)
+    knots += 1e-9 * max(float(np.ptp(knots)), 1e-12) * np.arange(inner)
+    return np.concatenate([[knots[0]] * _DEGREE, knots, [knots[-1]] * _DEGREE])
+
+
+def basis_of(x: FloatArray, knots: FloatArray) -> FloatArray:
+    """Return the parts of a spline at x, held at their ends beyond the knots, shape (parts, n)."""
+    inside = np.clip(x, knots[0], knots[-1])
+    return np.ascontiguousarray(BSpline.design_matrix(inside, knots, _DEGREE, extrapolate=True).toarray().T)
+
+
+def terms_for(benches: Sequence[Bench]) -> tuple[Term, ...]:
+    """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
+    bench = benches[0]
+    made: list[Term] = [
+        *GEAR_TERMS,
+        *COMMAND_TERMS,
+        *MOTOR_TERMS,
+        *SPRING_TERMS, *LOAD_TERMS,
+        *SENSOR_TERMS,
+        *ENCODER_TERMS,
+    ]
+    for cycles in wave_numbers(bench):
+        made += wave_terms(cycles)
+    if "ft" in bench.places:
+        made += [t for f in sensor_lines(bench) for t in hum_terms(f)]
+        made += mode_terms(sensor_modes(bench))
+    rigid = bench.injector is None
+    return tuple(
+        t for t in made if t.place in bench.places and not (rigid and "d" in (t.over, t.expression[:1]))
+    )
+
+
+def wave_numbers(bench: Bench) -> list[float]:
+    """Return cycles per revolution of the rotor at which the missing torque repeats."""
+    variables, missing = bench.variables, bench.missing
+    at = (np.arange(len(variables.letters["t"])) + (0.5 if bench.injector else 0.0)) * variables.step
+    theta = np.interp(missing.t, at, variables.letters["theta"])
+    return periods(theta, missing.torque)
+
+
+def sensor_modes(bench: Bench) -> list[float]:
+    """Return the frequencies of the highest broad peaks of the F/T sensor's residual, Hz."""
+    keep = bench.case.mask["ft"]
+    return modes(bench.case.t["ft"][keep], bench.residual["ft"][keep])
+
+
+def sensor_lines(bench: Bench) -> list[float]:
+    """Return the frequency of the sharpest line in what the F/T sensor has beside the mechanics, Hz."""
+    case = bench.case
+    keep = case.mask["ft"]
+    t = case.t["ft"][keep]
+    explained = np.interp(t - case.start, bench.missing.t, bench.missing.answers["ft"])
+    return lines(t, bench.residual["ft"][keep] - explained)
+
+
+def candidates_of(benches: Sequence[Bench]) -> list[tuple[Candidate, list[FloatArray]]]:
+    """Return all candidates with their course along the steps of every case."""
+    return [*_of_terms(benches), *_of_splines(benches)]
+
+
+def _of_terms(benches: Sequence[Bench]) -> Iterator[tuple[Candidate, list[FloatArray]]]:
+    for term in terms_for(benches):
+        for shape in benches[0].variables.shapes(term):
+            values = [b.variables.values(term, shape) for b in benches]
+            if any(np.ptp(v) > 0.0 or v[0] != 0.0 for v in values):
+                yield Candidate(term.place, term.regressor, term, shape), values
+
+
+def _of_splines(benches: Sequence[Bench]) -> Iterator[tuple[Candidate, list[FloatArray]]]:
+    for spline in SPLINES:
+        if spline.place not in benches[0].places or np.ptp(benches[0].variables.letters[spline.over]) == 0.0:
+            continue
+        knots = spline_knots(benches, spline)
+        parts = [spline_parts(b.variables, spline, knots) for b in benches]
+        for k in range(spline.parts):
+            part = (spline.over, spline.factor, k)
+            yield Candidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]
+
+
+def columns_of(
+    rows: Rows, benches: Sequence[Bench], made: Sequence[tuple[Candidate, list[FloatArray]]]
+) -> list[FloatArray]:
+    """Return the column of every candidate; the simulations run on two threads."""
+
+    def column(item: tuple[Candidate, list[FloatArray]]) -> FloatArray:
+        candidate, values = item
+        return rows.column([b.answers(v, candidate.place) for b, v in zip(benches, values, strict=True)])
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(column, made))

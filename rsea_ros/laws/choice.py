@@ -1,0 +1,132 @@
+"""The choice among laws: which surely help, which is the shortest, and whether a curve has to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.laws.base import Base
+from rsea_ros.laws.candidates import Candidate, candidates_of, columns_of
+from rsea_ros.laws.columns import Bench, bench_of, rows_of
+from rsea_ros.laws.dependence import Dependence
+from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
+from rsea_ros.laws.result import Tried
+from rsea_ros.laws.selection import MOST_TERMS, Model, paths, simplest, standard_error
+from rsea_ros.signals import FloatArray
+
+MATTERS = 0.02
+"""Smallest gain that is written down: 1 - RMS(with) / RMS(without)."""
+_SURE, _SURE_ON_TEST = 4.0, 2.0
+"""Standard errors by which a law must gain on the blocks that chose it, and on those that did not."""
+_WORSE, _WORSE_ON_TEST = 0.1, 0.25
+"""Of what groups gain: what others lose, where the gain counts although few groups have it."""
+_SHORT_ENOUGH = 0.75
+"""Of what a law without a form explains: a short law that explains less gives way to a learnt curve."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """A base model with all columns of laws and their sums of products."""
+
+    base: Base
+    benches: tuple[Bench, ...]
+    candidates: tuple[Candidate, ...]
+    gram: Gram
+
+
+def searched(base: Base) -> Search:
+    """Return a base with the columns of all candidates."""
+    problem, theta = base.problem, base.solution.theta
+    rows = rows_of(problem, theta)
+    benches = tuple(bench_of(problem, theta, c, o) for c, o in zip(base.cases, base.outputs, strict=True))
+    made = candidates_of(benches)
+    gram = gram_of(rows, columns_of(rows, benches, made))
+    return Search(base, benches, tuple(c for c, _ in made), gram)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The models that were compared, those that make the law, and the dependence that a curve shall show."""
+
+    compared: tuple[Model, ...]
+    taken: tuple[Model, ...] = ()
+    curve: Dependence | None = None
+
+
+def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
+    """Return the models of the law, if any surely helps; a second place where that surely adds."""
+    gram = search.gram
+    models = paths(gram, search.candidates)
+    none = gram.held_out(np.array([], np.int64))
+    if not models:
+        return Choice(())
+    best = simplest(models, gram)
+    if not surely_helps(gram, none, best.left, best.columns, ()):
+        return Choice(tuple(models))
+    more = [
+        m
+        for m in paths(gram, search.candidates, best.columns, most=3)
+        if m.place != best.place or len(best.columns) + len(m.columns) <= MOST_TERMS
+    ]
+    second = simplest([Model(best.place, (), best.left), *more], gram)
+    helps = second.columns and surely_helps(gram, best.left, second.left, second.columns, best.columns)
+    taken = (best, second) if helps else (best,)
+    return Choice((*models, *more), taken, _curve(search, depends, none, taken[-1]))
+
+
+def _curve(
+    search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model
+) -> Dependence | None:
+    """Return the dependence that a learnt curve shall show, where short laws leave much of it."""
+    weight = search.gram.weights(none, SELECTION)
+    room = float(((none - search.gram.count)[SELECTION] @ weight).sum())
+    share = float(((none - short.left)[SELECTION] @ weight).sum()) / max(room, 1e-9)
+    curved = [
+        d
+        for d in depends
+        if any(c.part and (c.place, c.regressor) == (d.place, d.regressor) for c in search.candidates)
+    ]
+    best = max(curved, key=lambda d: d.share, default=None)
+    if best is None or share > _SHORT_ENOUGH * best.share or best.share - share < 2.0 * best.se:
+        return None
+    return best
+
+
+def surely_helps(
+    gram: Gram, before: FloatArray, after: FloatArray, columns: Sequence[int], given: Sequence[int]
+) -> bool:
+    """Tell whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
+    weight = gram.weights(before, SELECTION)
+    gain = (before - after)[SELECTION] @ weight
+    if not _is_sure(gain, _SURE, _WORSE):
+        return False
+    held = [gram.tested(np.array(c, np.int64)) @ weight for c in ([*given], [*given, *columns])]
+    fall = (held[0] - held[1])[HELD_BACK]
+    rms = 1.0 - float(np.sqrt(held[1][HELD_BACK].sum() / max(held[0][HELD_BACK].sum(), 1e-300)))
+    return rms > MATTERS and _is_sure(fall, _SURE_ON_TEST, _WORSE_ON_TEST)
+
+
+def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
+    """Tell whether the gains of groups are more than chance: beyond their error, or hardly any is a loss.
+
+    What an excitation shows once, such as a mode that a chirp passes, gains in one group alone.
+    """
+    lost, won = float(-gain[gain < 0.0].sum()), float(gain[gain > 0.0].sum())
+    return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
+
+
+def tried_of(search: Search, choice: Choice, taken: Sequence[Model]) -> tuple[Tried, ...]:
+    """Return the compared models with what each leaves, held out, over what the base leaves."""
+    gram, first = search.gram, len(search.gram.prior)
+    none = gram.held_out(np.array([], np.int64))
+    weight = gram.weights(none, SELECTION)
+    whole = float((none[SELECTION] @ weight).sum())
+    rows = []
+    for model in choice.compared:
+        terms = [search.candidates[k - first].term for k in model.columns]
+        left = float((model.left[SELECTION] @ weight).sum()) / whole
+        rows.append(Tried(model.place, tuple(t.name for t in terms if t), float(np.sqrt(max(left, 0.0))),
+                          any(model is t for t in taken)))  # fmt: skip
+    return tuple(rows)

@@ -1,0 +1,121 @@
+"""A law as a value: terms with coefficients and shapes at one place, or a learnt curve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.laws.terms import CREEP, Place, Term
+from rsea_ros.laws.variables import Variables
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Part:
+    """One term of a law with its coefficient and shape, SI, and their 95 % intervals where they are known."""
+
+    term: Term
+    coefficient: float
+    shape: float = 0.0
+    ci95: tuple[float, float] | None = None
+    shape_ci95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A learnt curve: values (N m, rad at the encoder) over a variable, times a factor, held at its ends."""
+
+    over: str
+    factor: str
+    x: FloatArray
+    y: FloatArray
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law at one place. parts: of a short law. curve: of a learnt one, which has no parts.
+
+    ranges: of each variable that it reads, its largest size in the data.
+    """
+
+    name: str
+    place: Place
+    regressor: str
+    parts: tuple[Part, ...]
+    ranges: Mapping[str, float]
+    curve: Curve | None = None
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether it is a curve, which names nothing."""
+        return self.curve is not None
+
+    @property
+    def is_friction(self) -> bool:
+        """Whether a term of it turns with the sign of the speed."""
+        return any(part.term.friction for part in self.parts)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of the parameters of its effect file by name."""
+        if self.curve is not None:
+            return {"size": 1.0}
+        values: dict[str, float] = {}
+        for part, names in zip(self.parts, self.names, strict=True):
+            values[names[0]] = part.coefficient
+            if names[1]:
+                values[names[1]] = part.shape
+        return values | ({"creep_velocity": CREEP} if self.is_friction else {})
+
+    @property
+    def names(self) -> list[tuple[str, str]]:
+        """Names of the coefficient and shape of each term; a second one of a name gets a number."""
+        seen: dict[str, int] = {}
+
+        def unique(name: str) -> str:
+            seen[name] = seen.get(name, 0) + 1
+            return name if seen[name] == 1 else f"{name}_{seen[name]}"
+
+        shared: dict[float, str] = {}
+        made = []
+        for part in self.parts:
+            name = unique(part.term.name)
+            if part.term.shape == "cycles_per_revolution":
+                shape = shared.setdefault(part.shape, "") or unique(part.term.shape)
+                shared[part.shape] = shape
+            else:
+                shape = unique(part.term.shape) if part.term.shape else ""
+            made.append((name, shape))
+        return made
+
+    def with_parameters(self, values: Mapping[str, float], ci95: Mapping[str, tuple[float, float]]) -> Law:
+        """Return the law with fitted parameters and their intervals, by name."""
+        parts = tuple(
+            replace(
+                part,
+                coefficient=values[c],
+                shape=values[s] if s else 0.0,
+                ci95=ci95.get(c),
+                shape_ci95=ci95.get(s),
+            )
+            for part, (c, s) in zip(self.parts, self.names, strict=True)
+            if values[c] != 0.0
+        )
+        regressors = dict.fromkeys(part.term.regressor for part in parts)
+        return replace(self, parts=parts, regressor=joined(list(regressors)))
+
+    def values(self, variables: Variables) -> FloatArray:
+        """Return the law along a record."""
+        if self.curve is None:
+            return np.asarray(sum(p.coefficient * variables.values(p.term, p.shape) for p in self.parts))
+        from rsea_ros.laws.candidates import factor_of
+
+        curve = np.interp(variables.letters[self.curve.over], self.curve.x, self.curve.y)
+        return curve * factor_of(variables, self.place, self.curve.over, self.curve.factor)
+
+
+def joined(names: Sequence[str]) -> str:
+    """Return names as people list them."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

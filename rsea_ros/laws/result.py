@@ -1,0 +1,75 @@
+"""What a search for a law returns: the dependences, the laws with their files, and what they gain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rsea_ros.effects.effect import Claims, Effect
+from rsea_ros.laws.dependence import Dependence
+from rsea_ros.laws.law import Law
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A model that was compared: its terms, and what it leaves held out over what the base leaves."""
+
+    place: str
+    terms: tuple[str, ...]
+    left: float
+    chosen: bool = False
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The missing torque beside a law, point by point, for the page.
+
+    t: s. values, law: N m, rad at the encoder. over: the letter of what the law
+    depends on most. sd: of a value.
+    """
+
+    t: FloatArray
+    x: FloatArray
+    values: FloatArray
+    law: FloatArray
+    over: str
+    sd: float
+
+
+@dataclass(frozen=True)
+class WrittenLaw:
+    """A law, its effect, the text of its file, and what is drawn of it."""
+
+    law: Law
+    effect: Effect
+    source: str
+    claims: Claims
+    shown: Shown
+
+
+@dataclass(frozen=True)
+class LawResult:
+    """laws: most important first; none where nothing is left that a law takes.
+
+    gain: 1 - RMS(with the laws) / RMS(without) on test blocks that took part in nothing, with its 95 %
+    interval, each channel in units of what the base leaves. share: of the power above the noise.
+    left, noise: RMS of each channel before and after, and of its noise, on those blocks.
+    """
+
+    rig_name: str
+    sources: tuple[str, ...]
+    duration: float
+    base_rig: Rig
+    rig: Rig
+    dependences: tuple[Dependence, ...]
+    tried: tuple[Tried, ...]
+    laws: tuple[WrittenLaw, ...]
+    gain: float
+    gain_ci95: tuple[float, float]
+    share: float
+    before: Mapping[str, float]
+    after: Mapping[str, float]
+    noise: Mapping[str, float]
+    at_floor: bool

@@ -1,0 +1,138 @@
+"""Sparse regression: orthogonal matching among the terms of one place, each step by its held-out loss.
+
+A term enters whose addition leaves least of the blocks that its coefficients were not fitted to. Of all
+paths, one a place, the best model is the one of the largest held-out likelihood; what is taken is the
+shortest model within one standard error of it (Breiman, Friedman, Olshen, Stone, CART, 1984, section 3.4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.laws.candidates import Candidate
+from rsea_ros.laws.gram import FOLDS, SELECTION, Gram
+from rsea_ros.laws.terms import Place
+from rsea_ros.signals import FloatArray, IntArray
+
+MOST_TERMS = 5
+_RIDGE = 1e-7
+_SAME = 0.05
+"""Of what the best model leaves: models that differ by less in power are alike."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A law of some columns at one place. left: squares left of each group by fits without it."""
+
+    place: Place
+    columns: tuple[int, ...]
+    left: FloatArray
+
+    def minus_log_likelihood(self, gram: Gram) -> float:
+        """Return half the number of samples times the logarithm of what is left, over all channels."""
+        left, count = self.left[SELECTION].sum(axis=0), gram.count[SELECTION].sum(axis=0)
+        floor = np.maximum(left / np.maximum(count, 1.0), 1.0)
+        return float(0.5 * np.sum(count * (np.log(floor) + left / np.maximum(count, 1.0) / floor)))
+
+
+@dataclass(frozen=True)
+class Folded:
+    """The sums of a Gram in each fold, channels weighed alike: inside to fit, outside to judge."""
+
+    inside: tuple[tuple[FloatArray, FloatArray], ...]
+    outside: tuple[tuple[FloatArray, FloatArray, float], ...]
+    penalty: FloatArray
+
+    def loss(self, which: IntArray) -> float:
+        """Return what fits of some columns leave of the folds that they did not see."""
+        total = 0.0
+        for (a, b), (held, right, rr) in zip(self.inside, self.outside, strict=True):
+            normal = a[np.ix_(which, which)]
+            normal = normal + np.diag(self.penalty[which] + _RIDGE * np.diag(normal) + 1e-30)
+            beta = np.linalg.solve(normal, b[which])
+            total += rr - 2.0 * float(beta @ right[which]) + float(beta @ held[np.ix_(which, which)] @ beta)
+        return total
+
+
+def folded(gram: Gram, weight: FloatArray) -> Folded:
+    """Return the sums of each fold. weight: of each channel."""
+    products, rights, squares = gram.by_set
+    sets = [k for fold in FOLDS for k in fold]
+    a = {k: np.tensordot(weight, products[k], 1) for k in sets}
+    b = {k: weight @ rights[k] for k in sets}
+    whole_a, whole_b = np.sum([a[k] for k in sets], axis=0), np.sum([b[k] for k in sets], axis=0)
+    inside = [(np.asarray(whole_a - a[k]), np.asarray(whole_b - b[k])) for k in sets]
+    outside = [(a[k], b[k], float(squares[k] @ weight)) for k in sets]
+    penalty = np.zeros(gram.b.shape[2])
+    penalty[: len(gram.prior)] = (gram.prior / gram.scale[: len(gram.prior)]) ** 2
+    return Folded(tuple(inside), tuple(outside), penalty)
+
+
+def paths(
+    gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = (), most: int = MOST_TERMS
+) -> list[Model]:
+    """Return the models of one, two, … terms of every place. given: columns that are part of all."""
+    models = []
+    for place in dict.fromkeys(c.place for c in candidates):
+        models += _path(gram, candidates, place, given, most)
+    return models
+
+
+def _path(
+    gram: Gram, candidates: Sequence[Candidate], place: Place, given: Sequence[int], most: int
+) -> list[Model]:
+    first = len(gram.prior)
+    free = [first + k for k, c in enumerate(candidates) if c.term is not None and c.place == place]
+    chosen: list[int] = []
+    models: list[Model] = []
+    left = gram.held_out(np.array([*given], np.int64))
+    for _ in range(most):
+        sums = folded(gram, gram.weights(left, SELECTION))
+        base = np.concatenate([gram.nominal, np.array([*given, *chosen], np.int64)])
+        ranked = sorted(free, key=lambda k: sums.loss(np.append(base, k)))
+        taken = next((k for k in ranked if _acts_right(gram, candidates, [*given, *chosen, k])), None)
+        if taken is None:
+            break
+        chosen.append(taken)
+        free = [k for k in free if not _same_form(candidates[k - first], candidates[taken - first])]
+        left = gram.held_out(np.array([*given, *chosen], np.int64))
+        models.append(Model(place, tuple(chosen), left))
+    return models
+
+
+def _same_form(a: Candidate, b: Candidate) -> bool:
+    """Tell whether two candidates are one term with other shapes; waves and pasts of others are others."""
+    assert a.term is not None and b.term is not None
+    is_many = a.term.shape == "cycles_per_revolution" or a.term.memory in ("lag", "delay", "ring")
+    return a.term.name == b.term.name and (a.shape == b.shape or not is_many)
+
+
+def _acts_right(gram: Gram, candidates: Sequence[Candidate], columns: Sequence[int]) -> bool:
+    """Tell whether all terms that only can take energy do."""
+    first = len(gram.prior)
+    beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]
+    terms = [candidates[k - first].term for k in columns]
+    return all(b > 0.0 for b, t in zip(beta, terms, strict=True) if t is not None and t.is_drag)
+
+
+def simplest(models: Sequence[Model], gram: Gram) -> Model:
+    """Return the shortest model within one standard error of the one with the largest likelihood."""
+    best = min(models, key=lambda m: m.minus_log_likelihood(gram))
+    weight = gram.weights(best.left, SELECTION)
+
+    def is_near(model: Model) -> bool:
+        more = (model.left - best.left)[SELECTION] @ weight
+        return bool(
+            more.sum() <= max(standard_error(more), _SAME * float((best.left[SELECTION] @ weight).sum()))
+        )
+
+    near = [m for m in models if is_near(m)]
+    return min(near, key=lambda m: (len(m.columns), m.minus_log_likelihood(gram)))
+
+
+def standard_error(values: FloatArray) -> float:
+    """Return the standard error of the sum of values of groups."""
+    return float(np.std(values, ddof=1) * np.sqrt(len(values)))

@@ -1,0 +1,123 @@
+"""Levels and slopes of a course, the doubt of its dates in their intervals; relative units, days."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.signals import FloatArray
+from rsea_ros.trends.course import Course, Term, date_range
+from rsea_ros.trends.regression import Regression, term
+from rsea_ros.trends.result import Interval
+
+_Z = 1.959964
+_SURE_SLOPE = 3.0
+"""|z| of a slope from which it is a trend: one in 370, of a series that is more than noise."""
+Quantity = Callable[[Course], Interval]
+
+
+@dataclass(frozen=True)
+class Dated:
+    """A course, the days on which its terms may begin, and it with each term at both ends of these."""
+
+    course: Course
+    ranges: tuple[tuple[int, int], ...]
+    moved: tuple[tuple[Course, Course], ...]
+
+    def interval(self, of: Quantity) -> Interval:
+        """Return a quantity of the course; its interval spans the dates too, in quadrature."""
+        best = of(self.course)
+        apart = [[of(c).value - best.value for c in pair] for pair in self.moved]
+        below = np.sqrt((best.value - best.low) ** 2 + sum(min(0.0, *pair) ** 2 for pair in apart))
+        above = np.sqrt((best.high - best.value) ** 2 + sum(max(0.0, *pair) ** 2 for pair in apart))
+        return Interval(best.value, best.value - float(below), best.value + float(above))
+
+
+def dated(course: Course, doubt: float) -> Dated:
+    """Return a course with what its dates may be. doubt: fall of twice the log likelihood."""
+    ranges = tuple(date_range(course, i, doubt) for i in range(len(course.terms)))
+    moved = tuple(
+        (_moved(course, i, first), _moved(course, i, last)) for i, (first, last) in enumerate(ranges)
+    )
+    return Dated(course, ranges, moved)
+
+
+def _moved(course: Course, i: int, index: int) -> Course:
+    terms: Sequence[Term] = course.terms
+    return replace(course, terms=(*terms[:i], replace(terms[i], index=index), *terms[i + 1 :]))
+
+
+def combined(r: Regression, row: FloatArray) -> Interval:
+    """Return a linear combination of the coefficients with its interval."""
+    variance = float(row @ r.covariance @ row)
+    value, half = float(row @ r.coefficients), _Z * float(np.sqrt(max(0.0, variance)))
+    return Interval(value, value - half, value + half)
+
+
+def level_at(t: float) -> Quantity:
+    """Return the quantity that is the level at a time, at the mean temperature. t: days from the first on."""
+    return lambda course: combined(course.regression(), level_row(course, t))
+
+
+def level_row(course: Course, t: float) -> FloatArray:
+    """Return the combination of coefficients that is the level at a time."""
+    at = np.array([t])
+    terms = [float(term(k.kind, at, course.t[k.index])[0]) for k in course.terms]
+    return np.array([1.0, *[0.0] * (course.at - 1), *([t] if course.slope else []), *terms])
+
+
+def slope_row(course: Course, last: int) -> FloatArray:
+    """Return the combination of coefficients that is the slope after the ramps up to a term's place."""
+    row = np.zeros(course.at + course.slope + len(course.terms))
+    row[course.at : course.at + course.slope] = 1.0
+    for i, k in enumerate(course.terms[: last + 1]):
+        row[course.at + course.slope + i] = float(k.kind == "ramp")
+    return row
+
+
+def slope_after(last: int) -> Quantity:
+    """Return the quantity that is the slope, per day, after the ramps up to a place; -1: before all."""
+    return lambda course: combined(course.regression(), slope_row(course, last))
+
+
+def step_size(i: int) -> Quantity:
+    """Return the quantity that is the size of the step at a term's place."""
+
+    def size(course: Course) -> Interval:
+        row = np.zeros(course.at + course.slope + len(course.terms))
+        row[course.at + course.slope + i] = 1.0
+        return combined(course.regression(), row)
+
+    return size
+
+
+def ramp_size(last: int) -> Quantity:
+    """Return the quantity that is what a ramp adds until the next one, or the end; -1: the first slope."""
+
+    def size(course: Course) -> Interval:
+        begin = course.t[course.terms[last].index] if last >= 0 else 0.0
+        later = [course.t[k.index] for k in course.terms[last + 1 :] if k.kind == "ramp"]
+        length = float(min([*later, course.t[-1]]) - begin)
+        return slope_after(last)(course).times(length)
+
+    return size
+
+
+def last_slope(whole: Dated) -> Interval:
+    """Return the slope of the last piece, per day, also where it is not part of the course."""
+    course = whole.course
+    if course.slope or any(k.kind == "ramp" for k in course.terms):
+        return whole.interval(slope_after(len(course.terms) - 1))
+    start = max((k.index for k in course.terms), default=0)
+    if len(course.t) - start < 3 or course.t[-1] <= course.t[start]:
+        return Interval(0.0, -np.inf, np.inf)
+    longer = replace(course, terms=(*course.terms, Term("ramp", start)))
+    return step_size(len(course.terms))(longer)
+
+
+def is_sure(slope: Interval) -> bool:
+    """Return whether a slope is surely none of noise."""
+    near = slope.value - slope.low if slope.value > 0.0 else slope.high - slope.value
+    return abs(slope.value) > _SURE_SLOPE / _Z * near

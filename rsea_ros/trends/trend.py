@@ -1,0 +1,129 @@
+"""From a course in relative units and days to a trend in the parameter's unit and in dates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.trends.course import Course
+from rsea_ros.trends.quantities import (
+    Dated,
+    combined,
+    dated,
+    is_sure,
+    last_slope,
+    level_at,
+    level_row,
+    ramp_size,
+    slope_after,
+    step_size,
+)
+from rsea_ros.trends.regression import term
+from rsea_ros.trends.result import Change, Curve, Interval, Trend
+from rsea_ros.trends.search import Tested
+from rsea_ros.trends.series import Series
+from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
+from rsea_ros.trends.significance import scan_threshold
+from rsea_ros.trends.time_to_limit import time_to_limit
+
+_Z = 1.959964
+_POINTS = 24
+"""Places at which a course is drawn, beside its steps."""
+
+
+def trend_of(series: Series, test: Tested, course: Course, q: float, settings: TrendSettings) -> Trend:
+    """Return what a course says. course: the one without a change for a series that is noise."""
+    scale, whole = course.days.scale, dated(course, settings.date_doubt)
+    detectable = scale * _detectable(course, test.effect.freedom, settings)
+    first, now = (whole.interval(level_at(float(t))).times(scale) for t in (course.t[0], course.t[-1]))
+    level = abs(now.value)
+    if detectable > settings.widest * level and not course.terms:
+        reason = f"only steps above {detectable / level:.0%} would show" if level else "no level"
+        return Trend(series, "undetermined", len(course.t), reason=reason, detectable=detectable)
+    changes, slope = tuple(_changes(series, whole)), last_slope(whole)
+    goes_on = bool(changes) and changes[-1].kind == "ramp" and is_sure(slope)
+    trend = Trend(
+        series,
+        "trending" if goes_on else "changed" if changes else "steady",
+        len(course.t),
+        q,
+        first,
+        now,
+        per_year=slope.times(scale * YEAR),
+        day_sd=scale * float(np.sqrt(course.day_variance)),
+        detectable=detectable,
+        changes=changes,
+        curve=_curve(course),
+        by_day=_by_day(course),
+        per_kelvin=_per_kelvin(course),
+    )
+    return _with_limit(trend, whole, settings) if goes_on else trend
+
+
+def _per_kelvin(course: Course) -> Interval | None:
+    if course.days.warmth is None:
+        return None
+    r = course.regression()
+    row = np.zeros(r.x.shape[1])
+    row[1] = 1.0
+    return Interval(*(v + course.warm for v in combined(r, row)))
+
+
+def _detectable(course: Course, freedom: int, settings: TrendSettings) -> float:
+    """Return the least step at mid-series that would stand out, relative to the scale."""
+    t, n = course.t, len(course.t)
+    longer = course.base.with_columns(term("step", t, t[n // 2])[:, None])
+    share = min(0.4, settings.fewest_beside / n)
+    b = scan_threshold(settings.false_discovery, share, freedom)
+    return b * float(np.sqrt(longer.covariance[-1, -1]))
+
+
+def _changes(series: Series, whole: Dated) -> Iterator[Change]:
+    """Yield the steps, and the ramps from where they begin; the end of a ramp is no change of its own."""
+    course, scale = whole.course, whole.course.days.scale
+    if course.slope and is_sure(whole.interval(slope_after(-1))):
+        t = float(course.days.t[0]) * DAY
+        yield Change("ramp", t, t, t, whole.interval(ramp_size(-1)).times(scale), True)
+    for i, k in enumerate(course.terms):
+        if k.kind == "step":
+            yield _change(series, whole, i, whole.interval(step_size(i)).times(scale))
+        elif is_sure(whole.interval(slope_after(i))):
+            yield _change(series, whole, i, whole.interval(ramp_size(i)).times(scale))
+
+
+def _change(series: Series, whole: Dated, i: int, size: Interval) -> Change:
+    """Return a change; a step lies between the day that shows it first and the one before."""
+    t, k, (first, last) = whole.course.days.t, whole.course.terms[i], whole.ranges[i]
+    before = max(0, k.index - 1) if k.kind == "step" else k.index
+    since = 0.5 * float(t[before] + t[k.index]) * DAY
+    row = int(np.searchsorted(series.time_s, np.floor(t[k.index]) * DAY))
+    earliest, latest = float(t[max(0, first - 1)]) * DAY, float(t[last]) * DAY
+    return Change(k.kind, since, earliest, latest, size, False, min(row, len(series.time_s) - 1))
+
+
+def _curve(course: Course) -> Curve:
+    """Return the course at few places: an even grid and both sides of each term's beginning."""
+    t, r = course.t, course.regression()
+    edges = [v for k in course.terms for v in (t[k.index] - 1e-6, t[k.index])]
+    grid = np.unique(np.concatenate([np.linspace(t[0], t[-1], _POINTS), edges]))
+    values = np.array([combined(r, level_row(course, float(at))) for at in grid]) * course.days.scale
+    return Curve((course.days.t[0] + grid) * DAY, values[:, 0], values[:, 1], values[:, 2])
+
+
+def _by_day(course: Course) -> Curve:
+    days, value = course.days, course.at_mean_temperature() * course.days.scale
+    half = _Z * np.sqrt(days.variance) * days.scale
+    return Curve(days.t * DAY, value, value - half, value + half)
+
+
+def _with_limit(trend: Trend, whole: Dated, settings: TrendSettings) -> Trend:
+    """Return the trend with its limit on the side where it goes, and when it gets there."""
+    assert trend.first is not None and trend.per_year is not None
+    side = abs(trend.first.value) * settings.limit
+    usual = (trend.first.value - side, trend.first.value + side)
+    low, high = settings.limits.get(trend.series.parameter, usual)
+    limit = high if trend.per_year.value > 0.0 else low
+    when = time_to_limit(whole, limit / whole.course.days.scale)
+    return replace(trend, limit=limit, to_limit_s=when)

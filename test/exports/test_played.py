@@ -1,0 +1,182 @@
+"""Exports that run here: MuJoCo and an FMU play what our simulation plays, and the difference is a number."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from rsea_ros.cli.main import main
+from rsea_ros.exports.difference import RATE, differences, ours
+from rsea_ros.exports.fmu import export_fmu
+from rsea_ros.exports.fmu_play import play_fmu
+from rsea_ros.exports.mjcf import export_mjcf
+from rsea_ros.exports.mujoco_play import play_mujoco
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+
+MUJOCO = pytest.mark.skipif(
+    sys.version_info < (3, 11), reason="MuJoCo 4 has no wheel for Python 3.10: nothing is played in it there"
+)
+
+
+def command(seconds):
+    t = np.arange(round(seconds * RATE)) / RATE
+    return 12.0 * (np.sin(2 * np.pi * 3.0 * t) + 0.5 * np.sin(2 * np.pi * 17.0 * t))
+
+
+def share_lost(nominal, rig):
+    """Return the largest share of the effects' size, in a channel, by which MuJoCo differs."""
+    given = command(0.25)
+    mine, without = ours(rig, given, RATE), ours(nominal, given, RATE)
+    size = {one.channel: one.times_noise for one in differences(rig, mine, without)}
+    assert min(size.values()) > 3.0
+    left = apart(rig)
+    return max(left[channel] / size[channel] for channel in ("ft", "position"))
+
+
+def apart(rig):
+    """Return the difference of each channel in times the noise."""
+    given = command(0.25)
+    theirs = play_mujoco(export_mjcf(rig).content, rig, given)
+    return {one.channel: one.times_noise for one in differences(rig, ours(rig, given, RATE), theirs)}
+
+
+@MUJOCO
+@pytest.mark.parametrize("name", ["paper_high_impedance", "paper_moving_output", "prototype_knee"])
+def test_a_nominal_rig_is_the_same_in_mujoco(name):
+    """The knee's rotor turns at -160: told bodies and teeth only, the engine finds that by itself."""
+    assert max(apart(load_rig(name)).values()) < 0.01
+
+
+SHARE = {"spring_hysteresis": 0.25, "stribeck_friction": 0.15, "asymmetric_friction": 0.05}
+"""Of an effect's size that may be lost in MuJoCo's terms; a twentieth where nothing is said."""
+
+
+@MUJOCO
+@pytest.mark.parametrize(
+    "name",
+    [
+        "command_delay", "current_loop_lag", "torque_saturation", "torque_constant_error", "coulomb_friction",
+        "stribeck_friction", "lugre_friction", "quadratic_drag", "nonlinear_spring", "lopsided_spring",
+        "hard_stop", "spring_hysteresis", "torque_ripple", "backlash", "voltage_sag", "gear_compliance",
+        "base_compliance",
+    ],
+)  # fmt: skip
+def test_an_effect_in_mujocos_terms_is_the_effect(name):
+    rig = load_rig("paper_high_impedance")
+    assert share_lost(rig, rig.with_effect(name)) < SHARE.get(name, 0.05)
+
+
+@MUJOCO
+def test_several_effects_at_once_beside_free_ends():
+    nominal = load_rig("paper_moving_output")
+    rig = nominal.with_effect("backlash").with_effect("torque_ripple").with_effect("quadratic_drag")
+    assert share_lost(nominal, rig.with_effect("torque_saturation").with_effect("command_delay")) < 0.05
+
+
+@MUJOCO
+@pytest.mark.parametrize("other", ["torque_constant_error", "current_loop_lag", "torque_saturation"])
+def test_what_cannot_stand_beside_another_is_left_out_whole(other):
+    """The actuator had become a dcmotor already when its gain was refused."""
+    both = load_rig("paper_high_impedance").with_effect("voltage_sag", limit=5.0).with_effect(other)
+    made = export_mjcf(both)
+    left = {one.name for one in made.unsaid} & {"voltage_sag", other}
+    said = both.with_effects(*(one for one in both.effects if one.name not in left))
+    given = command(0.25)
+    theirs = play_mujoco(made.content, both, given)
+    assert max(one.times_noise for one in differences(said, ours(said, given, RATE), theirs)) < 1.0
+
+
+@MUJOCO
+def test_a_model_that_runs_away_is_told_and_leaves_no_log(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    stiff = "lugre_friction:coulomb_torque=50,bristle_stiffness=1e8,bristle_damping=0"
+    arguments = ["export", "--mjcf", "paper_high_impedance", "--effect", stiff, "--duration", "0.5"]
+    status = main([*arguments, "--limit", "1"])
+    assert status in (1, 2)
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+    assert capsys.readouterr().err.count("\n") == (1 if status == 2 else 0)
+
+
+@MUJOCO
+def test_the_limit_is_an_exit_status(tmp_path, capsys):
+    arguments = ["export", "--mjcf", "paper_high_impedance", "--duration", "0.4", "--limit", "1", "--json"]
+    assert main([*arguments, "--out", str(tmp_path / "a.xml")]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["difference"]["ft"]["times_noise"] < 0.01
+    assert document["leaves_out"].keys() == {"sensor noise"}
+    assert main([*arguments, "--effect", "ft_bias:bias=1", "--out", str(tmp_path / "b.xml")]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert document["difference"]["ft"]["times_noise"] == pytest.approx(1.0 / 0.03, rel=0.01)
+    assert document["leaves_out"]["ft_bias"] == "MuJoCo has no element for it"
+
+
+@pytest.mark.parametrize(("target", "package"), [("mjcf", "mujoco"), ("fmu", "fmpy")])
+def test_a_missing_package_is_one_line(target, package, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, package, None)
+    out = tmp_path / "rig.out"
+    assert main(["export", f"--{target}", "prototype_knee", "--out", str(out)]) == 0
+    assert f"needs the package {package}" in capsys.readouterr().out.splitlines()[-1]
+    assert out.exists()
+    asked = ["--limit", "1", "--out", str(tmp_path / "b")]
+    assert main(["export", f"--{target}", "prototype_knee", *asked]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "b").exists()
+
+
+def test_a_missing_builder_of_fmus_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pythonfmu3", None)
+    assert main(["export", "--fmu", "prototype_knee", "--out", str(tmp_path / "a.fmu")]) == 2
+    assert "--fmu needs the package pythonfmu3, which is not installed" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("target", ["fmu", "mjcf"])
+def test_an_effect_that_the_rig_cannot_have_is_one_line(target, tmp_path, capsys):
+    arguments = ["--effect", "base_compliance", "--out", str(tmp_path / "a")]
+    assert main(["export", f"--{target}", "so101_joint", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert "effect base_compliance: rig so101_joint: spring_end is free, expected clamped" in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
+    from fmpy import simulate_fmu
+    from fmpy.validation import validate_fmu
+
+    rig = load_rig("paper_high_impedance").with_effect("backlash").with_effect("ft_sensor_lag")
+    file = tmp_path / "rig.fmu"
+    file.write_bytes(export_fmu(rig).content)
+    assert validate_fmu(str(file)) == []
+    given = command(0.4)
+    t = np.arange(len(given)) / RATE
+    signal = np.array(list(zip(t, given, strict=True)), dtype=[("time", "f8"), ("torque_command", "f8")])
+    changed = {"backlash.gap": 0.002, "spring.stiffness": 1200.0}
+    other = rig.with_values({"spring.stiffness": 1200.0}).with_effects(
+        *(EffectSetting("backlash", {"gap": 0.002}) if e.name == "backlash" else e for e in rig.effects)
+    )
+    for values, expected in (({}, rig), (changed, other)):
+        result = simulate_fmu(
+            str(file), stop_time=t[-1], step_size=1 / RATE, output_interval=1 / RATE, input=signal,
+            start_values=values, output=["ft", "position", "velocity"],
+        )  # fmt: skip
+        theirs = {name: result[name] for name in ("ft", "position", "velocity")}
+        found = differences(expected, ours(expected, given, RATE), theirs)
+        assert max(one.times_noise for one in found) < 0.5
+
+
+def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
+    rig, given = load_rig("paper_high_impedance").with_effect("ft_drift", drift=3.0), command(0.25)
+    theirs = play_fmu(export_fmu(rig).content, rig, given)
+    (ft,) = (one for one in differences(rig, ours(rig, given, RATE), theirs) if one.channel == "ft")
+    assert ft.times_noise < 1.0
+
+
+@pytest.mark.parametrize("arguments", [[], ["--mjcf", "prototype_knee", "--urdf", "prototype_knee"]])
+def test_one_target_is_asked_for(arguments, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["export", *arguments])
+    assert end.value.code == 2

@@ -1,0 +1,35 @@
+"""A row's parameters are those beside the causes: a fit without them takes backlash for a softer spring."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis import diagnose as engine
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.fleet.analysis import _diagnosed
+from rsea_ros.fleet.row import empty
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+def test_a_parameter_of_a_row_is_the_one_beside_the_causes(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = load_rig("paper_high_impedance")
+    u = excitation("chirp", Settings(duration=6.0, seed=2))
+    gap = EffectSetting("backlash", {"gap": 3e-3})
+    record = synthesize(rig.with_effects(gap), Channel(np.arange(len(u)) / 280.0, u), seed=2)
+    others = tuple(name for name in catalogue() if name != "backlash")
+    short = partial(engine.diagnose, settings=DiagnosisSettings(without=others))
+    monkeypatch.setattr(engine, "diagnose", short)
+    row = empty("knee", parameters=[{"name": "spring.stiffness", "value": 1340.0}])
+    assert "diagnosis.json" in _diagnosed(row, record, rig)
+    assert [c["name"] for c in row["causes"]] == ["backlash"]
+    values = {p["name"]: p for p in row["parameters"]}
+    assert values["spring.stiffness"]["value"] == pytest.approx(rig["spring.stiffness"], rel=0.005)
+    assert values["spring.stiffness"]["identifiable"]

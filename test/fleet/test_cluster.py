@@ -1,0 +1,88 @@
+"""The executor on Dask, against a client that stands in for it: what is in flight, and what is lost."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from distributed.scheduler import KilledWorker
+
+from rsea_ros.fleet import cluster
+from rsea_ros.fleet.cluster import PER_WORKER, OnDask
+from rsea_ros.fleet.errors import FleetError
+from rsea_ros.fleet.executor import Job, WorkerLost
+
+
+class Future:
+    """A future that is done when it is asked for."""
+
+    def __init__(self, key: str, status: str, result: object) -> None:
+        self.key, self.status, self._result = key, status, result
+
+    def add_done_callback(self, call):
+        call(self)
+
+    def result(self):
+        if isinstance(self._result, Exception):
+            raise self._result
+        return self._result
+
+    def release(self):
+        pass
+
+
+class Client:
+    """Two workers; each job submitted ends as `outcome` says: the status of its future, and its result."""
+
+    def __init__(self) -> None:
+        self.status, self.outcome = "running", ("finished", 1)
+
+    def scheduler_info(self, n_workers):
+        return {"n_workers": 2}
+
+    def submit(self, function, argument, pure):
+        assert pure is False, "the same function of the same argument again is another try"
+        return Future("key", *self.outcome)
+
+
+def test_a_few_tasks_for_each_worker_are_in_flight():
+    assert OnDask(Client()).places == 2 * PER_WORKER
+
+
+def test_workers_are_asked_for_again_and_again(monkeypatch):
+    """One that is killed before it is up is restarted by nobody else: without this a run waits for ever."""
+    now, asked = [100.0], []
+    monkeypatch.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    workers = OnDask(Client(), lambda: asked.append(now[0]))
+    for now[0] in (100.0, 101.0, 111.0, 112.0):
+        assert workers.places == 2 * PER_WORKER
+    assert asked == [100.0, 111.0]
+
+
+@pytest.mark.parametrize(
+    ("result", "error"),
+    [
+        (KilledWorker("task", SimpleNamespace(address="tcp://x"), 0), WorkerLost),
+        (ValueError("no"), ValueError),
+    ],
+)
+def test_an_error_comes_back_with_its_job(result, error):
+    client, job = Client(), Job(print, 1)
+    client.outcome = "error", result
+    workers = OnDask(client)
+    workers.submit(job)
+    done = workers.next(1.0)
+    assert done is not None and done.job == job and isinstance(done.error, error)
+
+
+def test_a_lost_scheduler_ends_the_run():
+    client = Client()
+    workers = OnDask(client)
+    assert workers.next(0.0) is None
+    client.outcome = "cancelled", None
+    workers.submit(Job(print, 1))
+    with pytest.raises(FleetError, match="the scheduler is lost: what was done is in the store"):
+        workers.next(1.0)
+    client.status = "closed"
+    with pytest.raises(FleetError, match="the scheduler is lost"):
+        workers.next(0.0)

@@ -1,0 +1,78 @@
+"""The whole watch on a bench that shares no code with the model: what changed is named and sized."""
+
+import numpy as np
+import pytest
+from independent.bench import Bench, record_command
+
+from rsea_ros.errors import RigError
+from rsea_ros.health.look import events_of
+from rsea_ros.health.monitor import Monitor
+from rsea_ros.health.settings import Settings
+from rsea_ros.model.observer import noise_of
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import Channel, Record
+
+RATE, CLEAN, AFTER = 280.0, 8.0, 8.0
+BENCH = Bench().having(coulomb=3.0, b_m=8.0)
+SETTINGS = Settings(learn=6, every=1.0, fitted=3)
+
+
+def rig():
+    """The rig of the bench, off by what its last identification doubts."""
+    p = BENCH.plant
+    known = load_rig("paper_high_impedance").with_values(
+        {"rotor.reflected_inertia": 1.002 * p.j_m, "rotor.reflected_damping": 0.98 * p.b_m,
+         "spring.stiffness": 1.005 * p.k_s, "spring.damping": p.b_s}
+    )  # fmt: skip
+    return known.with_effects(EffectSetting("coulomb_friction", {"torque": 1.03 * p.coulomb}))
+
+
+def command(seconds, seed):
+    """A gait of random phases on a load that changes its sign, N m."""
+    t, rng = np.arange(round(seconds * RATE)) / RATE, np.random.default_rng(seed)
+    waves = [8.0 / h * np.sin(2 * np.pi * 1.1 * h * t + rng.uniform(0, 6.28)) for h in (1, 2, 3, 4)]
+    return np.sum(waves, axis=0) * np.clip(t / 0.5, 0.0, 1.0)
+
+
+def watched(**fault):
+    """Monitor and its findings after a clean record and one with a fault."""
+    monitor, rng = Monitor(rig(), noise_of(rig()), SETTINGS), np.random.default_rng(1)
+    for bench, start, length in ((BENCH, 0.0, CLEAN), (BENCH.having(**fault), CLEAN, AFTER)):
+        run = record_command(bench, command(length, 2), rng)
+        record = Record({n: Channel(c.t + start, c.y) for n, c in run.channels.items()})
+        t, kind, values = events_of(record)
+        for k in range(0, len(t), 210):
+            monitor.take(t[k : k + 210], kind[k : k + 210], values[k : k + 210])
+            if monitor.job is not None:
+                monitor.conclude(monitor.job())
+    return monitor, monitor.findings()
+
+
+def test_a_healthy_joint_is_not_alarmed_and_its_parameters_are_right():
+    monitor, found = watched()
+    assert found == [] and not monitor.learning
+    values = {e.name: e for e in monitor.estimates()}
+    low, high = values["spring.stiffness"].ci95
+    assert low < BENCH.plant.k_s < high and high - low < 0.03 * BENCH.plant.k_s
+
+
+def test_a_joint_in_a_position_loop_is_refused():
+    with pytest.raises(RigError, match="a position loop commands it"):
+        Monitor(load_rig("pd_joint"), noise_of(rig()))
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "size", "tolerance"),
+    [
+        ({"k_s": 0.85 * BENCH.plant.k_s}, "RSEA_STIFFNESS", -0.15 * BENCH.plant.k_s, 0.02 * BENCH.plant.k_s),
+        ({"gap": 4e-3}, "RSEA_BACKLASH", 4e-3, 0.2e-3),
+        ({"ft_gain": 1.1}, "RSEA_FT_GAIN", 0.1, 0.02),
+    ],
+)
+def test_what_changes_is_named_and_sized(fault, code, size, tolerance):
+    _, (finding,) = watched(**fault)
+    assert finding.code == code and finding.confidence > 0.95
+    assert finding.size == pytest.approx(size, abs=tolerance)
+    assert finding.ci95[0] < finding.size < finding.ci95[1]
+    assert CLEAN - 1.0 < finding.since < CLEAN + 3.0

@@ -1,0 +1,69 @@
+"""What the sensors themselves show: frozen, missing, no numbers, and nothing of it on a good record."""
+
+import numpy as np
+import pytest
+
+from rsea_ros.health.finding import sensor_findings
+from rsea_ros.health.look import events_of
+from rsea_ros.health.monitor import Monitor
+from rsea_ros.health.sensors import Sensors
+from rsea_ros.model.observer import noise_of
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+RATE = 280.0
+RIG = load_rig("paper_high_impedance")
+T = np.arange(round(3.0 * RATE)) / RATE
+RECORD = synthesize(RIG, Channel(T, 8.0 * np.sin(9.0 * T)), seed=1)
+
+
+def found(**channels):
+    """Codes and names that a record with other channels gives, taken in pieces."""
+    sensors, record = Sensors(RIG), RECORD.with_channels(**channels)
+    t, kind, values = events_of(record)
+    for k in range(0, len(t), 200):
+        sensors.take(t[k : k + 200], kind[k : k + 200], values[k : k + 200])
+    return [(f.code, f.name) for f in sensor_findings(sensors, 0, 0)]
+
+
+def with_values(name, change):
+    y = RECORD[name].y.copy()
+    return Channel(RECORD[name].t, change(y))
+
+
+def stopped(y):
+    y[400:] = y[400]
+    return y
+
+
+def test_a_good_record_has_nothing_nor_has_rest():
+    still = synthesize(RIG, Channel(T, np.zeros(len(T))), seed=1)
+    assert found() == [] and found(**still.channels) == []
+
+
+@pytest.mark.parametrize("name", ["position", "ft", "motor_torque"])
+def test_a_sensor_that_stops_is_frozen(name):
+    assert found(**{name: with_values(name, stopped)}) == [("RSEA_SENSOR_FROZEN", name)]
+
+
+def test_a_sensor_that_is_silent_is_missing():
+    ft = RECORD["ft"]
+    assert found(ft=Channel(ft.t[:300], ft.y[:300])) == [("RSEA_SENSOR_MISSING", "ft")]
+
+
+def test_values_that_are_no_numbers_are_counted():
+    def spoilt(y):
+        y[10:13] = np.nan
+        return y
+
+    assert found(ft=with_values("ft", spoilt)) == [("RSEA_BAD_DATA", "3 no numbers")]
+
+
+def test_a_clock_that_is_set_begins_anew_and_is_said():
+    monitor = Monitor(RIG, noise_of(RIG))
+    t, kind, values = events_of(RECORD)
+    monitor.take(t, kind, values)
+    monitor.take(t - 3600.0, kind, values)
+    assert monitor.jumps == 1 and monitor.late == 0 and monitor.looks >= 3
+    assert [f.code for f in monitor.findings()] == ["RSEA_BAD_DATA"]

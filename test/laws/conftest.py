@@ -1,0 +1,32 @@
+"""Makes the second bench and the effects' bench, which are no tests, importable, and learns each law once."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_ros.laws.learn import learn
+from rsea_ros.laws.result import LawResult
+from rsea_ros.model.rig_file import load_rig
+
+sys.path[:0] = [str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "effects")]
+SECONDS = 8.0
+
+
+@cache
+def learnt(values: tuple[tuple[str, float], ...], seed: int = 3) -> LawResult:
+    """Return what is learnt of a record of the second bench in which some of its values are hidden."""
+    from independent.bench import drawn_bench, record_run
+
+    bench = drawn_bench(np.random.default_rng(seed)).having(**dict(values))
+    return learn([record_run(bench, seed, "chirp_noise", SECONDS)], load_rig("paper_high_impedance"))
+
+
+@pytest.fixture(scope="session")
+def learn_of():
+    """Return a function that learns from a record with hidden values, once for each."""
+    return lambda **values: learnt(tuple(sorted(values.items())))

@@ -1,0 +1,53 @@
+"""Input estimation: a torque that the model does not know is reconstructed within the stated doubt."""
+
+from __future__ import annotations
+
+import numpy as np
+from effect_bench import RIG, command
+
+from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.diagnose import nominal_problem
+from rsea_ros.identification.unknowns import vector_of
+from rsea_ros.laws.columns import bench_of, rows_of
+from rsea_ros.laws.gram import SELECTION, gram_of
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+def problem_with(extra: np.ndarray):
+    """Return the fit of a record in which a torque acted beside the logged command."""
+    logged = command(280.0, 10.0)
+    record = synthesize(RIG, Channel(logged.t, logged.y + extra), seed=2)
+    record = record.with_channels(command=logged, motor_torque=Channel(logged.t + logged.t[1], logged.y))
+    problem = nominal_problem([check(record, RIG)], RIG)
+    return problem, vector_of(problem.unknowns, RIG)
+
+
+def bump(t: np.ndarray) -> np.ndarray:
+    return 1.5 * np.sin(2.0 * np.pi * 1.3 * t) * (np.sin(2.0 * np.pi * 0.2 * t) > 0.0)
+
+
+def test_a_hidden_torque_is_reconstructed_within_its_doubt():
+    t = np.arange(2800) / 280.0
+    problem, theta = problem_with(bump(t))
+    case = problem.cases[0]
+    missing = bench_of(problem, theta, case, problem.outputs(theta)[0]).missing
+    inside = (missing.t > 0.5) & (missing.t < 9.5)
+    error = (missing.torque - np.interp(missing.t + 0.5 / 280.0, t, bump(t)))[inside]
+    assert np.std(error) < 0.35
+    assert 0.5 < np.std(error) / missing.sd < 2.0
+
+
+def test_held_out_losses_are_those_of_fits_by_hand():
+    t = np.arange(2800) / 280.0
+    problem, theta = problem_with(bump(t))
+    rows = rows_of(problem, theta)
+    rng = np.random.default_rng(1)
+    columns = [rng.standard_normal(len(rows.residual)) for _ in range(3)]
+    gram = gram_of(rows, columns)
+    which = np.array([len(gram.prior), len(gram.prior) + 2])
+    beta = gram.fit(which, SELECTION)
+    x = np.column_stack([rows.nominal, columns[0], columns[2]]) / gram.scale[[*gram.nominal, *which]]
+    left = rows.residual - x @ beta
+    by_hand = np.bincount(rows.group, left**2, 32)
+    np.testing.assert_allclose(gram.loss(which, beta).sum(axis=1), by_hand, rtol=1e-3, atol=1e-2)

@@ -1,0 +1,107 @@
+"""The health node's parts in this process: what it hears, what it keeps, what it says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from msg_adapters import TopicMap, read_record
+from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_state_message, wrench_message
+from rsea_ros.health.codes import NAMES
+from rsea_ros.health.finding import Finding
+from rsea_ros.nodes._findings import FindingsPublisher
+from rsea_ros.nodes._health_inputs import Inputs
+from rsea_ros.nodes._kept import Keeper, Ring
+from rsea_ros.nodes._qos import COMMAND
+
+EPOCH, PERIOD = 1_700_000_000_000_000_000, round(1e9 / 280.0)
+TOPICS = ("joint_states", "torque_command", "ft")
+STATE = "sensor_msgs/msg/JointState"
+
+
+@pytest.fixture
+def heard(listener):
+    """Inputs on topics of this process with a ring, and publishers of them."""
+    ring = Ring(60.0, 1.0)
+    inputs = Inputs(listener.node, "torque.z", "joint", ring.add)
+    state, command, ft = (
+        listener.node.create_publisher(kind, topic, COMMAND)
+        for topic, kind in zip(TOPICS, (JointState, JointState, WrenchStamped), strict=True)
+    )
+    listener.until(lambda: all(p.get_subscription_count() for p in (state, command, ft)))
+    return inputs, ring, state, command, ft
+
+
+def taken(inputs, listener, count):
+    """Everything that is complete, once some messages have come."""
+    rows = []
+
+    def come():
+        rows.append(inputs.take())
+        return sum(inputs.counts.values()) + inputs.refused >= count
+
+    listener.until(come)
+    return tuple(np.concatenate(parts) for parts in zip(*rows, strict=True))
+
+
+def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, listener, tmp_path):
+    inputs, ring, state, command, ft = heard
+    for k in range(100):
+        stamp = EPOCH + k * PERIOD
+        ft.publish(wrench_message(stamp, 0.1 * k))
+        state.publish(joint_state_message(stamp, 1e-3 * k if k != 50 else math.nan, 0.0, 0.0))
+        command.publish(joint_state_message(stamp, 0.0, 0.0, 1.0))
+    state.publish(joint_state_message(EPOCH, 0.0, 0.0, 0.0, joint="elbow"))
+    command.publish(joint_state_message(EPOCH, 0.0, 0.0, math.inf))
+    t, kind, values = taken(inputs, listener, 302)
+    assert np.all(np.diff(t) >= 0.0) and len(t) > 3 * 60 and set(kind) == {0, 1, 2}
+    assert np.isnan(values[kind == 0, 0]).sum() == 1 and inputs.refused == 2
+    keeper = Keeper(ring, tmp_path / "kept", 1, 0.0)
+    middle = sorted(m.at for m in ring.messages())[150]
+    keeper.ask("RSEA_STIFFNESS", middle)
+    listener.until(lambda: keeper.poll() is not None)
+    assert keeper.last is not None
+    assert len(read_record(keeper.last / "after", topics=TopicMap(namespace="/"), strict=False)["ft"]) > 20
+    keeper.ask("RSEA_STIFFNESS", middle)
+    keeper.poll()
+    assert "holds 1, expected less than 1 (bags)" in keeper.trouble
+    keeper.close()
+    assert len(list((tmp_path / "kept").iterdir())) == 1
+
+
+def test_stamps_of_another_time_begin_anew(heard, listener):
+    inputs, _, state, _, _ = heard
+    for first in (EPOCH, EPOCH - 3600 * 10**9):
+        for k in range(60):
+            state.publish(joint_state_message(first + k * PERIOD, 0.0, 0.0, 0.0))
+        listener.until(lambda first=first: inputs.counts["joint_states"] >= (60 if first == EPOCH else 120)
+                       or len(inputs.take()[0]) < 0)  # fmt: skip
+    assert len(inputs._waiting) <= 60
+
+
+def test_memory_is_bounded_in_time_and_size():
+    ring = Ring(1.0, 0.001)
+    for k in range(1000):
+        ring.add("/a", STATE, k * 10_000_000, bytes(10))
+    assert len(ring.messages()) == 100 and ring.size == 1000
+    ring.add("/a", STATE, 9_990_000_001, bytes(5000))
+    assert ring.size <= 1000
+
+
+def test_every_code_has_a_status_of_its_own(listener):
+    nan = math.nan
+    found = [
+        Finding("RSEA_BACKLASH", "backlash.gap", "rad", 4e-3, (3.9e-3, 4.1e-3), 2.0, 0.99),
+        Finding("RSEA_SENSOR_FROZEN", "ft", "", nan, (nan, nan), 1.0, 1.0),
+    ]
+    publisher = FindingsPublisher(listener.node, "knee", lambda: found, lambda t: EPOCH + round(t * 1e9))
+    messages = []
+    publisher._publisher.publish = messages.append
+    publisher.publish()
+    statuses = {s.name.split(": ")[1]: s for s in messages[0].status}
+    assert list(statuses) == list(NAMES) and {s.hardware_id for s in statuses.values()} == {"knee"}
+    gap = {v.key: v.value for v in statuses["RSEA_BACKLASH"].values}
+    assert statuses["RSEA_BACKLASH"].level == WARN and gap["size"] == "0.004" and gap["unit"] == "rad"
+    assert (gap["low"], gap["high"], gap["confidence"]) == ("0.0039", "0.0041", "0.990")
+    assert gap["since"].startswith("2023-11-14T22:13:22")
+    assert statuses["RSEA_SENSOR_FROZEN"].level == ERROR and statuses["RSEA_DELAY"].level == OK

@@ -1,0 +1,124 @@
+"""Causes, faults and outliers: what appeared since when, what is usual, and keys that stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fleet_histories import DAY, START, cause, history, recordings
+
+from rsea_ros.trends import alarms, fleet_trends
+from rsea_ros.trends.ranking import by_joint
+from rsea_ros.trends.significance import adjusted, scan_p, scan_threshold
+
+JOINTS = tuple("abcdefgh")
+QUIET = history(np.random.default_rng(0), joints=JOINTS, days=60, each=1)
+
+
+def draws(seed, share):
+    """Return whether joint and day draw something of some probability, always the same for a seed."""
+    return lambda joint, d: np.random.default_rng([seed, ord(joint), d]).random() < share
+
+
+def test_a_cause_that_appears_is_dated_and_sized():
+    miss = draws(1, 0.25)
+    names = recordings(
+        JOINTS, 120,
+        causes=lambda j, d: [cause("backlash", 2e-3)] if j == "c" and d >= 70 and not miss(j, d) else [],
+    )  # fmt: skip
+    (alarm,) = alarms(QUIET, names)
+    assert (alarm.joint, alarm.about, alarm.kind, alarm.key) == ("c", "backlash", "cause", "c/backlash/cause")
+    assert abs((alarm.since_s - START) / DAY - 70.0) <= 4.0
+    assert alarm.size.low < 2e-3 < alarm.size.high
+    assert alarm.recording >= "bag00070"
+
+
+def test_a_cause_that_all_joints_have_is_no_alarm():
+    names = recordings(JOINTS, 60, causes=lambda j, d: [cause("coulomb_friction", 1.0, "torque", "N m")])
+    assert alarms(QUIET, names) == ()
+
+
+def test_a_cause_of_one_joint_from_the_first_recording_on_is_one():
+    names = recordings(JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "b" else [])
+    (found,) = fleet_trends(QUIET, names).appearances
+    assert found.from_first
+    assert found.joint == "b"
+
+
+def test_a_name_given_in_error_now_and_then_is_no_alarm():
+    wrong = draws(2, 0.03)
+    names = recordings(JOINTS, 250, causes=lambda j, d: [cause("backlash", 2e-3)] if wrong(j, d) else [])
+    assert alarms(QUIET, names) == ()
+
+
+def test_two_days_that_name_it_are_not_enough():
+    found = [cause("backlash", 2e-3)]
+    names = recordings(JOINTS, 9, causes=lambda j, d: found if j == "c" and d >= 7 else [])
+    assert alarms(QUIET, names) == ()
+
+
+def test_a_rival_that_is_not_likely_does_not_count():
+    names = recordings(
+        JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3, status="one_of", probability=0.3)]
+    )
+    assert fleet_trends(QUIET, names).namings == ()
+
+
+def test_the_detection_limit_is_the_size_of_the_least_gain():
+    noise, slope = 1.0, 2000.0
+    sizes = np.geomspace(1e-3, 4e-3, 60)
+    gains = 1.0 - noise / np.sqrt(noise**2 + (slope * sizes) ** 2)
+    names = recordings(("a",), 60, causes=lambda j, d: [cause("backlash", sizes[d], gain=gains[d])])
+    (naming,) = fleet_trends(QUIET, names).namings
+    rest = np.sqrt(noise**2 + (slope * naming.limit) ** 2)
+    assert 1.0 - noise / rest == pytest.approx(0.1)
+
+
+def test_bad_data_since_some_day_is_a_fault():
+    names = recordings(JOINTS, 60, faults=lambda j, d: ["outliers"] if j == "e" and d >= 30 else [])
+    (alarm,) = alarms(QUIET, names)
+    assert (alarm.joint, alarm.kind, alarm.about, alarm.size) == ("e", "fault", "outliers", None)
+
+
+def test_a_joint_unlike_its_fleet_is_an_outlier_and_an_unlike_fleet_has_none():
+    rng = np.random.default_rng(7)
+    levels = dict(zip(JOINTS, 1.0 + 0.02 * rng.normal(size=8), strict=True))
+    names = recordings(JOINTS, 1)
+
+    def one(d):
+        return history(rng, joints=JOINTS, days=40, course=lambda j, day: d[j] - 1.0 + 0.0 * day)
+
+    assert {a.kind for a in alarms(one(levels), names)} == set()
+    assert [(a.joint, a.kind) for a in alarms(one({**levels, "g": 1.4}), names)] == [("g", "outlier")]
+    unlike = dict(zip(JOINTS, (1.0, 2.0, 5.0, 0.3, 9.0, 0.1, 20.0, 3.0), strict=True))
+    assert alarms(one(unlike), names) == ()
+
+
+def test_the_key_of_wear_stays_while_its_history_grows():
+    made = history(
+        np.random.default_rng(8), joints=("a", "b"), days=200,
+        course=lambda j, d: -0.1 * np.clip((d - 60) / 100, 0, 1) * (j == "b"),
+    )  # fmt: skip
+    seen = set()
+    for until in range(60, 201, 20):
+        part = made["time_s"] < START + DAY * until
+        seen |= {a.key for a in alarms({n: c[part] for n, c in made.items()}, recordings(("a", "b"), 1))}
+    assert seen == {"b/spring.stiffness/lower/1"}
+
+
+def test_what_goes_on_comes_before_bad_data():
+    names = recordings(
+        JOINTS, 60, faults=lambda j, d: ["outliers"] if j == "a" and d >= 30 else [],
+        causes=lambda j, d: [cause("backlash", 2e-3)] if j == "h" and d >= 30 else [],
+    )  # fmt: skip
+    assert list(by_joint(alarms(QUIET, names))) == ["h", "a"]
+
+
+def test_the_false_discovery_rate_is_that_of_benjamini_and_hochberg():
+    p = np.array([0.01, 0.04, 0.03, 0.005, 0.8])
+    assert adjusted(p) == pytest.approx([0.025, 0.05, 0.05, 0.025, 0.8])
+
+
+@pytest.mark.parametrize("rate", [0.05, 0.01, 1e-5])
+def test_the_threshold_of_a_scan_has_its_rate(rate):
+    for freedom in (5, 200, 1000):
+        assert scan_p(scan_threshold(rate, 0.03, freedom), 0.03, freedom) == pytest.approx(rate, rel=1e-6)
