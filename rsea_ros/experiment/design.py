@@ -16,7 +16,7 @@ import numpy as np
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis
 from rsea_ros.experiment.judge import INSIDE, Judge, noise_by_channel
-from rsea_ros.experiment.margins import Peaks, ends_of, peaks, share_used
+from rsea_ros.experiment.margins import Group, Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.proposal import Asked, Proposal
 from rsea_ros.experiment.refine import refined
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
@@ -138,7 +138,7 @@ def _final(judge: Judge, shape: Shape, length: float, apart: BoolArray, tried: i
     )  # fmt: skip
 
 
-def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tuple[FloatArray, Peaks]:
+def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[FloatArray, Peaks]:
     """Return a command as large as the limits allow for all that the bench may be, and its peaks.
 
     By bisection, for what a bench may do at its worst is no straight line of the command. Raises
@@ -147,7 +147,7 @@ def held(command: FloatArray, asked: Asked, rigs: Sequence[Sequence[Rig]]) -> tu
     low, high, best = math.log(_SMALLEST), 0.0, None
     scale = high
     for _ in range(_BISECTIONS):
-        found = peaks(math.exp(scale) * command, asked.rate, rigs)
+        found = peaks(math.exp(scale) * command, asked.rate, groups)
         if share_used(found, asked.limits) <= 1.0:
             low, best = scale, (math.exp(scale) * command, found)
         else:

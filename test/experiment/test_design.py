@@ -79,7 +79,7 @@ def test_more_doubt_makes_a_smaller_run():
 
 
 def test_a_peak_at_the_quantile_adds_the_axes_as_squares():
-    assert at_ends(np.array([10.0, 9.0, 13.0, 14.0, 6.0])) == pytest.approx(15.0)
+    assert at_ends(np.array([10.0, 9.0, 12.0, 13.0, 11.0, 14.0, 6.0, 5.0, 8.0])) == pytest.approx(15.0)
     assert at_ends(np.array([10.0, 9.0, np.nan])) == np.inf
 
 
