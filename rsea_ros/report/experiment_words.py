@@ -64,6 +64,6 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
 
 
 LEVEL_WORDS = (
-    f"the upper limit that holds with a probability of {LEVEL:.5f}, over the causes still possible and what "
-    "is known of their numbers"
+    f"the upper limit at a probability of {LEVEL:.5f}, over the causes still possible and what is known of "
+    "their numbers, to first order; a hard stop met fast may go beyond"
 )
