@@ -65,5 +65,5 @@ def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, st
 
 LEVEL_WORDS = (
     f"the upper limit at a probability of {LEVEL:.5f}, over the causes still possible and what is known of "
-    "their numbers, to first order; a hard stop met fast may go beyond"
+    "their numbers, to first order"
 )
