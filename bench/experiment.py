@@ -8,7 +8,8 @@
 Truth is the second bench of test/independent. Every policy starts from the same poor log, 10 s of slow work
 at 0.5 N m, weighs the same causes by the same rule, and stops at the same probability; what differs is the
 run: designed; a piece of the paper's chirp, 20 s long, of the same peak as the limit; a random multisine of
-the designed run's power in 0.5 to 100 Hz. The search is restricted to the twelve effects in CAUSES.
+the designed run's power in 0.5 to 100 Hz. Causes are those that a
+session weighs (experiment/causes.py).
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
 from rsea_ros.cli.demo import EXCITED, PATIENT  # noqa: E402
 from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
+from rsea_ros.experiment.causes import USUAL  # noqa: E402
 from rsea_ros.experiment.design import propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
 from rsea_ros.experiment.limits import Limits, of_command, of_response, used  # noqa: E402
@@ -45,20 +47,6 @@ from rsea_ros.model.simulation import synthesize  # noqa: E402
 from rsea_ros.signals import Channel  # noqa: E402
 
 RATE, CHIRP = 280.0, 20.0
-CAUSES = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "backlash",
-    "nonlinear_spring",
-    "spring_hysteresis",
-    "hard_stop",
-    "torque_constant_error",
-    "ft_gain_error",
-    "command_delay",
-    "ft_sensor_lag",
-    "current_loop_lag",
-    "torque_saturation",
-)
 ALIKE = {"torque_constant_error", "ft_gain_error"}
 """No run tells these apart without a value measured apart: proved by experiment/bound.py on each bench."""
 LIMITS = Limits(torque=25.0, velocity=2.0, deflection=0.04)
@@ -71,8 +59,8 @@ SECONDS, SHORTEST = 20.0, 0.1
 def hidden(k):
     """Return bench number k, its cause, and the parameters."""
     rng = np.random.default_rng([17, k])
-    name = CAUSES[k % len(CAUSES)]
-    severity = SEVERITIES[(k // len(CAUSES) + k) % 3]
+    name = USUAL[k % len(USUAL)]
+    severity = SEVERITIES[(k // len(USUAL) + k) % 3]
     bench = drawn_bench(rng)
     parameters = drawn_parameters(name, severity, rng)
     return bench, hide(bench, name, parameters), name, severity, parameters
@@ -139,7 +127,7 @@ def played(policy, first, weighing, bench, rig, rng, pools):
         return record_command(bench, proposal.command, rng)
 
     campaign = Campaign(
-        rig, CAUSES, asked, play, Budget(seconds=SECONDS, runs=10), run=pools.run, choose=policy
+        rig, USUAL, asked, play, Budget(seconds=SECONDS, runs=10), run=pools.run, choose=policy
     )
     return campaign.go([first], weighing)
 
@@ -150,7 +138,7 @@ def one(k, pools):
     rig, begun = load_rig("paper_high_impedance"), time.process_time()
     rng = np.random.default_rng([18, k])
     first = record_command(bench, slow_work(), rng)
-    weighing = weigh([first], rig, CAUSES, run=pools.run)
+    weighing = weigh([first], rig, USUAL, run=pools.run)
     designed = played(propose, first, weighing, bench, rig, rng, pools)
     runs = [r.proposal.command for r in designed.rounds if r.proposal is not None]
     rms = float(np.sqrt(np.mean(np.concatenate([np.trim_zeros(u) for u in runs]) ** 2))) if runs else 0.0
@@ -240,7 +228,7 @@ def limits(runs):
         for k in range(DESIGNS):
             _, bench, *_ = hidden(k * 7)
             first = record_command(bench, slow_work(), np.random.default_rng([18, k]))
-            possible = weigh([first], rig, CAUSES, run=pools.run).hypotheses(0.005)[:7]
+            possible = weigh([first], rig, USUAL, run=pools.run).hypotheses(0.005)[:7]
             asked = Asked(tight, RATE, probe=1.0, refine=0)
             designs.append((possible, propose(possible, asked, run=pools.run)))
         for k in range(runs):

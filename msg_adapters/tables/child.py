@@ -1,9 +1,9 @@
 """Readers that run in another process: a damaged file, or one that asks for all memory, ends only that.
 
-A reader is a file `_NAME_child.py` with its ceilings. It is called with FILE, the largest number of values
-and the places of the columns in JSON, and answers with a line of JSON, {"sizes": …} in the order of the
-columns, {"column": …, "names": …} for one that the file has not, or {"error": …}; then the numbers, as
-doubles.
+A reader is a file `_NAME_reader.py` with its ceilings MEMORY and SECONDS, what it raises (Refused), what it
+says of a DAMAGED file, and `read`. `_child.py` runs it with FILE, the largest number of values and the places
+of the columns in JSON, and answers with a line of JSON, {"sizes": …} in the order of the columns,
+{"column": …, "names": …} for one that the file has not, or {"error": …}; then the numbers, as doubles.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ from msg_adapters.tables.table import Table, checked_lengths, index_of
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import shown
 
+PROGRAM = Path(__file__).with_name("_child.py")
+
 
 @dataclass(frozen=True)
 class Reader:
-    """name: of the format, for people. child: the program. seconds: after which it is ended."""
+    """name: of the format, for people. child: the reader's file. seconds: after which it is ended."""
 
     name: str
     child: Path
@@ -54,7 +56,7 @@ class Reader:
 
     def _run(self, arguments: list[str], output: IO[bytes]) -> None:
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
-        command = [sys.executable, "-I", str(self.child), *arguments]
+        command = [sys.executable, "-I", str(PROGRAM), str(self.child), *arguments]
         try:
             done = subprocess.run(
                 command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.DEVNULL,

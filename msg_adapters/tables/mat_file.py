@@ -1,4 +1,4 @@
-"""Vectors, matrices and structs out of MAT files, read in another process (see `_mat_child.py`)."""
+"""Vectors, matrices and structs out of MAT files, read in another process (see `_mat_reader.py`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from msg_adapters.tables.child import Reader
 from msg_adapters.tables.table import LARGEST, Table
 
-CHILD = Path(__file__).with_name("_mat_child.py")
+CHILD = Path(__file__).with_name("_mat_reader.py")
 TIME = 90.0
 """s. The largest file that is read takes 3 s."""
 _HDF5 = b"\x89HDF\r\n\x1a\n"

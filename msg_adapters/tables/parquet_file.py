@@ -1,4 +1,4 @@
-"""Columns out of Parquet files, read in another process, a row group at a time (see `_parquet_child.py`)."""
+"""Columns out of Parquet files, read in another process, a row group at a time (see `_parquet_reader.py`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from msg_adapters.tables.child import Reader
 from msg_adapters.tables.table import LARGEST, Table
 
-CHILD = Path(__file__).with_name("_parquet_child.py")
+CHILD = Path(__file__).with_name("_parquet_reader.py")
 TIME = 90.0
 """s. Three columns of ten million rows take 2 s."""
 

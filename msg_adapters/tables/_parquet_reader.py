@@ -1,29 +1,26 @@
-"""A program of its own: `_parquet_child.py FILE LIMIT PLACES` writes columns of a Parquet file to its output.
+"""Reads columns of a Parquet file, in a process of its own (see child.py).
 
-What a damaged file makes of the reader ends only this process (see child.py). One row group of one column is
-held at a time. A place is a column, or a field of one, `pose.x`; `name[2]` the third number of its lists.
+What a damaged file makes of the reader ends only this process. One row group of one column is held at a
+time. A place is a column, or a field of one, `pose.x`; `name[2]` the third number of its lists.
 """
 
 from __future__ import annotations
 
-import json
-import os
-import resource
-import sys
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
 MEMORY, SECONDS = 4 << 30, 60
-"""Ceilings of this process: bytes of addresses, and processor time."""
+"""Ceilings of the process: bytes of addresses, and processor time."""
+
+DAMAGED = "no Parquet file that can be read; a damaged file?"
 
 
 class Refused(ValueError):
     """What a column is, and what was expected."""
 
 
-def main(path: str, limit: int, places: list[dict[str, Any]]) -> None:
-    """Read and write. Raises Refused for what is no column of numbers."""
+def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], Iterator[Any]]:
+    """Return the sizes of the columns, and their parts one by one. Raises Refused for other than numbers."""
     import pyarrow as pa
     from pyarrow.parquet import ParquetFile
 
@@ -35,10 +32,9 @@ def main(path: str, limit: int, places: list[dict[str, Any]]) -> None:
     if rows < 2:
         raise Refused(f"{rows} rows, expected a record")
     found = [_field(place, file.schema_arrow) for place in places]
-    _answer({"sizes": [rows] * len(places)})
-    for place, (name, way) in zip(places, found, strict=True):
-        for vector in _vectors(file, name, way, place):
-            sys.stdout.buffer.write(vector.tobytes())
+    ways = zip(places, found, strict=True)
+    parts = (part for place, (name, way) in ways for part in _vectors(file, name, way, place))
+    return [rows] * len(places), parts
 
 
 def _field(place: dict[str, Any], schema: Any) -> tuple[str, list[str]]:
@@ -119,28 +115,3 @@ def _doubles(chunk: Any) -> Any:
         chunk = chunk.cast(pa.int64())
     chunk = chunk.cast(pa.float64(), safe=False)
     return np.asarray(chunk.to_numpy(zero_copy_only=False), "<f8") * factor
-
-
-def _answer(answer: dict[str, object]) -> None:
-    """Write the answer in the place of whatever was written before."""
-    sys.stdout.buffer.flush()
-    os.ftruncate(1, 0)
-    os.lseek(1, 0, os.SEEK_SET)
-    sys.stdout.buffer.write(json.dumps(answer).encode() + b"\n")
-
-
-if __name__ == "__main__":
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    warnings.simplefilter("ignore")
-    try:
-        main(sys.argv[1], int(sys.argv[2]), json.loads(sys.argv[3]))
-    except KeyError as error:
-        _answer({"column": error.args[0], "names": error.args[-1]})
-    except MemoryError:
-        _answer({"error": f"asks for more than {MEMORY >> 30} GB of memory"})
-    except Refused as error:
-        _answer({"error": str(error)})
-    except Exception:  # whatever a damaged file makes of the reader
-        _answer({"error": "no Parquet file that can be read; a damaged file?"})

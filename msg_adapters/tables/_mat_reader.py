@@ -1,21 +1,18 @@
-"""A program of its own: `_mat_child.py FILE LIMIT PLACES` writes vectors of a MAT file to its output.
+"""Reads vectors of a MAT file, in a process of its own (see child.py).
 
-SciPy's reader can crash on a damaged file, or ask for any amount of memory: that ends only this process (see
-child.py). A place is a variable, or a field of structs, `log.motor.current` or `runs(2).t`; all of it where
-it is a vector, one column or row where it is a matrix.
+SciPy's reader can crash on a damaged file, or ask for any amount of memory: that ends only this process. A
+place is a variable, or a field of structs, `log.motor.current` or `runs(2).t`; all of it where it is a
+vector, one column or row where it is a matrix.
 """
 
 from __future__ import annotations
 
-import json
 import re
-import resource
-import sys
-import warnings
 from typing import Any
 
 MEMORY, SECONDS = 3 << 30, 60
-"""Ceilings of this process: bytes of addresses (SciPy itself takes 1 GB of them), and processor time."""
+"""Ceilings of the process: bytes of addresses (SciPy itself takes 1 GB of them), and processor time."""
+DAMAGED = "no MAT file that can be read, expected one up to version 7; a damaged file?"
 _PART = re.compile(r"(?P<name>[^()]+)(?:\((?P<number>[0-9]{1,6})\))?")
 
 
@@ -23,8 +20,8 @@ class Refused(ValueError):
     """What a variable is, and what was expected."""
 
 
-def main(path: str, limit: int, places: list[dict[str, Any]]) -> None:
-    """Read and write. Raises Refused for what is no vector of numbers."""
+def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], list[Any]]:
+    """Return the sizes of the vectors, and the vectors. Raises Refused for what is no vector of numbers."""
     from scipy.io import loadmat, whosmat
 
     shapes = {name: (shape, kind) for name, shape, kind in whosmat(path)}
@@ -33,9 +30,7 @@ def main(path: str, limit: int, places: list[dict[str, Any]]) -> None:
     roots = sorted({root(place) for place in places})
     variables = loadmat(path, variable_names=roots)
     vectors = [vector(place, variables).astype("<f8") for place in places]
-    _answer({"sizes": [values.size for values in vectors]})
-    for values in vectors:
-        sys.stdout.buffer.write(values.tobytes())
+    return [values.size for values in vectors], vectors
 
 
 def root(place: dict[str, Any]) -> str:
@@ -125,24 +120,3 @@ def _product(shape: Any) -> float:
     for length in shape:
         result *= length
     return result
-
-
-def _answer(answer: dict[str, object]) -> None:
-    sys.stdout.buffer.write(json.dumps(answer).encode() + b"\n")
-
-
-if __name__ == "__main__":
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    warnings.simplefilter("ignore")
-    try:
-        main(sys.argv[1], int(sys.argv[2]), json.loads(sys.argv[3]))
-    except KeyError as error:
-        _answer({"column": error.args[0], "names": error.args[-1]})
-    except MemoryError:
-        _answer({"error": f"asks for more than {MEMORY >> 30} GB of memory"})
-    except Refused as error:
-        _answer({"error": str(error)})
-    except Exception:  # whatever a damaged file makes of the reader
-        _answer({"error": "no MAT file that can be read, expected one up to version 7; a damaged file?"})
