@@ -28,6 +28,7 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
+from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
 from rsea_ros.cli.demo import EXCITED, PATIENT  # noqa: E402
@@ -165,7 +166,7 @@ def said(outcome):
     }
 
 
-def causes(log, first=0, count=60):
+def causes(log, first, count):
     """Play benches and append their lines."""
     done = {json.loads(line)["bench"] for line in log.read_text().splitlines()} if log.exists() else set()
     with worker_pools() as pools:
@@ -273,17 +274,26 @@ def wire(out):
     print(f"loop ended: {said['end']}: {said['why']}; seconds {said['seconds']}, runs kept {runs}")
 
 
-def main():
+def main() -> None:
     """Run a command."""
-    command, *rest = sys.argv[1:]
-    if command == "limits":
-        limits(int(rest[0]) if rest else 10_000)
-    elif command == "wire":
-        wire(Path(rest[0]))
-    elif command == "summary":
-        summary(Path(rest[0]))
+    parser = parser_of(__doc__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    played = commands.add_parser("causes")
+    played.add_argument("log", type=Path)
+    played.add_argument("first", type=int, nargs="?", default=0)
+    played.add_argument("count", type=int, nargs="?", default=60)
+    commands.add_parser("summary").add_argument("log", type=Path)
+    commands.add_parser("wire").add_argument("out", type=Path)
+    commands.add_parser("limits").add_argument("runs", type=int, nargs="?", default=10_000)
+    args = parser.parse_args()
+    if args.command == "limits":
+        limits(args.runs)
+    elif args.command == "wire":
+        wire(args.out)
+    elif args.command == "summary":
+        summary(args.log)
     else:
-        causes(Path(rest[0]), *map(int, rest[1:]))
+        causes(args.log, args.first, args.count)
 
 
 if __name__ == "__main__":

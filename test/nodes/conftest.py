@@ -12,6 +12,9 @@ from pathlib import Path
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
+
+from rsea_ros.nodes import driver
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 60.0
@@ -98,6 +101,15 @@ class Listener:
         self._executor.add_node(self.node)
         self._subscriptions = []
 
+    def serve(self, node):
+        """Spin another node of this process too, until it is dropped."""
+        self._executor.add_node(node)
+
+    def drop(self, node):
+        """Serve a node no more, and take it away."""
+        self._executor.remove_node(node)
+        node.destroy_node()
+
     def until(self, condition):
         """Spin until the condition holds, and return what it returned."""
         deadline = time.monotonic() + TIMEOUT
@@ -131,3 +143,20 @@ def listener():
     node = Listener()
     yield node
     node.close()
+
+
+@pytest.fixture
+def make_driver(listener):
+    """A function that makes a driver in this process: name, values of its parameters; closed in the end."""
+    made = []
+
+    def make(name, values, overrides=()):
+        node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
+        made.append((driver.Driver(node, values), node))
+        listener.serve(node)
+        return made[-1]
+
+    yield make
+    for program, node in made:
+        program.close()
+        listener.drop(node)

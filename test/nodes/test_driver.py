@@ -134,14 +134,13 @@ class Spy:
 
 
 @pytest.fixture
-def spied(listener, monkeypatch):
+def spied(listener, make_driver, monkeypatch):
     """An active driver in this process that has written 5 N m to a spy."""
     spy = Spy()
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spy})
-    node = LifecycleNode("spied", namespace="spied")
     values = {parameter.name: parameter.default for parameter in driver.TABLE}
-    program = driver.Driver(node, values | {"rate": 200.0, "autostart": True, "command_timeout": 5.0})
-    listener._executor.add_node(node)
+    given = {"rate": 200.0, "autostart": True, "command_timeout": 5.0}
+    program, node = make_driver("spied", values | given)
     publisher = listener.node.create_publisher(JointState, "/spied/torque_command", COMMAND)
 
     def pushed():
@@ -149,10 +148,7 @@ def spied(listener, monkeypatch):
         return 5.0 in spy.written
 
     listener.until(pushed)
-    yield spy, program, node
-    program.close()
-    listener._executor.remove_node(node)
-    node.destroy_node()
+    return spy, program, node
 
 
 @pytest.mark.parametrize("way", ["trigger_deactivate", "trigger_shutdown"])

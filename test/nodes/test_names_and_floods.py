@@ -4,7 +4,6 @@ import threading
 import time
 
 import pytest
-from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 from rclpy.qos import ReliabilityPolicy
 
@@ -23,21 +22,13 @@ VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
 
 
 @pytest.fixture
-def drive(listener):
-    """A function that makes a driver in this process; what it made is closed in the end."""
-    made = []
+def drive(make_driver):
+    """A function that makes a driver with these values and those given."""
 
     def make(name, overrides=(), **values):
-        node = LifecycleNode(name, namespace=name, parameter_overrides=list(overrides))
-        made.append((driver.Driver(node, VALUES | values), node))
-        listener._executor.add_node(node)
-        return made[-1]
+        return make_driver(name, VALUES | values, overrides)
 
-    yield make
-    for program, node in made:
-        program.close()
-        listener._executor.remove_node(node)
-        node.destroy_node()
+    return make
 
 
 def test_joint_and_frames_are_parameters_and_quality_of_service_too(drive, listener):

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from rclpy.lifecycle import LifecycleNode
 
 from msg_adapters.ros import JointState, WrenchStamped, torque_command_message, wrench_of
 from rsea_ros.nodes import driver
@@ -16,22 +15,10 @@ VALUES = {parameter.name: parameter.default for parameter in driver.TABLE} | {
 
 
 @pytest.fixture
-def drive(listener, monkeypatch):
-    """A function that makes a driver of a toy in this process."""
+def drive(make_driver, monkeypatch):
+    """A function that makes a driver of a toy."""
     monkeypatch.setenv("RSEA_DEVICES", str(TOY))
-    made = []
-
-    def make(**values):
-        node = LifecycleNode("toy", namespace="toy")
-        made.append((driver.Driver(node, VALUES | values), node))
-        listener._executor.add_node(node)
-        return made[-1]
-
-    yield make
-    for program, node in made:
-        program.close()
-        listener._executor.remove_node(node)
-        node.destroy_node()
+    return lambda **values: make_driver("toy", VALUES | values)
 
 
 def test_without_protection_it_is_not_configured(drive):
