@@ -207,12 +207,15 @@ def small_files() -> None:
 
 def test_a_disk_that_fills_up_under_the_results(record, tmp_path):
     write_record(record, tmp_path / "bag")
+    assert rsea("identify", tmp_path / "bag", "--out", tmp_path / "roomy").returncode == 0  # compiles it all
     done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results", before=small_files)
     refused(done, tmp_path / "results" / "report.html", "File too large")
     assert not (tmp_path / "results").exists()
 
 
-def test_a_disk_that_fills_up_under_a_bag(tmp_path):
+def test_a_disk_that_fills_up_under_a_bag(tmp_path, tmp_path_factory):
+    roomy = tmp_path_factory.mktemp("roomy") / "bag"  # also compiles all that the process with small files runs
+    assert rsea("simulate", "paper_high_impedance", "--out", roomy).returncode == 0
     done = rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", before=small_files)
     refused(done, tmp_path / "bag", "File too large")
     assert list(tmp_path.iterdir()) == []
