@@ -214,7 +214,7 @@ def test_a_disk_that_fills_up_under_the_results(record, tmp_path):
 
 
 def test_a_disk_that_fills_up_under_a_bag(tmp_path, tmp_path_factory):
-    roomy = tmp_path_factory.mktemp("roomy") / "bag"  # also compiles all that the process with small files runs
+    roomy = tmp_path_factory.mktemp("roomy") / "bag"  # compiles all that runs with small files
     assert rsea("simulate", "paper_high_impedance", "--out", roomy).returncode == 0
     done = rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", before=small_files)
     refused(done, tmp_path / "bag", "File too large")
