@@ -12,8 +12,7 @@ import numpy as np
 from rsea_ros.design.by_train import by_train
 from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import FALL_FACTOR, end_to_end
-from rsea_ros.model.paper_formulas import PAPER_FACTOR
+from rsea_ros.model.bandwidth import FALL_FACTOR, PAPER_FACTOR, end_to_end
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.design.map import Demand, feasible_map
