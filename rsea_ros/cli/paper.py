@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
-    from rsea_ros.report.identification.files import json_text
+    from rsea_ros.report.json_values import json_text
     from rsea_ros.report.paper.json import paper_json
     from rsea_ros.report.paper.page import paper_report
 

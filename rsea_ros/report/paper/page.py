@@ -16,7 +16,8 @@ from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import Block, key_numbers, page
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import key_numbers
 from rsea_ros.report.paper import figures, tables
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 

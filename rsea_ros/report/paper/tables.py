@@ -13,7 +13,7 @@ from rsea_ros.paper.finding import Finding
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.paper.rivals import Judged
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import equation, section
+from rsea_ros.report.page.html import equation, section
 from rsea_ros.report.page.table import table
 
 EQUATIONS = """\
