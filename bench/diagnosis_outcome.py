@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from math import nan, prod
 
 from diagnosis_cases import Case
-from independent.hidden import MAIN_PARAMETER
+from independent.hidden import BESIDE_THE_CONTRACT, MAIN_PARAMETER
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
@@ -43,11 +43,15 @@ class Found:
 
     @property
     def main(self) -> bool:
-        return MAIN_PARAMETER[self.effect] == self.parameter
+        return _main_parameter(self.effect) == self.parameter
 
     @property
     def covered(self) -> bool:
         return self.low <= self.truth <= self.high
+
+
+def _main_parameter(effect: str) -> str:
+    return MAIN_PARAMETER.get(effect) or next(iter(BESIDE_THE_CONTRACT[effect][0]))
 
 
 @dataclass(frozen=True)
