@@ -91,7 +91,8 @@ class Case:
 class Plan:
     """What a case is made from; without: effects that the diagnosis has to do without.
 
-    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple or newer.
+    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple, newer, or
+    unsearched (an effect that a diagnosis does not try unless a rig states it).
     newer: an effect that came after the first 23, and the factor on its main parameter.
     """
 
@@ -227,7 +228,8 @@ def _newer(rng: np.random.Generator) -> Iterator[Plan]:
     for effect in BESIDE_THE_CONTRACT:
         for k, factor in enumerate((0.5, 1.0, 2.0)):
             name = f"newer-{effect}-{factor:g}"
-            yield Plan(name, "newer", _seed(rng), _excitation(k), newer=(effect, factor))
+            group = "newer" if catalogue()[effect].is_searched else "unsearched"
+            yield Plan(name, group, _seed(rng), _excitation(k), newer=(effect, factor))
 
 
 def _readings(rng: np.random.Generator) -> Iterator[Plan]:

@@ -56,6 +56,7 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         _at_least(
             "unexplained, effect taken out of the catalogue, %", _right(groups.get("taken_out", ())), 90.0
         ),
+        _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
         _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
         _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in found], 100.0),
