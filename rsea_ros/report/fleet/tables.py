@@ -84,7 +84,8 @@ def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) ->
 def parameter_rows(trends: Sequence[Trend]) -> str:
     """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
     head = [
-        "Parameter", "State", "#Now, 95 %", "#A year", "#A day scatters", "#Least step seen", "#Determined by",
+        "Parameter", "State", "#Now, 95 %", "#A year", "#A day scatters", "#Least step seen",
+        "#Determined by",
     ]  # fmt: skip
     rows = []
     for t in trends:
