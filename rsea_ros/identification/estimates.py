@@ -31,12 +31,6 @@ def errors_by_channel(
     }
 
 
-def fit_percent(error: FloatArray, measured: FloatArray) -> float:
-    """Return 100 (1 - ||e|| / ||y - mean y||), %."""
-    scale = float(np.linalg.norm(measured - measured.mean()))
-    return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
-
-
 def parameters_of(solution: Solution, confidence: Confidence) -> tuple[ParameterEstimate, ...]:
     """Return the estimates of a fit with their 95 % intervals."""
     sd = np.sqrt(np.diag(confidence.covariance))

@@ -16,7 +16,6 @@ from rsea_ros.identification.confidence import (
 )
 from rsea_ros.identification.estimates import (
     errors_by_channel,
-    fit_percent,
     identified_rig,
     overlays_of,
     parameters_of,
@@ -41,6 +40,7 @@ from rsea_ros.identification.workers import cores
 from rsea_ros.model.extent import bounded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.prediction import fit_percent
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
