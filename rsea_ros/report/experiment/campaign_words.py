@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.diagnosis.causes import MODEL_DOUBT
+from rsea_ros.diagnosis.naming.causes import MODEL_DOUBT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import Outcome
 from rsea_ros.experiment.hypothesis import NOTHING

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import preference
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
-from rsea_ros.diagnosis.flexible import Flexible, flexible
+from rsea_ros.diagnosis.naming.contribution import rows_of, weighted_by
+from rsea_ros.diagnosis.naming.flexible import Flexible, flexible
+from rsea_ros.diagnosis.naming.signature import Signature, signature
 from rsea_ros.diagnosis.score import Score, gain, score_on
-from rsea_ros.diagnosis.signature import Signature, rows_of, signature, weighted_by
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map

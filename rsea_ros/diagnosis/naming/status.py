@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rsea_ros.diagnosis.coefficients import COEFFICIENTS
-from rsea_ros.diagnosis.evidence import Evidence
-from rsea_ros.diagnosis.probability import probability
+from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.naming.probability import probability
+from rsea_ros.diagnosis.naming.weighing import Place, Weighed
 from rsea_ros.diagnosis.result import Status
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, NamingSettings
-from rsea_ros.diagnosis.weighing import Place, Weighed
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def named(
 ) -> list[Named]:
     """Return what may be said of the cause in each place.
 
-    at_floor, takes_most: all causes together leave only noise, or take most of the residual (verdict.py).
+    at_floor, takes_most: all causes together leave only noise, or take most of the residual (criteria.py).
     """
     return [_named(p, at_floor, takes_most and not p.is_late, settings) for p in places]
 

@@ -6,10 +6,12 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.checks.faults import Checked
-from rsea_ros.diagnosis.causes import alternative_of, cause_of, dropped_of, latest, rejected_of
 from rsea_ros.diagnosis.coherence import lost_above
+from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
 from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.naming import Named, named
+from rsea_ros.diagnosis.naming.causes import alternative_of, cause_of, dropped_of, latest, rejected_of
+from rsea_ros.diagnosis.naming.status import Named, named
+from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum
 from rsea_ros.diagnosis.result import (
@@ -27,8 +29,6 @@ from rsea_ros.diagnosis.sentences import (
     verdict_sentence,
 )
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
-from rsea_ros.diagnosis.verdict import is_at_floor, takes_most, verdict_of
-from rsea_ros.diagnosis.weighing import Weighing
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import what_is_not_told
 from rsea_ros.identification.estimates import identified_rig, overlays_of, parameters_of

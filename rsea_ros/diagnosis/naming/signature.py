@@ -10,18 +10,13 @@ in others, although on the whole it helps. By amplitude, time and frequency lamb
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.diagnosis.candidate import with_misfit_as_noise
-from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
-from rsea_ros.diagnosis.score import Score
-from rsea_ros.diagnosis.screening import without_effect
-from rsea_ros.identification.problem import Case, Problem
-from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
-from rsea_ros.signals import BoolArray, FloatArray, IntArray
+from rsea_ros.diagnosis.naming.contribution import Rows, projected
+from rsea_ros.signals import FloatArray, IntArray
 
 _PARTS = 4
 """Parts of equal power into which amplitude and time are divided: enough to show a curve."""
@@ -52,63 +47,6 @@ class Signature:
     kept: float
 
 
-@dataclass(frozen=True)
-class Rows:
-    """The weighted residuals of a model and what one cause contributes to them, row by row, shape (m,).
-
-    others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, tests:
-    whether it takes part in no fit and no choice. runs: rows of one channel of one record, in time.
-    """
-
-    contribution: FloatArray
-    residual: FloatArray
-    others: FloatArray
-    prior: FloatArray
-    block: IntArray
-    tests: BoolArray
-    runs: tuple[slice, ...]
-
-
-def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
-    """Return a problem on all samples of the cases, each channel in units of what `weights` leaves of it."""
-    return replace(problem, cases=tuple(with_misfit_as_noise(c, weights) for c in cases))
-
-
-def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -> Rows | None:
-    """Return a model's residuals and what a cause of it contributes; None where that runs away."""
-    error = problem.residual(theta)
-    less, rest = without_effect(problem, theta, name)
-    without = less.residual(rest)
-    if not np.isfinite(power(error)) or not np.isfinite(power(without)):
-        return None
-    which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    block, tests, runs = _places(problem)
-    return Rows(
-        contribution=error - without,
-        residual=-error,
-        others=jacobian_columns(problem, theta, error, which, run),
-        prior=np.array([1.0 / problem.unknowns[i].reach for i in which]),
-        block=block,
-        tests=tests,
-        runs=runs,
-    )
-
-
-def _places(problem: Problem) -> tuple[IntArray, BoolArray, tuple[slice, ...]]:
-    """Return for every row its block, numbered through all records, and whether it tests; and the runs."""
-    blocks, tests, runs, first, at = [], [], [], 0, 0
-    for case in problem.cases:
-        last = 0
-        for n in problem.present(case):
-            own = blocks_of(case, n)[case.mask[n]]
-            blocks.append(first + own)
-            tests.append(np.isin(set_of(own), TEST))
-            runs.append(slice(at, at + len(own)))
-            at, last = at + len(own), max(last, int(own.max(initial=0)))
-        first += last + 1
-    return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
-
-
 def signature(rows: Rows) -> Signature:
     """Return the signature of a cause."""
     c, r = (projected(rows, v) for v in (rows.contribution, rows.residual))
@@ -127,13 +65,6 @@ def signature(rows: Rows) -> Signature:
         share=total / max(float(r @ r), 1e-300),
         kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
     )
-
-
-def projected(rows: Rows, values: FloatArray) -> FloatArray:
-    """Return what is left of rows of values when the other unknowns have done what they can."""
-    a = rows.others
-    normal = a.T @ a + np.diag(rows.prior**2)
-    return np.asarray(values - a @ np.linalg.lstsq(normal, a.T @ values, rcond=None)[0])
 
 
 def _summed(part: IntArray, cc: FloatArray, cr: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,7 +1,13 @@
 """Claims: every accepted cause and every rival of it, as a model that held-out data can be asked about.
 
 Rivals of a cause are the effects that were tried beside the same model and what is said to be confused with
-it and does as well in its place; each has a weight by what it leaves of the test blocks (stacking.py).
+it and does as well in its place. Each has a weight by what it leaves of the test blocks: pseudo-BMA with the
+Bayesian bootstrap,
+
+    w_k = mean over bootstraps of softmax_k(-1/2 (sum_b v_b loss_kb + price_k))
+
+v: Dirichlet weights of the blocks times their number. A rival that is ahead by a few blocks' luck does not
+get all the weight, as it would from the sum alone (Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13, 2018).
 """
 
 from __future__ import annotations
@@ -11,15 +17,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.evidence import Claim
-from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.naming.evidence import Claim
+from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.diagnosis.stacking import stacked
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
+from rsea_ros.signals import FloatArray
 
 LEAST_WEIGHT = 0.02
 """Of all that was tried in a cause's place: a rival with less is none."""
@@ -111,3 +119,17 @@ def _stacked(scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[i
     losses = [s.loss(best) for s in scores]
     prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
     return [float(w) for w in stacked(losses, prices)]
+
+
+def stacked(losses: Sequence[FloatArray], prices: Sequence[float]) -> FloatArray:
+    """Return a weight for each model, shape (k,), summing to 1.
+
+    losses: twice the negative log likelihood of every block, shape (b,) each. prices: of the priors, alike.
+    """
+    loss = np.array(losses)
+    blocks = loss.shape[1]
+    draws = np.random.default_rng(0).dirichlet(np.ones(blocks), RESAMPLES) * blocks
+    evidence = -0.5 * (draws @ loss.T + np.asarray(prices))
+    evidence -= evidence.max(axis=1, keepdims=True)
+    likely = np.exp(evidence)
+    return np.asarray((likely / likely.sum(axis=1, keepdims=True)).mean(axis=0))

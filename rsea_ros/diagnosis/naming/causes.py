@@ -9,12 +9,12 @@ import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.naming import Named
-from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
+from rsea_ros.diagnosis.naming.status import Named
+from rsea_ros.diagnosis.naming.weighing import Weighed
+from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Reason, Rejected
 from rsea_ros.diagnosis.score import gain, score_on
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.sentences import evidence_of
-from rsea_ros.diagnosis.weighing import Weighed
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
@@ -27,6 +27,8 @@ MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
 _FALLS = 1.02
 """Ratio by which a channel's residual must fall for a cause's gain to speak of that channel."""
+PLAY = "backlash"
+_GAP = f"{PLAY}.gap"
 
 
 def cause_of(
@@ -127,3 +129,18 @@ def dropped_of(
     evidence = weighed.cause.evidence
     reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
     return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
+
+
+def play_not_told(selection: Selection, result: Diagnosis) -> tuple[str, ...]:
+    """Return the sentence for a joint in a position loop whose play these data do not show."""
+    named = {cause.name for cause in result.causes}
+    trials = [trial for trial in selection.trials if trial.name == PLAY]
+    gains = [rejected.gain_holdout for rejected in result.rejected if rejected.name == PLAY]
+    if result.baseline_rig.loop is None or PLAY in named or not (trials and gains):
+        return ()
+    unknowns = zip(trials[-1].problem.unknowns, trials[-1].theta, strict=True)
+    gap = next(u.outer(float(value)) for u, value in unknowns if u.name == _GAP)
+    return (
+        f"These data cannot determine the play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the "
+        f"residual of data that took no part changes by {-100.0 * gains[-1]:+.1f} %.",
+    )

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.diagnosis.naming.contribution import Rows
 from rsea_ros.diagnosis.score import RESAMPLES
-from rsea_ros.diagnosis.signature import Rows
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect

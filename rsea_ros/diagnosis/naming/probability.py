@@ -3,7 +3,7 @@
     p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
 
 The features f say how far the law's shape fits (signature.py), what a flexible law still gains (flexible.py),
-how it stands among its rivals (stacking.py), and how much it helps. The coefficients are those of
+how it stands among its rivals (rivals.py), and how much it helps. The coefficients are those of
 `bench/calibration.py fit`; "none of these" is the mass that a cause and its rivals leave.
 """
 
@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from rsea_ros.diagnosis.coefficients import COEFFICIENTS
-from rsea_ros.diagnosis.evidence import Evidence
+from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.identification.result import AT_NOISE
 
 INTERCEPT = "intercept"
