@@ -29,7 +29,8 @@ from rsea_ros.exports.fmu_play import play_fmu
 from rsea_ros.exports.isaac import export_isaac
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.mujoco_play import play_mujoco
-from rsea_ros.exports.urdf import export_sdf, export_urdf
+from rsea_ros.exports.sdf import export_sdf
+from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.identification.excitation import JOINT, Settings, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, rig_names

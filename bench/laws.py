@@ -28,7 +28,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
 from rsea_ros.effects.catalogue import lent
-from rsea_ros.identification.identify import fit
+from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import simulated
 from rsea_ros.laws.fitting import gain_of
 from rsea_ros.laws.learn import learn

@@ -82,7 +82,8 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
     from rsea_ros.exports.fmu import export_fmu
     from rsea_ros.exports.isaac import export_isaac
     from rsea_ros.exports.mjcf import export_mjcf
-    from rsea_ros.exports.urdf import export_sdf, export_urdf
+    from rsea_ros.exports.sdf import export_sdf
+    from rsea_ros.exports.urdf import export_urdf
 
     def bam(rig: Rig) -> Export:
         return export_bam(rig, args.actuator)

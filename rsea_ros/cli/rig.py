@@ -68,7 +68,7 @@ def _row(rig: Rig, name: str) -> tuple[str, ...]:
 
 def remarks(rig: Rig) -> list[str]:
     """Return what a reader of the rig should know: what moves, what is fitted, which sensors it has."""
-    from rsea_ros.model.rig import END_NAMES
+    from rsea_ros.model.rig_fields import END_NAMES
     from rsea_ros.wording import listed
 
     ends = [f"{end} {'moves' if rig.end_is_free(end) else 'is clamped'}" for end in END_NAMES]

@@ -10,7 +10,8 @@ from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import PAPER_FACTOR, end_over_end, flat_band, pure_torque_bandwidth
-from rsea_ros.model.rig import END_NAMES, Quantity, Rig
+from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.spring import spring_rate
 
 DAMPING_RATIO = 0.025

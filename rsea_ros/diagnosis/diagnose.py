@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.confidence import torque_scale
-from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.fit import CHANNELS, unknowns_of
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.steady import steadied

@@ -12,7 +12,7 @@ from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_o
 from rsea_ros.experiment.limits import of_command, of_response, used
 from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.shape import Shape, command_of
-from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
 from rsea_ros.signals import FloatArray

@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Parameter
 from rsea_ros.experiment.hypothesis import NOTHING
-from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.fit import CHANNELS, unknowns_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import Unknown, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig

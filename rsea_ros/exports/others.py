@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.exports.coverage import Said, Unsaid
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 
 
 def acting(rig: Rig) -> Rig:

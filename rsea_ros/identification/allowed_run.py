@@ -12,7 +12,8 @@ from rsea_ros.errors import RseaError
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import drive_from
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.simulation import simulate_drive
 from rsea_ros.signals import Channel, FloatArray, Record
 

@@ -18,7 +18,7 @@ from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
-from rsea_ros.model.rig import FIELDS
+from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.signals import FloatArray, IntArray
 from rsea_ros.wording import listed
 

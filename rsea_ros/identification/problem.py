@@ -15,6 +15,7 @@ from rsea_ros.identification.unknowns import Clocks, Unknown, apply
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF, Motion, acted, inverse_torque, is_inverse, motion_from
 from rsea_ros.model.position_loop import commanded
+from rsea_ros.model.prediction import SETTLE
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import drive_of, simulate_drives
 from rsea_ros.model.step import OUTPUTS
@@ -22,8 +23,6 @@ from rsea_ros.signals import BoolArray, FloatArray, Record
 
 FEWEST = 64
 """Samples of a channel: fewer show no spectrum, so no noise to weigh them by."""
-SETTLE = 0.3
-"""s at the start of a record that no fit looks at: the bench may not have been at rest."""
 
 
 @dataclass(frozen=True)

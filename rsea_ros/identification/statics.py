@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.signals import FloatArray, Record
 
 SLOW = 1.0

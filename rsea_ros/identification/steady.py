@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.identification.even_stamps import Evened, evened, may_be_even
-from rsea_ros.identification.identify import fit
+from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig

@@ -10,7 +10,8 @@ import numpy as np
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
-from rsea_ros.model.rig import FIELDS, EffectSetting, Rig
+from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.signals import FloatArray
 
 CLOCK, CLOCK_RATE = "clock", "clock_rate"

@@ -11,7 +11,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.identification.identify import fit
+from rsea_ros.identification.fit import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution

@@ -20,7 +20,7 @@ from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
 SETTLE = 0.3
-"""s at the start of a record that no comparison looks at: the bench may not have been at rest."""
+"""s at the start of a record that no comparison and no fit looks at: the bench may not have been at rest."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,16 @@ class Comparison:
 
     @property
     def fit_percent(self) -> float:
-        """100 (1 - ||e|| / ||y - mean y||), %; NaN where no sample counts."""
+        """The fit of the samples that count, %; NaN where none does."""
         if not self.counts.any():
             return math.nan
-        y = self.measured[self.counts]
-        scale = float(np.sqrt(np.mean((y - y.mean()) ** 2)))
-        return 100.0 * (1.0 - self.rms_error / scale) if scale > 0.0 else 0.0
+        return fit_percent((self.predicted - self.measured)[self.counts], self.measured[self.counts])
+
+
+def fit_percent(error: FloatArray, measured: FloatArray) -> float:
+    """Return 100 (1 - ||e|| / ||y - mean y||), %."""
+    scale = float(np.linalg.norm(measured - measured.mean()))
+    return 100.0 * (1.0 - float(np.linalg.norm(error)) / scale) if scale > 0.0 else 0.0
 
 
 def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:

@@ -1,7 +1,7 @@
 """Rig: what the bench is. Values in SI with their prior spread, which ends are clamped, which effects act.
 
-The model calls everything by the dotted name of the YAML file (`rotor.reflected_inertia`); FIELDS is the
-only list of them. Reading and writing of files is in `rig_file.py`.
+The model calls everything by the dotted name of the YAML file (`rotor.reflected_inertia`); `rig_fields.py`
+lists them. Reading and writing of files is in `rig_file.py`.
 """
 
 from __future__ import annotations
@@ -14,75 +14,15 @@ from typing import Literal
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import RigError
-from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.model.rig_fields import FIELDS, check_value, unit_of
+from rsea_ros.model.rig_structure import check_structure
+from rsea_ros.model.train import Train
 from rsea_ros.signals import FloatArray
 
-LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
-"""Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
 CLOCK_DOUBT = 1e-4
 """s, one sigma. How far the stamps of a sensor may lie from its instants where the rig does not say."""
-END_NAMES = ("housing_end", "spring_end")
 Hold = Literal["zero", "first", "band"]
 HOLDS: tuple[Hold, ...] = ("zero", "first", "band")
-
-
-@dataclass(frozen=True)
-class Field:
-    """A value that a rig may have: unit, smallest value, whether that is allowed itself, default."""
-
-    unit: str
-    low: float = 0.0
-    low_allowed: bool = True
-    default: float | None = None
-
-
-_END_FIELDS = {
-    "inertia": Field("kg m^2", low_allowed=False),
-    "damping": Field("N m s/rad", default=0.0),
-    "stiffness": Field("N m/rad", default=0.0),
-    "gravity": Field("N m", default=0.0),
-    "gravity_angle": Field("rad", low=-math.inf, default=0.0),
-}
-
-LOOP_FIELDS: Mapping[str, Mapping[str, Field]] = {
-    "pd": {
-        "k_p": Field("N m/rad"),
-        "k_i": Field("N m/rad/s", default=0.0),
-        "k_d": Field("N m s/rad", default=0.0),
-        "k_f": Field("N m s/rad", default=0.0),
-    },
-    "cascade": {
-        "k_pos": Field("1/s"),
-        "k_v": Field("N m s/rad"),
-        "k_vi": Field("N m/rad", default=0.0),
-    },
-}
-"""Gains of the kinds of position loop (model/loop.py)."""
-_LIMIT_FIELDS = {
-    "torque_limit": Field("N m", low_allowed=False, default=math.inf),
-    "velocity_limit": Field("rad/s", low_allowed=False, default=math.inf),
-    "sample_time": Field("s", default=0.0),
-}
-LOOP_LIMITS = tuple(_LIMIT_FIELDS)
-
-FIELDS: Mapping[str, Field] = MappingProxyType(
-    {
-        "rotor.reflected_inertia": Field("kg m^2", low_allowed=False),
-        "rotor.reflected_damping": Field("N m s/rad"),
-        "gear.ratio": Field("1", low=1.0, default=1.0),
-        "gear.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "chassis.inertia": Field("kg m^2", default=0.0),
-        "spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "spring.damping": Field("N m s/rad", default=0.0),
-        "housing.inertia": Field("kg m^2", default=0.0),
-        "proximal_spring.stiffness": Field("N m/rad", low_allowed=False, default=math.inf),
-        "proximal_spring.damping": Field("N m s/rad", default=0.0),
-        **{f"{end}.{key}": f for end in END_NAMES for key, f in _END_FIELDS.items()},
-        **{f"controller.{key}": f for gains in LOOP_FIELDS.values() for key, f in gains.items()},
-        **{f"controller.{key}": f for key, f in _LIMIT_FIELDS.items()},
-        "spring_end.above_sensor": Field("1", default=0.0),
-    }
-)
 
 
 @dataclass(frozen=True)
@@ -179,7 +119,7 @@ class Rig:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name, quantity in self.quantities.items():
             check_value(name, quantity.value, where=self.name)
-        _check_structure(self)
+        check_structure(self)
 
     def __getitem__(self, name: str) -> float:
         """Return a value in SI, or the default of a field that the rig leaves out."""
@@ -246,93 +186,3 @@ class Rig:
     def end_is_free(self, end: str) -> bool:
         """Tell whether an end can move (it has an inertia of its own)."""
         return end not in self.clamped
-
-
-def unit_of(name: str) -> str:
-    """Return the unit of a rig field. Raises RigError for a name that is none."""
-    if name not in FIELDS:
-        raise RigError(f"{name}: no such rig field, expected one of {', '.join(FIELDS)}")
-    return FIELDS[name].unit
-
-
-def check_value(name: str, value: float, where: str = "rig") -> None:
-    """Raise RigError when a value is not a possible one for its field."""
-    unit = unit_of(name)
-    low, allowed = FIELDS[name].low, FIELDS[name].low_allowed
-    infinite_ok = FIELDS[name].default == math.inf
-    possible = (value >= low if allowed else value > low) and (math.isfinite(value) or infinite_ok)
-    if possible and math.isfinite(value) and value != 0.0 and not LEAST_SIZE <= abs(value) <= GREATEST_SIZE:
-        sizes = f"a size between {LEAST_SIZE:g} and {GREATEST_SIZE:g} {unit}"
-        raise RigError(f"{where}: {name} = {value:g} {unit}, expected {sizes}", name)
-    if not possible:
-        bound = f">= {low:g}" if allowed else f"> {low:g}"
-        raise RigError(f"{where}: {name} = {value:g} {unit}, expected a finite value {bound} {unit}", name)
-
-
-def _check_structure(rig: Rig) -> None:
-    for end in set(rig.clamped) - set(END_NAMES):
-        raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")
-    if rig.train not in TRAINS:
-        raise RigError(
-            f"rig {rig.name}: gear.train = {rig.train!r}, expected one of {', '.join(TRAINS)}", "gear.train"
-        )
-    for train in rig.other_trains:
-        if train not in TRAINS:
-            raise RigError(
-                f"rig {rig.name}: gear.or has {train!r}, expected one of {', '.join(TRAINS)}", "gear.or"
-            )
-    for key, end in (("proximal", rig.proximal), ("ft_end", rig.ft_end)):
-        if end not in END_NAMES:
-            raise RigError(f"rig {rig.name}: {key} = {end!r}, expected one of {', '.join(END_NAMES)}", key)
-    if rig.ft_end == "housing_end" and math.isinf(rig["proximal_spring.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: ft_end = housing_end without proximal_spring.stiffness, expected that of the "
-            "sensor, N m/rad"
-        )
-    if rig.rigid_spring and "spring_end" in rig.clamped and math.isinf(rig["gear.stiffness"]):
-        raise RigError(
-            f"rig {rig.name}: spring rigid and spring_end clamped, expected one of them: nothing could move"
-        )
-    if not rig.rigid_spring and math.isinf(rig["spring.stiffness"]):
-        value = "= inf" if "spring.stiffness" in rig.quantities else "is missing"
-        raise RigError(
-            f"rig {rig.name}: spring.stiffness {value}, expected a value in N m/rad or `rigid: true`",
-            "spring.stiffness",
-        )
-    for name in ("rotor.reflected_inertia", "rotor.reflected_damping"):
-        rig[name]
-    _check_loop(rig)
-    for end in END_NAMES:
-        if rig.end_is_free(end):
-            rig[f"{end}.inertia"]
-
-
-def _check_loop(rig: Rig) -> None:
-    if rig.encoder_end not in ("gear_output", "spring_end"):
-        raise RigError(
-            f"rig {rig.name}: encoder_end = {rig.encoder_end!r}, expected gear_output or spring_end",
-            "encoder_end",
-        )
-    stated = [n.split(".")[1] for n in rig.quantities if n.startswith("controller.")]
-    if rig.loop is None:
-        if stated:
-            raise RigError(
-                f"rig {rig.name}: controller.{stated[0]} without controller.kind, expected one of "
-                f"{', '.join(LOOP_FIELDS)}",
-                "controller",
-            )
-        return
-    if rig.loop not in LOOP_FIELDS:
-        raise RigError(
-            f"rig {rig.name}: controller.kind = {rig.loop!r}, expected one of {', '.join(LOOP_FIELDS)}",
-            "controller.kind",
-        )
-    allowed = (*LOOP_FIELDS[rig.loop], *LOOP_LIMITS)
-    for name in stated:
-        if name not in allowed:
-            raise RigError(
-                f"rig {rig.name}: controller.{name} in a {rig.loop} loop, expected {', '.join(allowed)}",
-                f"controller.{name}",
-            )
-    for name in LOOP_FIELDS[rig.loop]:
-        rig[f"controller.{name}"]

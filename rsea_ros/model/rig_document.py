@@ -1,7 +1,7 @@
-"""Rig and the mapping that its YAML file holds, every key, type, unit and range checked.
+"""A rig from the mapping that its YAML file holds, every key, type, unit and range checked.
 
 A value is written `{value: 0.953, unit: kg m^2, spread: 0.3, source: Table 2}`; the unit must be the one of
-`rig.FIELDS`.
+`rig_fields.FIELDS`.
 """
 
 from __future__ import annotations
@@ -14,40 +14,18 @@ from rsea_ros.checked import mapping, number, only_keys, switch, text, unit
 from rsea_ros.errors import FieldError, RigError
 from rsea_ros.keys import names
 from rsea_ros.model.effect_settings import check_effects
-from rsea_ros.model.rig import (
-    CLOCK_DOUBT,
-    END_NAMES,
-    FIELDS,
-    HOLDS,
-    LOOP_FIELDS,
-    LOOP_LIMITS,
-    Controller,
-    EffectSetting,
-    Field,
-    Hold,
-    Quantity,
-    Rig,
-    Sensor,
-    check_value,
-)
+from rsea_ros.model.rig import HOLDS, Controller, EffectSetting, Hold, Quantity, Rig
+from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field, check_value
 from rsea_ros.model.rig_keys import (
-    CLOCK,
-    CLOCK_RATE,
     CONTROLLER,
     EFFECT,
     GROUPS,
     QUANTITY,
-    SENSOR,
     SWITCHES,
     TOP,
 )
-from rsea_ros.signals import UNITS
+from rsea_ros.model.rig_sensors import sensors_from
 from rsea_ros.wording import shown
-
-_LATEST = 0.01
-"""s. A clock further off than this is no clock error but a delay of the bench."""
-_FASTEST = 1000.0
-"""ppm. A clock that runs faster than this counts in other units."""
 
 
 def rig_from_document(document: Mapping[str, Any], default_name: str = "rig") -> Rig:
@@ -76,7 +54,7 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         linear=switch(document, "linear"),
         train=groups["gear"].get("train", "planetary"),
         other_trains=_other_trains(groups["gear"].get("or", [])),
-        sensors=_sensors(mapping(document.get("sensors", {}), "sensors")),
+        sensors=sensors_from(mapping(document.get("sensors", {}), "sensors")),
         known=_known(
             document.get("known", []),
             [*quantities, *(f"{e.name}.{p}" for e in effects for p in e.parameters)],
@@ -89,74 +67,6 @@ def _rig(document: Mapping[str, Any], default_name: str) -> Rig:
         hold=_hold(document.get("hold", "zero")),
         effects=effects,
     )
-
-
-def rig_to_document(rig: Rig) -> dict[str, Any]:
-    """Return the rig as the mapping that its YAML file holds."""
-    document: dict[str, Any] = {
-        "name": rig.name,
-        "about": rig.about,
-        "source": rig.source,
-        "proximal": rig.proximal,
-    }
-    if rig.linear:
-        document["linear"] = True
-    if rig.ft_end != "spring_end":
-        document["ft_end"] = rig.ft_end
-    if rig.encoder_end != "gear_output":
-        document["encoder_end"] = rig.encoder_end
-    if rig.loop:
-        document["controller"] = {"kind": rig.loop}
-    if rig.hold != "zero":
-        document["hold"] = rig.hold
-    for name, quantity in rig.quantities.items():
-        group, key = name.split(".")
-        document.setdefault(group, {})[key] = _quantity_to_document(name, quantity)
-    for end in sorted(rig.clamped):
-        document.setdefault(end, {})["clamped"] = True
-    document.setdefault("gear", {})["train"] = rig.train
-    if rig.other_trains:
-        document["gear"]["or"] = list(rig.other_trains)
-    if rig.rigid_spring:
-        document.setdefault("spring", {})["rigid"] = True
-    document["known"] = sorted(rig.known)
-    document["sensors"] = {n: _sensor_to_document(n, s) for n, s in rig.sensors.items()}
-    if rig.controller:
-        document["controller"] = {
-            "k_p": rig.controller.k_p,
-            "k_v": rig.controller.k_v,
-            "limit": rig.controller.limit,
-        }
-    document["effects"] = [
-        {
-            "name": e.name,
-            "parameters": {k: float(v) for k, v in e.parameters.items()},
-            **({"guess": True} if e.guess else {}),
-        }
-        for e in rig.effects
-    ]
-    return document
-
-
-def _sensor_to_document(name: str, sensor: Sensor) -> dict[str, Any]:
-    body: dict[str, Any] = {"noise": sensor.noise, "quantum": sensor.quantum, "unit": UNITS[name]}
-    body |= {"zero_unknown": True} if sensor.zero_unknown else {}
-    if sensor.clock or sensor.clock_doubt != CLOCK_DOUBT:
-        body["clock"] = {"value": sensor.clock, "unit": "s"}
-    if sensor.clock_doubt != CLOCK_DOUBT:
-        body["clock"]["doubt"] = sensor.clock_doubt
-    return body | ({"clock_rate": {"value": sensor.clock_rate, "unit": "ppm"}} if sensor.clock_rate else {})
-
-
-def _quantity_to_document(name: str, quantity: Quantity) -> dict[str, Any]:
-    body: dict[str, Any] = {"value": float(quantity.value), "unit": FIELDS[name].unit}
-    if quantity.spread:
-        body["spread"] = float(quantity.spread)
-    if quantity.source:
-        body["source"] = quantity.source
-    if quantity.ci95:
-        body["ci95"] = [float(v) for v in quantity.ci95]
-    return body
 
 
 def _quantities(group: str, body: Mapping[str, Any]) -> list[tuple[str, Quantity]]:
@@ -191,53 +101,6 @@ def _interval(item: Any, name: str, unit_name: str) -> tuple[float, float]:
         raise RigError(f"{name} = {shown(item)}, expected [low, high] in {unit_name}", name)
     low, high = (number(v, name, unit_name) for v in item)
     return low, high
-
-
-def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
-    """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
-    field = f"sensors.{name}.clock"
-    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
-    only_keys(item, names(CLOCK), field)
-    unit(item.get("unit"), f"{field}.unit", "s")
-    value = number(item.get("value"), f"{field}.value", "s")
-    if not abs(value) < _LATEST:
-        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
-    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
-    if not 0.0 < doubt < _LATEST:
-        raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
-    return value, doubt
-
-
-def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
-    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
-    field = f"sensors.{name}.clock_rate"
-    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
-    only_keys(item, names(CLOCK_RATE), field)
-    unit(item.get("unit"), f"{field}.unit", "ppm")
-    value = number(item.get("value"), f"{field}.value", "ppm")
-    if not abs(value) < _FASTEST:
-        raise RigError(f"{field}.value = {value:g} ppm, expected less than {_FASTEST:g} either way", field)
-    return value
-
-
-def _sensors(body: Mapping[str, Any]) -> dict[str, Sensor]:
-    only_keys(body, set(UNITS), "sensors")
-    sensors = {}
-    for name, item in body.items():
-        fields = mapping(item, f"sensors.{name}")
-        only_keys(fields, names(SENSOR), f"sensors.{name}")
-        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
-        noise, quantum = (
-            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
-        )
-        if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
-            raise RigError(
-                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
-                f"sensors.{name}",
-            )
-        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
-        sensors[name] = Sensor(noise, quantum, floating, *clock, _clock_rate(fields, name))
-    return sensors
 
 
 def _other_trains(items: Any) -> tuple[Any, ...]:

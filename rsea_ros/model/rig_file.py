@@ -13,7 +13,8 @@ from pathlib import Path
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, OutputError, RigError
 from rsea_ros.model.rig import Rig
-from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.rig_document import rig_from_document
+from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.new_files import write_text
 from rsea_ros.wording import did_you_mean, shown
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.keys import NEEDED, Key, table
-from rsea_ros.model.rig import CLOCK_DOUBT, END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field
+from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.model.rig_fields import END_NAMES, FIELDS, LOOP_FIELDS, LOOP_LIMITS, Field
 from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
 

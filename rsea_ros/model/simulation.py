@@ -22,7 +22,8 @@ from rsea_ros.model.extent import LARGEST, SMALLEST
 from rsea_ros.model.loop import STATES, control
 from rsea_ros.model.position_loop import commanded, loop_parameters
 from rsea_ros.model.propagator import propagator, start_map
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.sampling import sample
 from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.model.structure import structured

@@ -21,7 +21,8 @@ from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.hardware.spring import Spring
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 
 Values = Mapping[str, Any]

@@ -11,7 +11,8 @@ import numpy as np
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.response import frequency_response
-from rsea_ros.model.rig import END_NAMES, Quantity
+from rsea_ros.model.rig import Quantity
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas

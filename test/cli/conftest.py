@@ -1,6 +1,29 @@
-"""Makes `foreign`, bags written without this project, importable for the tests of the command line."""
+"""What tests of the command line share: `foreign`, bags written without this project, and a short record."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parents[1] / "msg_adapters"))
+import numpy as np
+import pytest
+
+from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel, Record
+
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "msg_adapters")]
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    u = excitation("white_noise", Settings(duration=4.0))
+    return synthesize(load_rig("paper_high_impedance"), Channel(np.arange(len(u)) / 280.0, u))
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Iterator[Path]:
+    """Give a directory for results in which nothing may be left."""
+    yield tmp_path / "results"
+    left = list((tmp_path / "results").glob("*"))
+    assert not left, left

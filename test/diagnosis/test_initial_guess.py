@@ -8,7 +8,7 @@ import pytest
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.excitation import Settings, excitation
-from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize

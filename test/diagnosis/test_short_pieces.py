@@ -11,7 +11,7 @@ import pytest
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.problem_variants import with_doubled_step
 from rsea_ros.identification.excitation import Settings, excitation
-from rsea_ros.identification.identify import CHANNELS
+from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate, synthesize

@@ -10,7 +10,8 @@ from benches import bench, recorded
 
 from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Sensor
-from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.rig_document import rig_from_document
+from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate
 from rsea_ros.signals import Channel, Record
 

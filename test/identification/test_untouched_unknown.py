@@ -10,7 +10,7 @@ import pytest
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification import confidence
 from rsea_ros.identification.excitation import Settings, excitation
-from rsea_ros.identification.identify import fit
+from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig

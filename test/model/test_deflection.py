@@ -9,8 +9,9 @@ import pytest
 
 from msg_adapters import read_record, write_record
 from rsea_ros.model.rig import Sensor
-from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.signals import Channel, Record
 

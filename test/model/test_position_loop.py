@@ -13,8 +13,9 @@ from rsea_ros.errors import ChannelError, RigError
 from rsea_ros.identification.responses import model_response
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Controller, Quantity, Rig
-from rsea_ros.model.rig_document import rig_from_document, rig_to_document
+from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate, synthesize
 from rsea_ros.signals import Channel, Record
 

@@ -13,7 +13,7 @@ from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia, reson
 from rsea_ros.model.equations import mechanics, rotor_inertia, train_ratio
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.response import frequency_response
-from rsea_ros.model.rig import END_NAMES
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import TRAINS, rotor_turns, spin_inertia
 

@@ -17,7 +17,7 @@ from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.sentences import evidence_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
-from rsea_ros.identification.identify import parameters_of
+from rsea_ros.identification.estimates import parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve

@@ -31,9 +31,10 @@ from rsea_ros.diagnosis.sentences import (
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import IdentificationError
 from rsea_ros.identification.confidence import what_is_not_told
-from rsea_ros.identification.identify import fit_percent, identified_rig, overlays_of, parameters_of
+from rsea_ros.identification.estimates import identified_rig, overlays_of, parameters_of
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
+from rsea_ros.model.prediction import fit_percent
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Record
 

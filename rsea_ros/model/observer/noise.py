@@ -22,7 +22,8 @@ import numpy as np
 
 from rsea_ros.errors import RigError
 from rsea_ros.model.propagator import state_space
-from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.signals import UNITS
 
 NOTHING: Mapping[str, float] = MappingProxyType({})

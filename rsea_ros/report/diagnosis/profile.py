@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.diagnosis.result import Diagnosis
-from rsea_ros.identification.problem import SETTLE
 from rsea_ros.identification.result import Overlay
+from rsea_ros.model.prediction import SETTLE
 from rsea_ros.signals import UNITS, FloatArray
 
 BINS = 16

@@ -1,0 +1,139 @@
+"""Residuals of a record and their derivatives by the rig's values and the sensors' clocks, biases and gains.
+
+Unknowns beside the rig's values, for each of F/T sensor, position and velocity: how late its stamps are at
+the start of the record (offset, s), how that grows (drift, s/s), bias, gain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from rsea_ros.identification.confidence import BLOCK
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import jacobian
+from rsea_ros.identification.unknowns import Unknown, clocks
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.simulation import drive_of
+from rsea_ros.signals import Channel, FloatArray, IntArray, Record
+
+_LEAST_MISFIT = 0.5
+_BLOCKS = 40
+"""At least: with fewer than unknowns a sandwich is too thin."""
+
+
+class State(NamedTuple):
+    """Values of the rig in the fit's coordinates; offset (s) and drift (s/s) of each timed channel."""
+
+    theta: FloatArray
+    offset: FloatArray
+    drift: FloatArray
+
+    def moved(self, step: FloatArray) -> State:
+        """Return the state after a step; a clock that reads later than stamped is stamped early."""
+        n, m = len(self.theta), len(self.offset)
+        return State(
+            self.theta + step[:n], self.offset - step[n : n + m], self.drift - step[n + m : n + 2 * m]
+        )
+
+
+class Setting(NamedTuple):
+    """What stays the same in all rounds. start: of the whole record, s."""
+
+    record: Record
+    start: float
+    case: Case
+    rig: Rig
+    timed: tuple[str, ...]
+    values: tuple[Unknown, ...]
+
+
+def on_time(record: Record, start: float, timed: Sequence[str], state: State) -> Record:
+    """Return the record with the stamps that its sensors would have had without offset and drift."""
+    moved = {}
+    for n, late, grows in zip(timed, state.offset, state.drift, strict=True):
+        moved[n] = Channel(record[n].t - late - grows * (record[n].t - start), record[n].y)
+    return record.with_channels(**moved)
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a state leaves of the record: residual over noise, shape (m,), with the problem and where it is.
+
+    plain: derivatives of each channel's residual by bias and gain, shape (m, 2). of: channel of each row.
+    misfit: RMS over noise of each channel without bias and gain.
+    """
+
+    problem: Problem
+    theta: FloatArray
+    residual: FloatArray
+    plain: FloatArray
+    of: IntArray
+    misfit: FloatArray
+
+    @property
+    def loss(self) -> float:
+        """What rounds lower: the product of the misfits."""
+        return float(np.prod(self.misfit))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Residual r (m,) and derivatives (m, n) in units of the misfit.
+
+    Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
+    """
+
+    left: Left
+    residual: FloatArray
+    matrix: FloatArray
+    block: IntArray
+
+
+def left_of(setting: Setting, state: State) -> Left:
+    """Return what a state leaves: one simulation."""
+    record = on_time(setting.record, setting.start, setting.timed, state)
+    case = replace(setting.case, drive=drive_of(record, setting.rig))
+    wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
+    problem = Problem((case,), setting.rig, (*setting.values, *wide), setting.timed)
+    theta = np.concatenate([state.theta, np.zeros(len(wide))])
+    residual, of = problem.residual(theta), _channel_of(case, setting.timed)
+    noise, y = _of_rows(case, case.noise, setting.timed), _of_rows(case, case.measured, setting.timed)
+    plain = np.column_stack([1.0 / noise, y / noise + residual])
+    return Left(problem, theta, residual, plain, of, _misfits(residual, plain, of, len(setting.timed)))
+
+
+def _channel_of(case: Case, timed: Sequence[str]) -> IntArray:
+    """Return the channel of every row, as its number in `timed`."""
+    return np.repeat(np.arange(len(timed)), [int(case.mask[n].sum()) for n in timed])
+
+
+def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence[str]) -> FloatArray:
+    """Return what belongs to each channel, or to each of its samples, for every row."""
+    return np.concatenate([np.broadcast_to(what[n], case.t[n].shape)[case.mask[n]] for n in timed])
+
+
+def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> FloatArray:
+    """Return the RMS over noise of each channel's residual, without bias and gain."""
+    found = []
+    for k in range(m):
+        columns, here = plain[of == k], residual[of == k]
+        left = here - columns @ np.linalg.lstsq(columns, here, rcond=None)[0]
+        found.append(float(np.sqrt(np.mean(left**2))))
+    return np.array(found)
+
+
+def rows_of(setting: Setting, left: Left) -> Rows:
+    """Lay out the rows about a state: one simulation for each unknown."""
+    (case,), n = left.problem.cases, len(setting.values)
+    moved = jacobian(left.problem, left.theta, left.residual)
+    t = _of_rows(case, case.t, setting.timed)
+    of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
+    own = [moved[:, n:] * (t - setting.start)[:, None]]
+    own += [of_channel * column[:, None] for column in left.plain.T]
+    weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
+    block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
+    return Rows(left, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)

@@ -1,0 +1,77 @@
+"""The Gauss-Newton step on laid-out rows, its doubt, and what the rows bring of each value of the rig.
+
+The covariance is the sandwich over blocks of one second (identification/confidence.py says why).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rsea_ros.checks.linear_rows import Rows, Setting, State
+from rsea_ros.identification.unknowns import Unknown, start_vector
+from rsea_ros.signals import FloatArray
+
+_OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
+"""One sigma before: s, s/s, 1."""
+_WIDER = 3.0
+
+
+class Brought(NamedTuple):
+    """What data bring of a value: the share of what is known of it then, and its one sigma over its size."""
+
+    share: float
+    relative_sd: float
+
+
+def gauss_newton_step(rows: Rows, setting: Setting, state: State) -> tuple[FloatArray, FloatArray]:
+    """Return the step of every unknown and its one sigma."""
+    m, matrix = len(setting.timed), rows.matrix
+    doubt = [_WIDER * _doubt(u) for u in setting.values]
+    doubt += [_OFFSET_DOUBT] * m + [_DRIFT_DOUBT] * m + [np.inf] * m + [_GAIN_DOUBT] * m
+    prior = np.array(doubt) ** -2.0
+    off = state.theta - start_vector(setting.values)
+    at = np.concatenate([off, -state.offset, -state.drift, np.zeros(2 * m)])
+    normal = matrix.T @ matrix + np.diag(prior)
+    scale = np.sqrt(np.diag(normal) + 1e-300)
+    inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+    step = -inverse @ (matrix.T @ rows.residual + prior * at)
+    scores = _scores(rows, rows.residual + matrix @ step)
+    covariance = inverse @ (scores.T @ scores + np.diag(prior)) @ inverse
+    return step, np.sqrt(np.maximum(np.diag(covariance), np.diag(inverse)))
+
+
+def _scores(rows: Rows, left: FloatArray) -> FloatArray:
+    """Return the sum of the scores of each block, shape (blocks, unknowns)."""
+    first = np.flatnonzero(np.diff(rows.block, prepend=-1))
+    parts = np.add.reduceat(rows.matrix * left[:, None], first, axis=0)
+    scores = np.zeros((int(rows.block.max()) + 1, rows.matrix.shape[1]))
+    np.add.at(scores, rows.block[first], parts)
+    return scores
+
+
+def brought_by_value(setting: Setting, rows: Rows) -> dict[str, Brought]:
+    """Return by value of the rig what the data bring of it.
+
+    Gains and drifts count as known: they are what a check looks for, not what a fit frees.
+    """
+    values, n, m = setting.values, len(setting.values), len(setting.timed)
+    if not n:
+        return {}
+    keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
+    columns = rows.matrix[:, keep]
+    clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
+    doubt = np.array([*(_doubt(u) for u in values), *clock_doubts, *[np.inf] * m])
+    part = columns.T @ columns + np.diag(doubt**-2.0)
+    scale = np.sqrt(np.diag(part) + 1e-300)
+    after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale
+    size = [1.0 if u.logarithmic else abs(u.start) or 1.0 for u in values]
+    return {
+        u.name: Brought(float(max(0.0, 1.0 - (sd / before) ** 2)), float(sd / scale))
+        for u, sd, before, scale in zip(values, after, doubt, size, strict=False)
+    }
+
+
+def _doubt(u: Unknown) -> float:
+    return u.doubt if np.isfinite(u.doubt) else u.scale

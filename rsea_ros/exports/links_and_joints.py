@@ -1,0 +1,132 @@
+"""A rig as a chain of links and joints in XML, with a block of our own for what the format has no words for.
+
+The block holds every value and effect of the rig; other programs pass it by.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree as xml
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.exports.chain import Chain, Joint, Link, chain_of
+from rsea_ros.exports.coverage import Export, Said, Unsaid, coverage_lines
+from rsea_ros.exports.others import acting, sized
+from rsea_ros.model.rig import Rig
+
+Frame = Callable[[str], tuple[xml.Element, xml.Element]]
+"""Takes the name of a rig, gives the root of a document and the element in it that holds links and joints."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a format writes a chain. block: the tag of what holds every value and effect of the rig."""
+
+    target: str
+    has_springs: bool
+    frame: Frame
+    link: Callable[[Link], xml.Element]
+    joint: Callable[[Joint, Rig], xml.Element]
+    block: str
+
+
+def export_chain(rig: Rig, language: Language) -> Export:
+    """Return a rig in a language. Raises RigError for one that is no chain of links (see chain.py)."""
+    rig = acting(rig)
+    chain = chain_of(rig)
+    said, unsaid = _coverage(rig, chain, has_springs=language.has_springs)
+    root, model = language.frame(rig.name)
+    model.insert(0, _comment(said, unsaid))
+    model.extend(language.link(link) for link in chain.links)
+    model.extend(language.joint(joint, rig) for joint in chain.joints)
+    model.append(_block(language.block, rig))
+    return Export(language.target, f".{language.target}", _text(root), said, unsaid)
+
+
+def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[tuple[Said, ...], tuple[Unsaid, ...]]:
+    """Return what the joints say, and what only the block does."""
+    only = "only in the block rsea"
+    said = [Said(one.name, _how(one, has_springs)) for one in chain.joints]
+    unsaid = [Unsaid(name, f"{why}; {only}") for name, why in chain.left_out.items()]
+    if not has_springs and not rig.rigid_spring:
+        unsaid.append(Unsaid("spring.stiffness", f"URDF joints have no spring; {only}"))
+    finite, has_stop = sized(rig), any(stop_of(joint, rig) for joint in chain.joints)
+    for one in rig.effects:
+        how = _EFFECTS.get(one.name)
+        if one.name not in finite:
+            unsaid.append(Unsaid(one.name, f"a parameter of it is infinite; {only}"))
+        elif how is None or (one.name == "hard_stop" and not has_stop):
+            unsaid.append(Unsaid(one.name, only))
+        else:
+            said.append(Said(one.name, how))
+    if rig.loop is not None:
+        unsaid.append(Unsaid(f"{rig.loop} loop", f"a controller's affair; {only}"))
+    return tuple(said), tuple(unsaid)
+
+
+_EFFECTS = {
+    "coulomb_friction": "dynamics friction of the gear",
+    "torque_saturation": "limit effort of the gear",
+    "hard_stop": "limits of the spring's joint",
+    "gravity_error": "mass of the free end",
+}
+
+
+def _how(joint: Joint, has_springs: bool) -> str:
+    if joint.mimics:
+        return f"mimics {joint.mimics}, {joint.multiplier:g} turns for one"
+    spring = f", spring {joint.stiffness:g} N m/rad" if has_springs and joint.stiffness else ""
+    return f"damping {joint.damping:g} N m s/rad{spring}"
+
+
+def _parameters(rig: Rig, name: str) -> dict[str, float]:
+    return sized(rig).get(name, {})
+
+
+def inertia(link: Link) -> dict[str, str]:
+    """Return the inertia of a link about its centre, kg m^2, by the names that both formats use."""
+    diagonal = repr(link.about_centre)
+    return {"ixx": diagonal, "iyy": diagonal, "izz": diagonal, "ixy": "0", "ixz": "0", "iyz": "0"}
+
+
+def stop_of(joint: Joint, rig: Rig) -> dict[str, float]:
+    """Return the parameters of the hard stop in a joint: that of the spring."""
+    return _parameters(rig, "hard_stop") if joint.name == "spring" else {}
+
+
+def friction(joint: Joint, rig: Rig) -> float:
+    """Return the dry friction of a joint, N m."""
+    return _parameters(rig, "coulomb_friction").get("torque", 0.0) if joint.name == "gear" else 0.0
+
+
+def effort(joint: Joint, rig: Rig) -> float:
+    """Return the largest torque of a joint, N m."""
+    return _parameters(rig, "torque_saturation").get("limit", math.inf) if joint.name == "gear" else math.inf
+
+
+def _block(tag: str, rig: Rig) -> xml.Element:
+    """Return every value and effect of the rig; in SDF each element with the prefix of the block."""
+    prefix = f"{tag.partition(':')[0]}:" if ":" in tag else ""
+    block = xml.Element(tag, name=rig.name, train=rig.train)
+    for name, number in rig.values().items():
+        xml.SubElement(block, f"{prefix}value", name=name, unit=rig.unit(name), value=repr(number))
+    for one in rig.effects:
+        effect = xml.SubElement(block, f"{prefix}effect", name=one.name)
+        for p in effect_named(one.name).parameters:
+            if p.name in one.parameters:
+                value = repr(one.parameters[p.name])
+                xml.SubElement(effect, f"{prefix}parameter", name=p.name, unit=p.unit, value=value)
+    return block
+
+
+def _comment(said: tuple[Said, ...], unsaid: tuple[Unsaid, ...]) -> Any:
+    lines = ["rsea export", *coverage_lines(said, unsaid)]
+    return xml.Comment(" " + "\n       ".join(lines).replace("--", "- -") + " ")
+
+
+def _text(root: xml.Element) -> str:
+    xml.indent(root)
+    return '<?xml version="1.0"?>\n' + xml.tostring(root, encoding="unicode") + "\n"

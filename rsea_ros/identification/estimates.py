@@ -1,0 +1,73 @@
+"""What a fit says: its errors by channel, its estimates with their intervals, the rig with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.identification.confidence import Confidence, interval
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.result import Overlay, ParameterEstimate
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+from rsea_ros.units import in_motion
+
+
+def errors_by_channel(
+    problem: Problem, outputs: Sequence[Mapping[str, FloatArray]]
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return by channel the error (simulated - measured) and the measured values, of samples that count."""
+    parts: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
+    for case, out in zip(problem.cases, outputs, strict=True):
+        for n in problem.present(case):
+            keep, y = case.mask[n], case.measured[n]
+            parts.setdefault(n, []).append(((out[n] - y)[keep], y[keep]))
+    return {
+        n: (np.concatenate([e for e, _ in p]), np.concatenate([y for _, y in p])) for n, p in parts.items()
+    }
+
+
+def parameters_of(solution: Solution, confidence: Confidence) -> tuple[ParameterEstimate, ...]:
+    """Return the estimates of a fit with their 95 % intervals."""
+    sd = np.sqrt(np.diag(confidence.covariance))
+    return tuple(
+        ParameterEstimate(
+            name=u.name,
+            value=u.outer(float(theta)),
+            unit=in_motion(u.unit, linear=solution.problem.rig.linear),
+            ci95=interval(u, float(theta), float(s)),
+            start=u.start,
+            spread=u.doubt,
+            told_by_data=float(told),
+        )
+        for u, theta, s, told in zip(
+            solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True
+        )
+    )
+
+
+def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
+    """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
+    rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
+    sensors = {
+        n: replace(
+            s, clock=s.clock + clocks.offset.get(n, 0.0), clock_rate=s.clock_rate + clocks.rate.get(n, 0.0)
+        )
+        for n, s in rig.sensors.items()
+    }
+    quantities = dict(rig.quantities)
+    for estimate in parameters:
+        if estimate.name in quantities:
+            quantities[estimate.name] = replace(
+                quantities[estimate.name], ci95=estimate.ci95, source="identified"
+            )
+    return replace(rig, quantities=quantities, sensors=sensors)
+
+
+def overlays_of(case: Case, outputs: Mapping[str, FloatArray]) -> tuple[Overlay, ...]:
+    """Return measured beside simulated for every channel of a case."""
+    return tuple(Overlay(n, case.t[n], case.measured[n], outputs[n]) for n in outputs)

@@ -1,0 +1,100 @@
+"""The fit of a rig: output error, with the noise that the residual shows and the clocks that it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
+from rsea_ros.identification.misfit import ratios_of, reweighted
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, Solution, serial, solve
+from rsea_ros.identification.unknowns import (
+    Unknown,
+    clocks,
+    start_vector,
+    unknowns_of_effect,
+    unknowns_of_rig,
+    vector_of,
+)
+from rsea_ros.model.inverse import is_inverse
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import FloatArray
+
+CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
+_MISFIT = 1.3
+_REWEIGHTINGS = 3
+_OTHER_NOISE = 1.1
+"""Ratio of a channel's noise after a fit to that before, from which the fit is repeated."""
+
+
+def fit(
+    cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
+) -> tuple[Solution, tuple[Case, ...], Asked]:
+    """Fit the rig's free values, its effects and the clocks that the data ask for.
+
+    Returns the cases with their noise too, and what was asked of the clocks.
+
+    The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
+    weight becomes that residual, as maximum likelihood with unknown noise has it. start: where to begin,
+    should the records fit it better than `rig`.
+    """
+    unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
+    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
+    solution = solve(problem, _better_start(problem, start, run), run=run)
+    outputs = problem.outputs(solution.theta)
+    known = _with_noise_of(problem, outputs)
+    if _changed(problem.cases, known):
+        solution = solve(replace(problem, cases=known), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(solution.problem, outputs)
+    asked = asked_of(solution, run)
+    if asked.clocks:
+        solution = solve(*freed(solution, asked), run=run)
+        solution = solve(*without_needless(solution), run=run)
+        problem = solution.problem
+        outputs = problem.outputs(solution.theta)
+        known = _with_noise_of(problem, outputs)
+    for _ in range(_REWEIGHTINGS):
+        ratios = ratios_of(problem, solution.problem.cases, outputs)
+        if max(ratios.values()) < _MISFIT:
+            break
+        heavier = tuple(reweighted(c, ratios) for c in solution.problem.cases)
+        solution = solve(replace(problem, cases=heavier), solution.theta, run=run)
+        outputs = problem.outputs(solution.theta)
+    return solution, known, asked
+
+
+def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
+    """Return the cases with the noise that the residual of simulated outputs shows."""
+    ratio = problem.rig["gear.ratio"]
+    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
+
+
+def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
+    """Tell whether the noise of any channel has changed by more than a fit would notice."""
+    ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
+    return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
+
+
+def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
+    """Return the coordinates of `start` where the residual is smaller there than at the rig's own values."""
+    own = start_vector(problem.unknowns)
+    if start is None:
+        return own
+    other = vector_of(problem.unknowns, start)
+    costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
+    return other if costs[1] < costs[0] else own
+
+
+def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
+    """Return all that a fit of these cases may move."""
+    channels = sorted({n for case in cases for n in case.measured})
+    effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
+    return (
+        *unknowns_of_rig(rig),
+        *(u for group in effects for u in group),
+        *(clocks(channels, rig) if not is_inverse(rig) else ()),
+    )

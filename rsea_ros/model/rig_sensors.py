@@ -1,0 +1,67 @@
+"""The sensors in the file of a rig: noise, quantum, and the clock of each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rsea_ros.checked import mapping, number, only_keys, switch, unit
+from rsea_ros.errors import RigError
+from rsea_ros.keys import names
+from rsea_ros.model.rig import CLOCK_DOUBT, Sensor
+from rsea_ros.model.rig_keys import CLOCK, CLOCK_RATE, SENSOR
+from rsea_ros.signals import UNITS
+
+_LATEST = 0.01
+"""s. A clock further off than this is no clock error but a delay of the bench."""
+_FASTEST = 1000.0
+"""ppm. A clock that runs faster than this counts in other units."""
+
+
+def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
+    """Return the sensors by channel, from what the file says under `sensors`."""
+    only_keys(body, set(UNITS), "sensors")
+    sensors = {}
+    for name, item in body.items():
+        fields = mapping(item, f"sensors.{name}")
+        only_keys(fields, names(SENSOR), f"sensors.{name}")
+        unit(fields.get("unit"), f"sensors.{name}.unit", UNITS[name])
+        noise, quantum = (
+            number(fields.get(k, 0.0), f"sensors.{name}.{k}", UNITS[name]) for k in ("noise", "quantum")
+        )
+        if not (0 <= noise < math.inf and 0 <= quantum < math.inf):
+            raise RigError(
+                f"sensors.{name} = {noise:g}, {quantum:g} {UNITS[name]}, expected finite values >= 0",
+                f"sensors.{name}",
+            )
+        floating, clock = switch(fields, f"sensors.{name}.zero_unknown"), _clock(fields, name)
+        sensors[name] = Sensor(noise, quantum, floating, *clock, _clock_rate(fields, name))
+    return sensors
+
+
+def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
+    """Return value and doubt, s, from `clock: {value: …, unit: s, doubt: …}`; 0 where there is none."""
+    field = f"sensors.{name}.clock"
+    item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
+    only_keys(item, names(CLOCK), field)
+    unit(item.get("unit"), f"{field}.unit", "s")
+    value = number(item.get("value"), f"{field}.value", "s")
+    if not abs(value) < _LATEST:
+        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
+    doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
+    if not 0.0 < doubt < _LATEST:
+        raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
+    return value, doubt
+
+
+def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
+    """Return ppm from `clock_rate: {value: …, unit: ppm}`; 0 where there is none."""
+    field = f"sensors.{name}.clock_rate"
+    item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
+    only_keys(item, names(CLOCK_RATE), field)
+    unit(item.get("unit"), f"{field}.unit", "ppm")
+    value = number(item.get("value"), f"{field}.value", "ppm")
+    if not abs(value) < _FASTEST:
+        raise RigError(f"{field}.value = {value:g} ppm, expected less than {_FASTEST:g} either way", field)
+    return value

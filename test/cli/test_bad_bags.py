@@ -1,0 +1,90 @@
+"""Bags that cannot be used, as a person meets them: one line of what and where, status 2, nothing left."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from bad_input import changed, refused, rsea, without
+from foreign import EPOCH, joint_state, write_foreign
+
+from msg_adapters import write_record
+from msg_adapters.writing import BagWriter
+from rsea_ros.cli.main import main
+
+
+def test_a_missing_topic(record, tmp_path, out):
+    write_record(without(record, "command"), tmp_path / "bag")
+    done = rsea("identify", tmp_path / "bag", "--out", out)
+    refused(done, tmp_path / "bag", "no message on /rsea/torque_command", "the bag holds /rsea/ft")
+
+
+def test_a_wrong_type(record, tmp_path, out):
+    write_record(without(record, "ft"), tmp_path / "bag")
+    stated = ["--topic", "ft=/rsea/joint_states", "--topic", "joint_states=/rsea/nothing"]
+    done = rsea("identify", tmp_path / "bag", "--out", out, *stated)
+    refused(
+        done, "/rsea/joint_states is sensor_msgs/msg/JointState, expected geometry_msgs/msg/WrenchStamped"
+    )
+
+
+def test_an_empty_bag(tmp_path, out):
+    with BagWriter(tmp_path / "bag", "mcap"):
+        pass
+    refused(rsea("identify", tmp_path / "bag", "--out", out), tmp_path / "bag", "holds no topic at all")
+
+
+def test_an_empty_file(tmp_path, out):
+    (tmp_path / "bag.mcap").touch()
+    refused(rsea("identify", tmp_path / "bag.mcap", "--out", out), tmp_path / "bag.mcap", "empty file")
+
+
+def test_a_truncated_mcap_opens_up_to_its_last_chunk(record, tmp_path):
+    write_record(record, tmp_path / "whole.mcap")
+    data = (tmp_path / "whole.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: int(0.7 * len(data))])
+    done = rsea("identify", tmp_path / "cut.mcap", "--out", tmp_path / "results")
+    assert done.returncode == 0, done.stderr
+    assert "cut off" in done.stdout
+
+
+def test_a_truncated_mcap_with_nothing_in_it(record, tmp_path, out):
+    write_record(record, tmp_path / "whole.mcap")
+    (tmp_path / "cut.mcap").write_bytes((tmp_path / "whole.mcap").read_bytes()[:60])
+    refused(rsea("identify", tmp_path / "cut.mcap", "--out", out), tmp_path / "cut.mcap", "cut off")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_no_number(record, tmp_path, out, value):
+    write_record(changed(record, "ft", 7, y=value), tmp_path / "bag")
+    done = rsea("identify", tmp_path / "bag", "--out", out)
+    refused(done, tmp_path / "bag", f"/rsea/ft wrench[7] is {value}", "expected a finite number")
+
+
+@pytest.mark.parametrize(
+    ("sample", "stamp", "kinds"),
+    [(9, 3.3 / 280, ["stray_stamps", "dropped_samples"]), (11, 13.5 / 280, ["out_of_order"])],
+)
+def test_a_stamp_that_goes_back_is_told_and_the_rest_used(record, tmp_path, sample, stamp, kinds):
+    write_record(changed(record, "ft", sample, t=stamp), tmp_path / "bag")
+    assert main(["identify", str(tmp_path / "bag"), "--out", str(tmp_path / "found")]) == 0
+    faults = json.loads((tmp_path / "found" / "identification.json").read_text())["data"]["faults"]
+    assert [(f["kind"], f["channel"], f["size"]) for f in faults] == [(kind, "ft", 1) for kind in kinds]
+
+
+def test_two_joints(tmp_path, out):
+    """A command for one joint, states of two: which is meant must be said."""
+    two = joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])
+    rows = [
+        ("/rsea/torque_command", EPOCH, joint_state(EPOCH, effort=[1.0])),
+        ("/rsea/joint_states", EPOCH, two),
+    ]
+    bag = write_foreign(tmp_path / "bag", rows)
+    done = rsea("identify", bag, "--out", out)
+    refused(done, bag, "/rsea/joint_states: 2 joints (hip, knee), expected one; name it with --joint")
+    refused(rsea("identify", bag, "--out", out, "--joint", "ankle"), bag, "no joint 'ankle'")
+
+
+def test_a_bag_that_is_not_there(tmp_path, out):
+    refused(rsea("identify", tmp_path / "nothing", "--out", out), tmp_path / "nothing", "no such bag")

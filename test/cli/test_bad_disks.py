@@ -1,0 +1,80 @@
+"""Disks that are full and folders without permission: one line, status 2, nothing half there."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from bad_input import ROOT, refused, rsea
+
+from msg_adapters import write_record
+
+NOBODY = 65534
+
+
+def small_files() -> None:
+    """Let this process write no file above 40 kB: writing fails as on a full disk, with an error instead."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
+
+
+def test_a_disk_that_fills_up_under_the_results(record, tmp_path):
+    write_record(record, tmp_path / "bag")
+    assert rsea("identify", tmp_path / "bag", "--out", tmp_path / "roomy").returncode == 0  # compiles it all
+    done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results", before=small_files)
+    refused(done, tmp_path / "results" / "report.html", "File too large")
+    assert not (tmp_path / "results").exists()
+
+
+def test_a_disk_that_fills_up_under_a_bag(tmp_path, tmp_path_factory):
+    roomy = tmp_path_factory.mktemp("roomy") / "bag"  # compiles all that runs with small files
+    assert rsea("simulate", "paper_high_impedance", "--out", roomy).returncode == 0
+    done = rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", before=small_files)
+    refused(done, tmp_path / "bag", "File too large")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_is_full(record, tmp_path):
+    write_record(record, tmp_path / "bag")
+    done = rsea("predict", "paper_high_impedance", tmp_path / "bag", "--out", "/dev/full/x.csv")
+    refused(done, "/dev/full")
+
+
+def as_nobody(*arguments: str | Path, once: tuple[str | Path, ...] = ()) -> subprocess.CompletedProcess[str]:
+    """Run a verb without root's rights. once: with root's, before, so that all that it imports is there."""
+    code = (
+        "import contextlib, io, os, sys, msg_adapters, rsea_ros.cli.identify, rsea_ros.model.rig_file\n"
+        "from rsea_ros.cli.main import main\n"
+        f"once = {[str(a) for a in once]}\n"
+        "with contextlib.redirect_stdout(io.StringIO()): assert not once or main(once) == 0\n"
+        f"os.geteuid() or os.seteuid({NOBODY})\n"
+        f"sys.exit(main({[str(a) for a in arguments]}))"
+    )
+    return subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def reachable(folder: Path) -> None:
+    for one in (folder, *folder.parents[:-2]):
+        one.chmod(0o755)
+
+
+def test_a_reader_without_permission(record, tmp_path):
+    for name in ("open.mcap", "locked.mcap"):
+        write_record(record, tmp_path / name)
+    (tmp_path / "locked.mcap").chmod(0)
+    reachable(tmp_path)
+    before = ("identify", tmp_path / "open.mcap", "--out", tmp_path / "results")
+    done = as_nobody("identify", tmp_path / "locked.mcap", once=before)
+    refused(done, tmp_path / "locked.mcap", "no permission to read it")
+
+
+def test_a_folder_that_this_user_may_not_write_to(record, tmp_path):
+    write_record(record, tmp_path / "bag.mcap")
+    (tmp_path / "locked").mkdir(mode=0o555)
+    reachable(tmp_path)
+    bag = ("identify", tmp_path / "bag.mcap", "--out")
+    done = as_nobody(*bag, tmp_path / "locked" / "results", once=(*bag, tmp_path / "open"))
+    refused(done, tmp_path / "locked" / "results", "Permission denied")
