@@ -76,6 +76,7 @@ def _print(result: Identification, report: Path) -> None:
 
     from rsea_ros.report.fault_words import fault_lines
     from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
+    from rsea_ros.report.remark_words import remark_sentences
     from rsea_ros.report.statics_words import statics_sentences
     from rsea_ros.report.terminal import terminal_table
 
@@ -88,6 +89,7 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.clocks):
+    remarks = remark_sentences([*result.remarks, *result.clocks])
+    for sentence in (*found, *doubt_sentences(result), *remarks):
         print(sentence)
     print(f"report: {report}")

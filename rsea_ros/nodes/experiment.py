@@ -34,6 +34,7 @@ from rsea_ros.nodes._trial import Ears, Trial
 from rsea_ros.report.campaign_files import write_campaign
 from rsea_ros.report.campaign_words import end_sentence, known
 from rsea_ros.report.diagnosis_files import write_diagnosis
+from rsea_ros.report.diagnosis_sentences import diagnosis_sentence
 from rsea_ros.report.experiment_words import shape_words
 from rsea_ros.signals import Record
 
@@ -194,7 +195,7 @@ class Experiment:
             )
         except RseaError as error:
             return f"none: {' '.join(str(error).split())}"
-        return verdict.sentence
+        return diagnosis_sentence(verdict)
 
     def close(self) -> None:
         """Zero torque first; then let the loop's thread end."""

@@ -22,6 +22,7 @@ from rsea_ros.report.page import Block, bullets, folded, key_numbers, page, para
 from rsea_ros.report.palette import AFTER, BEFORE
 from rsea_ros.report.parameters import parameter_table
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.sketch import sketch
 
 
@@ -75,7 +76,7 @@ def _kicker(d: Diagnosis) -> str:
 
 
 def _untold(d: Diagnosis) -> str:
-    told = [*say.confusions(d), *d.statements]
+    told = [*say.confusions(d), *remark_sentences(d.remarks)]
     body = bullets(told) if told else paragraph("Nothing that was asked for.")
     return section("What these data cannot determine", body)
 
