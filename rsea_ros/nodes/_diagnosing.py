@@ -13,7 +13,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
 from rsea_ros.new_files import Place
 from rsea_ros.nodes._health import OK, WARN, Report
-from rsea_ros.report.diagnosis_sentences import diagnosis_sentence
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.signals import Record
 
@@ -65,7 +65,7 @@ class Diagnosing:
     def _diagnose(self, record: Record) -> Diagnosis:
         from rsea_ros.checks.carried import held_against
         from rsea_ros.diagnosis.diagnose import diagnose
-        from rsea_ros.report.diagnosis_files import write_diagnosis
+        from rsea_ros.report.diagnosis.files import write_diagnosis
 
         result = diagnose([held_against(record, self._rig, masks=True)], self._rig, progress=self._tell)
         self._report = write_diagnosis(result, record, Place(self._out, fresh=True), write_overlay)
