@@ -248,7 +248,7 @@ def test_an_offence_is_found(place, source):
         ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant"),
         ("rsea_ros/nodes/plant.py", "import rclpy\nfrom msg_adapters.ros import JointState"),
         ("msg_adapters/ros.py", "from sensor_msgs.msg import JointState"),
-        ("rsea_ros/report/bode.py", "import plotly\nfrom ..identification.identify import Identification"),
+        ("rsea_ros/report/figures/bode.py", "import plotly\nfrom ...identification import result"),
     ],
 )
 def test_what_is_allowed_passes(place, source):
