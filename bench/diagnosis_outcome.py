@@ -16,6 +16,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Record
 
 ERROR = "error"
@@ -126,7 +127,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
         times_noise=_worst(diagnosis.extended_residual_rms, diagnosis.noise_rms),
         times_noise_fresh=_worst(_errors(diagnosis.extended_rig, case.fresh_record), diagnosis.noise_rms),
         seconds=seconds,
-        statements=diagnosis.statements,
+        statements=remark_sentences(diagnosis.remarks),
     )
 
 

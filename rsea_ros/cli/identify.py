@@ -78,6 +78,7 @@ def _print(result: Identification, report: Path) -> None:
     from rsea_ros.report.identification.statics import statics_sentences
     from rsea_ros.report.identification.terminal import terminal_table
     from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
+    from rsea_ros.report.remark_words import remark_sentences
 
     console = Console()
     if not console.is_terminal:
@@ -88,6 +89,7 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.clocks):
+    remarks = remark_sentences([*result.remarks, *result.clocks])
+    for sentence in (*found, *doubt_sentences(result), *remarks):
         print(sentence)
     print(f"report: {report}")

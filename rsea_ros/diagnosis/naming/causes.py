@@ -11,14 +11,14 @@ from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Reason, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
 from rsea_ros.diagnosis.score import gain, score_on
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.diagnosis.sentences import evidence_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.identify import parameters_of
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
@@ -54,9 +54,7 @@ def cause_of(
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
-        evidence=evidence_of(
-            effect, speaks, without.test.ratio(speaks), with_it.test.ratio(speaks), held_out
-        ),
+        times_noise=(without.test.ratio(speaks), with_it.test.ratio(speaks)),
         equation=effect.equation,
         channel=speaks,
         confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
@@ -131,16 +129,15 @@ def dropped_of(
     return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
 
 
-def play_not_told(selection: Selection, result: Diagnosis) -> tuple[str, ...]:
-    """Return the sentence for a joint in a position loop whose play these data do not show."""
-    named = {cause.name for cause in result.causes}
+def undetermined_play(
+    selection: Selection, causes: Sequence[Cause], rejected: Sequence[Rejected]
+) -> tuple[Remark, ...]:
+    """Return what a joint's log says of play that is no cause: people ask for it by name."""
     trials = [trial for trial in selection.trials if trial.name == PLAY]
-    gains = [rejected.gain_holdout for rejected in result.rejected if rejected.name == PLAY]
-    if result.baseline_rig.loop is None or PLAY in named or not (trials and gains):
+    gains = [effect.gain_holdout for effect in rejected if effect.name == PLAY]
+    is_named = any(cause.name == PLAY for cause in causes)
+    if selection.last.problem.rig.loop is None or is_named or not (trials and gains):
         return ()
     unknowns = zip(trials[-1].problem.unknowns, trials[-1].theta, strict=True)
     gap = next(u.outer(float(value)) for u, value in unknowns if u.name == _GAP)
-    return (
-        f"These data cannot determine the play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the "
-        f"residual of data that took no part changes by {-100.0 * gains[-1]:+.1f} %.",
-    )
+    return (Remark("play_undetermined", values=(gap, gains[-1])),)

@@ -23,6 +23,7 @@ from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.identification.parameters import parameter_table
 from rsea_ros.report.page.frame import Block, bullets, folded, key_numbers, page, paragraph, section
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.remark_words import remark_sentences
 
 
 def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
@@ -75,7 +76,7 @@ def _kicker(d: Diagnosis) -> str:
 
 
 def _untold(d: Diagnosis) -> str:
-    told = [*say.confusions(d), *d.statements]
+    told = [*say.confusions(d), *remark_sentences(d.remarks)]
     body = bullets(told) if told else paragraph("Nothing that was asked for.")
     return section("What these data cannot determine", body)
 

@@ -18,6 +18,7 @@ from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.page.frame import Block, bullets, code, key_numbers, page, paragraph, section
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import UNITS
 
 _ORDER = ("ft", "deflection", "position", "velocity")
@@ -127,7 +128,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 
 def _untold(identification: Identification) -> str:
     title = "What these data cannot determine"
-    said = (*doubt_sentences(identification), *identification.statements)
+    said = (*doubt_sentences(identification), *remark_sentences(identification.remarks))
     body = bullets(said) if said else paragraph("Nothing that was asked for.")
     return section(title, body)
 
@@ -147,6 +148,6 @@ def _footer(identification: Identification) -> list[str]:
         sources,
         *damage,
         *identification.notes,
-        *identification.clocks,
+        *remark_sentences(identification.clocks),
         "rsea identify. All values in SI.",
     ]
