@@ -15,7 +15,7 @@ import numpy as np
 
 from rsea_ros.checks.shape import Shape
 from rsea_ros.identification.confidence import BLOCK
-from rsea_ros.identification.problem import Case, Problem, case_from
+from rsea_ros.identification.problem import Case, Problem, case_from, channels_that_tell
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import (
     Unknown,
@@ -45,6 +45,8 @@ _OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
 _WIDER = 3.0
 _BLOCKS = 40
 """At least: with fewer than unknowns a sandwich is too thin."""
+_NEAR = 0.02
+"""Of the scale of every value: a move so small leaves the derivatives as they are."""
 _RESOLUTION = 3e-6
 """s. No clock is known better: the fixed step interpolates between its ends."""
 
@@ -94,8 +96,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
-    measured = case_from(record, rig, masked).measured
-    timed = tuple(n for n in TIMED if n in measured)
+    timed = tuple(n for n in TIMED if n in channels_that_tell(record, rig))
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = _State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
@@ -110,7 +111,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
         better = next((t for t in tried if t[1].loss < _WORSE * rows.left.loss), None)
         if better is None:
             break
-        state, rows = better[0], _rows(setting, better[1])
+        state, rows = better[0], _rows(setting, better[1], rows.slope)
         step, sd = _solved(rows, setting, state)
         clock_steps = slice(len(theta), len(theta) + 2 * len(timed))
         finest = np.repeat([_RESOLUTION, _RESOLUTION / case.duration], len(timed))
@@ -204,14 +205,27 @@ class _Left:
         return float(np.prod(self.misfit))
 
 
+class _Slope(NamedTuple):
+    """Derivatives of the residual over the noise by values and clocks, shape (m, n), and where they hold."""
+
+    matrix: FloatArray
+    theta: FloatArray
+
+    def holds_at(self, theta: FloatArray, unknowns: Sequence[Unknown]) -> bool:
+        """Tell whether another place is so near that the derivatives are the same."""
+        return bool(np.all(np.abs(theta - self.theta) < _NEAR * np.array([u.scale for u in unknowns])))
+
+
 @dataclass(frozen=True)
 class _Rows:
     """Residual r (m,) and derivatives (m, n) in units of the misfit.
 
     Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
+    slope: what the derivatives are made of.
     """
 
     left: _Left
+    slope: _Slope
     residual: FloatArray
     matrix: FloatArray
     block: IntArray
@@ -250,17 +264,19 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     return np.array(found)
 
 
-def _rows(setting: _Setting, left: _Left) -> _Rows:
-    """Lay out the rows about a state: one simulation for each unknown."""
-    (case,), n = left.problem.cases, len(setting.values)
-    moved = jacobian(left.problem, left.theta, left.residual)
+def _rows(setting: _Setting, left: _Left, known: _Slope | None = None) -> _Rows:
+    """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
+    (case,), n, at = left.problem.cases, len(setting.values), left.theta
+    if known is None or not known.holds_at(at, left.problem.unknowns):
+        known = _Slope(jacobian(left.problem, at, left.residual), at)
+    moved = known.matrix
     t = _of_rows(case, case.t, setting.timed)
     of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
     own = [moved[:, n:] * (t - setting.start)[:, None]]
     own += [of_channel * column[:, None] for column in left.plain.T]
     weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
     block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
-    return _Rows(left, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)
+    return _Rows(left, known, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)
 
 
 def _solved(rows: _Rows, setting: _Setting, state: _State) -> tuple[FloatArray, FloatArray]:
