@@ -58,9 +58,10 @@ def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: floa
     """Return over how many samples a response was averaged, 1 for none."""
     weight = 1.0 / (sd**2 + 0.05**2)
     turn, number = np.pi * f * period, np.arange(2.0, _MOST + 1.0)[:, None]
-    averages: ComplexArray = np.sin(number * turn) / (number * np.sin(turn)) * np.exp(-1j * (number - 1.0) * turn)
+    size = np.sin(number * turn) / (number * np.sin(turn))
+    averages = np.asarray(size * np.exp(-1j * (number - 1.0) * turn), dtype=np.complex128)
     tried = _left(response, np.vstack([np.ones(len(f), complex), averages]), weight)
-    lags: ComplexArray = 1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None])
+    lags = np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
     lagged = _left(response, lags, weight).min()
     best = int(np.argmin(tried))
     clear = tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2
