@@ -68,7 +68,7 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
+    {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients"},
     {"result", "score", "short_pieces", "initial_guess", "recommended_run"},
     {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
     {"selection", "step_fits", "signature"},

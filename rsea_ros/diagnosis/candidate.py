@@ -17,8 +17,6 @@ from rsea_ros.identification.solver import Map, Solution, serial, solve
 from rsea_ros.model.drive import Drive, coarser
 from rsea_ros.signals import FloatArray
 
-DELAY = "command_delay.delay"
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -153,9 +151,10 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
     """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    main = effect_named(name).main
-    value, span = solution.values[f"{name}.{main.name}"], main.high - main.low
-    return not main.low + near * span < value < main.high - near * span
+    main = f"{name}.{effect_named(name).main.name}"
+    unknown = next(u for u in solution.problem.unknowns if u.name == main)
+    span = unknown.high - unknown.low
+    return not unknown.low + near * span < solution.values[main] < unknown.high - near * span
 
 
 def on_blocks(
@@ -189,12 +188,14 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     """
     names = [u.name for u in solution.problem.unknowns]
     clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
-    if DELAY not in names or not clocks:
+    acting = [e for e in map(effect_named, solution.problem.acting) if "delay" in e.tags]
+    delay = next((d for d in (f"{e.name}.{e.main.name}" for e in acting) if d in names), None)
+    if delay is None or not clocks:
         return None
     theta = solution.theta.copy()
     common = float(np.mean(theta[clocks]))
     theta[clocks] -= common
-    theta[names.index(DELAY)] -= common
+    theta[names.index(delay)] -= common
     return np.asarray(theta)
 
 
