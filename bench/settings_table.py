@@ -113,3 +113,54 @@ def read(log: Path) -> list[Played]:
     lines = log.read_text().splitlines() if log.exists() else []
     return [Played(**{k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(line).items()})
             for line in lines if line.endswith("}")]  # fmt: skip
+
+
+def page(played: Sequence[Played]) -> str:
+    """Return docs/settings.md: for each setting the outcomes over its values, and whether they change."""
+    own = {s.name: s for s in DEFAULT.listed()}
+    count = len({p.case for p in played})
+    parts = [
+        "# Curves of the settings", "",
+        f"Ten numbers that steer a verdict, each moved alone over {count} short records ({DURATION:g} s at "
+        "280 Hz): mild effects, which a threshold loses first, two and three at once, nothing wrong, and two "
+        "causes that no effect explains. Short and few: a curve shows which way a number acts and how far it "
+        "can move before an outcome changes, not how often a diagnosis is right ([results](results.md)).", "",
+        "Right: the hidden causes and no other are named. Wrong: causes named that are none, in all records. "
+        "Missed: hidden causes not named. Changed: records whose causes, their statuses or verdict differ "
+        "from those at the value in use, in bold.", "",
+        "Made by `bench/settings_table.py`; `bench/settings_curve.py` plays any setting on longer records.", "",
+    ]  # fmt: skip
+    for name in CURVES:
+        rows = list(_rows(name, float(own[name].value), played))
+        flat = all(changed == 0 for *_, changed in rows)
+        parts += [f"## {name}", "", f"{own[name].meaning[:1].upper()}{own[name].meaning[1:]}.", ""]
+        parts += ["| value | right | wrong | missed | changed |", "|---|---|---|---|---|"]
+        for value, right, wrong, missed, changed in rows:
+            shown = f"**{value:g}**" if value == own[name].value else f"{value:g}"
+            parts.append(f"| {shown} | {right} | {wrong} | {missed} | {changed} |")
+        parts += ["", *(["Flat: no outcome changes on these records.", ""] if flat else [])]
+    return "\n".join(parts)
+
+
+def _rows(name: str, own: float, played: Sequence[Played]) -> Iterator[tuple[float, int, int, int, int]]:
+    """Yield value, right, wrong, missed and changed, over the cases that were played with every value."""
+    base = {p.case: p for p in played if p.setting == ""}
+    curve = {v: {p.case: p for p in played if (p.setting, p.value) == (name, v)} for v in CURVES[name]}
+    whole = set(base).intersection(*curve.values())
+    for value, outcomes in sorted({**curve, own: base}.items()):
+        some = [outcomes[case] for case in sorted(whole)]
+        yield (
+            value,
+            sum(p.right for p in some),
+            sum(len(set(p.named) - set(p.truth)) for p in some),
+            sum(len(set(p.truth) - set(p.named)) for p in some),
+            sum(_said(p) != _said(base[p.case]) for p in some),
+        )
+
+
+def _said(played: Played) -> tuple[object, ...]:
+    return played.named, played.statuses, played.verdict
+
+
+if __name__ == "__main__":
+    sys.exit(main())
