@@ -128,7 +128,8 @@ def page(played: Sequence[Played]) -> str:
         "Right: the hidden causes and no other are named. Wrong: causes named that are none, in all records. "
         "Missed: hidden causes not named. Changed: records whose causes, their statuses or verdict differ "
         "from those at the value in use, in bold.", "",
-        "Made by `bench/settings_table.py`; `bench/settings_curve.py` plays any setting on longer records.", "",
+        "Made by `bench/settings_table.py`; `bench/settings_curve.py` plays any setting on longer records.",
+        "",
     ]  # fmt: skip
     for name in CURVES:
         rows = list(_rows(name, float(own[name].value), played))

@@ -32,7 +32,7 @@ Tag = Literal["delay", "play", "mode", "friction", "limit"]
 """What others have to know of an effect's kind.
 
 delay: shifts the command by its main parameter, s, and does nothing else. play: its main parameter is a gap,
-rad. mode: adds a resonance, near which derivatives do not reach far. friction: against the motion, always.
+rad. mode: adds a resonance, near which derivatives do not reach far. friction: a torque of the gear train that depends on how it moves.
 limit: its main parameter is the largest torque, N m.
 """
 Response = Callable[[Sequence[float], Any], Any]
@@ -73,7 +73,7 @@ class Effect:
     reads: the signals among FIRST_READ … LAST_READ that the function looks at.
     guesses: where fits begin by what a residual shows; without it, at `default_guesses`.
     tags: of which kind it is. compensation: what a torque controller may add against it, by the same law.
-    response: how it acts on its signal where it is linear: the margins of a controller know it so.
+    response: how it acts on its signal (at a sensor, on ft) where it is linear: for a controller's margins.
     part: of the bench, where it sits in another than its port says.
     """
 

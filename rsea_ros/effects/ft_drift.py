@@ -2,7 +2,7 @@
 
     T_ft = T + drift * s(t) / s(duration),   s(t) = 1 - exp(-t / time_constant), or t without one
 
-Source: the sensor's manual (warm-up); test of the second bench, ft_thermal.
+Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input: the temperature).
 """
 
 from rsea_ros.effects._drift import SETTLING, progress

@@ -67,6 +67,11 @@ def scale_to(torque: float, stiffness: float, inertia: float, speed: float, peri
     return Scale(**{n: _on_grid(a / b) for n, a, b in zip(names, sizes, beside, strict=True)})
 
 
+def powers_of(unit: str) -> tuple[tuple[str, int], ...]:
+    """Return with which numbers of a machine, to which power, a number of a unit grows."""
+    return _POWERS.get(unit, ())
+
+
 def widest(unit: str) -> float:
     """Return how many times larger a number of a unit may be on any machine than on the catalogue's."""
     return _WIDEST.get(unit, _GRID**_MOST) if unit in _POWERS else 1.0
