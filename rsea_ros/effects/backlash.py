@@ -12,7 +12,7 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 from collections.abc import Sequence
 
 from rsea_ros.effects._chassis import over_step, path
-from rsea_ros.effects.compensated import Gap
+from rsea_ros.effects.compensable import Gap
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import (

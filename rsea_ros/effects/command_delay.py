@@ -48,7 +48,8 @@ EFFECT = Effect(
     parameters=(
         Parameter(
             "delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03),
-            reason="buses and drivers: a cycle at 1 kHz to three at 50 Hz; more where samples are slower",
+            is_fixed=True,
+            reason="buses and drivers: a cycle at 1 kHz to three at 50 Hz; short steps keep no more commands",
         ),
     ),
     claims=Claims(

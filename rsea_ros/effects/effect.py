@@ -14,7 +14,7 @@ from typing import Any, Literal, Protocol
 from numba import types
 
 from rsea_ros.compiler import cfunc
-from rsea_ros.effects.compensated import Compensated
+from rsea_ros.effects.compensable import Compensable
 from rsea_ros.effects.guess import Guess, Guesses
 from rsea_ros.effects.parameter import Parameter as Parameter  # files of effects import it from here
 from rsea_ros.effects.scale import Scale
@@ -32,8 +32,8 @@ Tag = Literal["delay", "play", "mode", "friction", "limit"]
 """What others have to know of an effect's kind.
 
 delay: shifts the command by its main parameter, s, and does nothing else. play: its main parameter is a gap,
-rad. mode: adds a resonance, near which derivatives do not reach far. friction: a torque of the gear train that depends on how it moves.
-limit: its main parameter is the largest torque, N m.
+rad. mode: adds a resonance, near which derivatives do not reach far. friction: a torque of the gear train
+that depends on how it moves. limit: its main parameter is the largest torque, N m.
 """
 Response = Callable[[Sequence[float], Any], Any]
 """Parameters in order and s = 2 pi i f, shape (n,), to the factor on the effect's signal, shape (n,)."""
@@ -91,7 +91,7 @@ class Effect:
     equation: str = ""
     guesses: Guesses | None = None
     tags: tuple[Tag, ...] = ()
-    compensation: Compensated | None = None
+    compensation: Compensable | None = None
     response: Response | None = None
     part: str = ""
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.compiler import njit
-from rsea_ros.effects.compensated import OfRotorAngle
+from rsea_ros.effects.compensable import OfRotorAngle
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port

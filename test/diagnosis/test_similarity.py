@@ -47,10 +47,10 @@ def screened(name: str, times: float):
 @pytest.mark.parametrize("name", SHOWN)
 def test_screening_is_the_same_on_a_similar_machine(name: str, times: float):
     one, other = screened(name, 1.0), screened(name, times)
-    assert other.cost == pytest.approx(one.cost, rel=1e-6)
+    assert other.cost == pytest.approx(one.cost, rel=1e-5)
     pairs = zip(one.problem.unknowns, one.theta, other.theta, strict=True)
     for unknown, a, b in pairs:
         if unknown.name.startswith(name):
             expected = unknown.outer(float(a)) * factor(unknown.unit, times)
             same = next(u for u in other.problem.unknowns if u.name == unknown.name)
-            np.testing.assert_allclose(same.outer(float(b)), expected, rtol=1e-5, err_msg=unknown.name)
+            np.testing.assert_allclose(same.outer(float(b)), expected, rtol=1e-4, err_msg=unknown.name)

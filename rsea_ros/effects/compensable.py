@@ -39,4 +39,4 @@ class Gap:
     width: Callable[[Parameters], float]
 
 
-Compensated = AgainstMotion | OfRotorAngle | Gap
+Compensable = AgainstMotion | OfRotorAngle | Gap
