@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.lags import lagging
 from rsea_ros.control.sampled import responses, sampled
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.naming.causes import play_not_told
 from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
@@ -25,9 +27,11 @@ from rsea_ros.exports.urdf import export_urdf
 from rsea_ros.identification.identify import CHANNELS, identify, unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
+from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
 from rsea_ros.laws.base import fitted_base
 from rsea_ros.model.observer.assemble import without_delay
 from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report.diagnosis.sketch import part_of
 
@@ -143,8 +147,6 @@ def test_its_page_and_its_line_in_the_catalogue(capsys):
 
 @pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)
 def test_an_export_says_that_it_leaves_it_out(export):
-    from rsea_ros.model.rig_file import load_rig
-
     rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
     exported = export(rig.with_effects(EffectSetting("paddle", SIZE)))
     assert "paddle" in {unsaid.name for unsaid in exported.unsaid}
@@ -159,6 +161,16 @@ def test_the_controller_compensates_it_by_the_law_of_the_step():
 def test_play_of_another_name_is_crossed_by_the_controller():
     gap = compensation(RIG.with_effects(EffectSetting("worn_key", {"gap": 3e-3}))).gap
     assert gap == 3e-3
+
+
+def test_a_joint_is_told_of_play_of_another_name_that_its_data_do_not_show():
+    (gap,) = unknowns_of_effect(effect_named("worn_key"), {"gap": 2e-3})
+    problem = SimpleNamespace(unknowns=(gap,))
+    trial = SimpleNamespace(name="worn_key", problem=problem, theta=start_vector((gap,)))
+    rejected = SimpleNamespace(name="worn_key", gain_holdout=0.004)
+    joint = SimpleNamespace(baseline_rig=SimpleNamespace(loop="pd"), causes=(), rejected=(rejected,))
+    (sentence,) = play_not_told(SimpleNamespace(trials=(trial,)), joint)
+    assert "with 2 mrad" in sentence and "changes by -0.4 %" in sentence
 
 
 def test_a_delay_of_another_name_is_a_delay():
