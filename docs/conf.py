@@ -33,7 +33,8 @@ suppress_warnings = ["myst.xref_missing"]
 def effects_page() -> str:
     """Return the catalogue of effects: meaning, equation, parameters and source of each."""
     parts = [
-        "# The effects", "", "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
+        "# The effects", "",
+        "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
         "Bounds and sizes are those for the paper's actuator in its high-impedance test: largest torque "
         f"{scale.TORQUE:g} N m, spring {scale.STIFFNESS:g} N m/rad, reflected inertia {scale.INERTIA:g} "
         f"kg m^2, largest speed {scale.SPEED:g} rad/s, {1.0 / scale.PERIOD:.0f} samples a second. On another "
