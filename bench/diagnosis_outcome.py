@@ -74,6 +74,7 @@ class Outcome:
     times_noise: float = nan
     times_noise_fresh: float = nan
     seconds: float = nan
+    statuses: tuple[str, ...] = ()
     error: str = ""
     statements: tuple[str, ...] = field(default=())
 
@@ -121,6 +122,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
         truth=() if case.group in OUTSIDE else tuple(case.truth_causes),
         named=tuple(cause.name for cause in causes),
         verdict=diagnosis.verdict,
+        statuses=tuple(cause.status for cause in causes),
         confusable=tuple(causes[0].confusable_with) if causes else (),
         found=tuple(_found(case, diagnosis)),
         faults=case.faults,

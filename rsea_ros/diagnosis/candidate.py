@@ -151,9 +151,10 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
     """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    main = effect_named(name).main
-    value, span = solution.values[f"{name}.{main.name}"], main.high - main.low
-    return not main.low + near * span < value < main.high - near * span
+    main = f"{name}.{effect_named(name).main.name}"
+    unknown = next(u for u in solution.problem.unknowns if u.name == main)
+    span = unknown.high - unknown.low
+    return not unknown.low + near * span < solution.values[main] < unknown.high - near * span
 
 
 def _distance(weights: Score | None, farthest: float) -> float:

@@ -7,7 +7,7 @@ the test blocks (naming/weighing.py), and named with gain and probability where 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from rsea_ros.checks.faults import Checked, check
@@ -20,9 +20,11 @@ from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.fit import CHANNELS, unknowns_of
 from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.steady import steadied
@@ -88,13 +90,20 @@ def search(
     record: the first one, from which a joint in its loop gets its start.
     """
     rig = nominal.rig
-    effects = [e for name, e in catalogue().items() if e.is_searched and name not in settings.without]
+    effects = searched_effects(nominal, settings.without)
     start = joint_start(record, rig) if rig.loop is not None else None
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
     selection = eliminate_backwards(selection, effects, pools, settings)
     tell("evaluating on the test blocks", 0.95)
     return selection, [evaluate(selection, m, holdout, pools, settings) for m in selection.models]
+
+
+def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:
+    """Return the effects that are tried beside a nominal model, with bounds that suit its machine."""
+    scale = scale_of(nominal.cases, nominal.rig)
+    searched = (e for e in catalogue().values() if e.is_searched and e.name not in without)
+    return [e.at(scale) for e in searched]
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:

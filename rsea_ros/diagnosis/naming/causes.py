@@ -27,8 +27,6 @@ MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
 _FALLS = 1.02
 """Ratio by which a channel's residual must fall for a cause's gain to speak of that channel."""
-PLAY = "backlash"
-_GAP = f"{PLAY}.gap"
 
 
 def cause_of(
@@ -133,11 +131,21 @@ def undetermined_play(
     selection: Selection, causes: Sequence[Cause], rejected: Sequence[Rejected]
 ) -> tuple[Remark, ...]:
     """Return what a joint's log says of play that is no cause: people ask for it by name."""
-    trials = [trial for trial in selection.trials if trial.name == PLAY]
-    gains = [effect.gain_holdout for effect in rejected if effect.name == PLAY]
-    is_named = any(cause.name == PLAY for cause in causes)
-    if selection.last.problem.rig.loop is None or is_named or not (trials and gains):
+    if selection.last.problem.rig.loop is None or any(_is_play(cause.name) for cause in causes):
         return ()
-    unknowns = zip(trials[-1].problem.unknowns, trials[-1].theta, strict=True)
-    gap = next(u.outer(float(value)) for u, value in unknowns if u.name == _GAP)
-    return (Remark("play_undetermined", values=(gap, gains[-1])),)
+    trials = [trial for trial in selection.trials if _is_play(trial.name)]
+    gains = {effect.name: effect.gain_holdout for effect in rejected}
+    if not trials or trials[-1].name not in gains:
+        return ()
+    return (Remark("play_undetermined", values=(_gap(trials[-1]), gains[trials[-1].name])),)
+
+
+def _is_play(name: str) -> bool:
+    return "play" in effect_named(name).tags
+
+
+def _gap(trial: Trial) -> float:
+    """Return the gap of a trial with play, rad."""
+    main = f"{trial.name}.{effect_named(trial.name).main.name}"
+    unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
+    return next(u.outer(float(value)) for u, value in unknowns if u.name == main)
