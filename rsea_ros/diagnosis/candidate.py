@@ -146,9 +146,8 @@ def effect_size(name: str) -> int:
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:
-    """Return what a fit paid for leaving the values that were known beforehand."""
-    known = ((t, u) for t, u in zip(theta, problem.unknowns, strict=True) if np.isfinite(u.doubt))
-    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in known))
+    """Return what a model pays for leaving the values that were known beforehand: their sigmas, squared."""
+    return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
 
 
 def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:

@@ -8,7 +8,7 @@ from functools import partial
 
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.claims import contests
-from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.evaluation import Evaluated, held_out_of
 from rsea_ros.diagnosis.evidence import Claim, Evidence, evidence_for
 from rsea_ros.diagnosis.promotion import promoted
 from rsea_ros.diagnosis.selection import Selection
@@ -57,7 +57,8 @@ def weigh(
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
         selection, stages = promoted(selection, stages, holdout, pools, settings)
-    held = contests(selection, stages, pools)
+    tested_on = held_out_of(selection, holdout)
+    held = contests(selection, stages, tested_on, pools, settings.floor.far)
     claims = [c for contest in held for c in (contest.cause, *contest.rivals)]
     found = pools.fits.map(partial(evidence_for, cases=selection.cases, run=pools.run), claims)
     of = {id(c): e for c, e in zip(claims, found, strict=True)}
