@@ -116,9 +116,9 @@ class ForwardStep:
 
     def _refused(self, model: Candidate, chosen: Candidate | None) -> Trial:
         """Return the trial of a model that was not accepted, with the reason."""
-        reason = refusal(model, self.present, self.settings)
-        if reason is not None or chosen is None:
-            return trial_of(model, model.newest, self.present, reason or "not_sure")
+        refused = refusal(model, self.present, self.settings)
+        if refused is not None or chosen is None:
+            return trial_of(model, model.newest, self.present, refused or "not_sure")
         loss = float(chosen.validation.loss(chosen.validation).sum())
         is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
         is_larger = model.parameters > chosen.parameters and is_alike
