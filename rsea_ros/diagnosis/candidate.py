@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks, with_common_clock_in_delay, with_doubled_step
 from rsea_ros.diagnosis.score import Score, score_on
@@ -144,9 +142,8 @@ def effect_size(name: str) -> int:
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:
-    """Return what a fit paid for leaving the values that were known beforehand."""
-    known = ((t, u) for t, u in zip(theta, problem.unknowns, strict=True) if np.isfinite(u.doubt))
-    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in known))
+    """Return what a model pays for leaving the values that were known beforehand: their sigmas, squared."""
+    return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
 
 
 def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
