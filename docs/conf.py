@@ -1,4 +1,4 @@
-"""The docs site. `.ci/docs` builds it and treats warnings as errors. Some pages are generated here from code."""
+"""The docs site: `.ci/docs` builds it and treats warnings as errors. Generated pages are written here."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ suppress_warnings = ["myst.xref_missing"]
 
 def effects_page() -> str:
     """Return the catalogue of effects: meaning, equation, parameters and source of each."""
-    parts = ["# The effects", "", "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", ""]
+    about = "Every cause that a diagnosis can name. `rsea effects NAME` prints this text."
+    parts = ["# The effects", "", about, ""]
     for name, effect in sorted(catalogue().items()):
         page = EffectPage(effect)
         rows = [
