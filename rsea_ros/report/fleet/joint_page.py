@@ -8,12 +8,12 @@ from html import escape
 import numpy as np
 
 from rsea_ros.report.fleet.cause_figure import cause_figure, share_figure
-from rsea_ros.report.fleet.fleet_tables import alarm_table, parameter_rows, rows_of
-from rsea_ros.report.fleet.fleet_words import finding, sentence, short_day
 from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.parameter_figure import parameter_figure
-from rsea_ros.report.page import Block, folded, key_numbers, page, paragraph, section
+from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, rows_of
+from rsea_ros.report.fleet.words import finding, sentence, short_day
+from rsea_ros.report.page.frame import Block, folded, key_numbers, page, paragraph, section
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.causes import Naming
