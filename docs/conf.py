@@ -1,4 +1,4 @@
-"""The docs site. `.ci/docs` builds it and treats warnings as errors. Code generates some of its pages."""
+"""The docs site: `.ci/docs` builds it and treats warnings as errors. Generated pages are written here."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def effects_page() -> str:
         "Bounds and sizes are those for the paper's actuator in its high-impedance test: largest torque "
         f"{scale.TORQUE:g} N m, spring {scale.STIFFNESS:g} N m/rad, reflected inertia {scale.INERTIA:g} "
         f"kg m^2, largest speed {scale.SPEED:g} rad/s, {1.0 / scale.PERIOD:.0f} samples a second. On another "
-        "machine they are as many times larger as the column *grows with* says, in powers of four: 2 N m of "
+        "machine they are multiplied by powers of four, according to the column *grows with*: 2 N m of "
         "friction are typical where the largest torque is 30 N m, 2 mN m where it is 30 mN m. Bounds in s "
         "and Hz only widen.", "",
     ]  # fmt: skip

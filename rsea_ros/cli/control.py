@@ -1,4 +1,4 @@
-"""`rsea control`: gains for a rig by synthesis, their margins, and what the controlled actuator can do."""
+"""`rsea control`: gains of the torque controller for a rig, their margins, and the resulting performance."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--free",
         metavar="RIG",
-        help="rig whose ends are the lightest load (default: the rig, the paper's pendulum if it is clamped)",
+        help="rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)",
     )
     parser.add_argument(
-        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="(default 280 1000)"
+        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="Hz (default 280 1000)"
     )
     parser.add_argument(
         "--out",
@@ -40,11 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="print control.json to stdout and nothing else")
-    parser.add_argument("--fail-on", choices=["missed"], help="status 1 when a trial misses what is asked")
+    parser.add_argument("--fail-on", choices=["missed"], help="exit status 1 if a trial misses its limit")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Design, try, write the results."""
+    """Design the controller, run the trials, write the results."""
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def motors(rig: Rig) -> list[Motor]:
-    """Return the driver's limit, and those of the catalogue's unit that has the rig's gear ratio."""
+    """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
     from rsea_ros.control.controller import Limits
     from rsea_ros.control.study import Motor
     from rsea_ros.design.catalogue import catalogue

@@ -12,7 +12,7 @@ from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
 
-HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
+HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
 JSON, REPORT = "design.json", "report.html"
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
@@ -21,60 +21,65 @@ UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments; the defaults are the paper's example."""
     default = Requirement()
-    parser.add_argument("--torque", type=float, default=default.torque, help="N m (default %(default)s)")
-    parser.add_argument("--bandwidth", type=float, default=default.bandwidth, help="Hz (default %(default)s)")
+    parser.add_argument(
+        "--torque", type=float, default=default.torque, help="largest torque, N m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--bandwidth", type=float, default=default.bandwidth, help="bandwidth, Hz (default %(default)s)"
+    )
     parser.add_argument(
         "--inertia",
         type=float,
         default=default.inertia,
-        help="of the spring chassis, kg m^2 (default %(default)s)",
+        help="inertia of the spring chassis, kg m^2 (default %(default)s)",
     )
     parser.add_argument(
-        "--mass", type=float, default=default.mass, help="of the chassis, kg (default %(default)s)"
+        "--mass", type=float, default=default.mass, help="mass of the chassis, kg (default %(default)s)"
     )
     parser.add_argument(
-        "--diameter", type=float, default=default.diameter, help="of the chassis, m (default %(default)s)"
+        "--diameter",
+        type=float,
+        default=default.diameter,
+        help="diameter of the chassis, m (default %(default)s)",
     )
     parser.add_argument(
         "--separation",
         type=float,
         default=default.separation,
-        help="between two springs, m (default %(default)s)",
+        help="distance between two springs, m (default %(default)s)",
     )
     parser.add_argument(
         "--spring-radius",
         type=float,
         default=default.spring_radius,
-        help="r_s of Eq. (9), m (default %(default)s)",
+        help="radius r_s of Eq. (9), m (default %(default)s)",
     )
     parser.add_argument(
         "--deflection",
         type=float,
         default=math.degrees(default.deflection),
-        help="largest, deg (default %(default).3g)",
+        help="largest deflection, deg (default %(default).3g)",
     )
     parser.add_argument(
         "--tolerance-db",
         type=float,
         default=default.tolerance_db,
-        help="of |T_d/T_p|, dB (default %(default)s)",
+        help="tolerance of |T_d/T_p|, dB (default %(default)s)",
     )
     parser.add_argument(
         "--tolerance-deg",
         type=float,
         default=default.tolerance_deg,
-        help="of its phase, deg; 90: any (default %(default)s)",
+        help="tolerance of its phase, deg; 90: none (default %(default)s)",
     )
     parser.add_argument(
         "--stiffness",
         type=float,
         default=STIFFNESS,
-        help="to be judged, N m/rad (default %(default)s, the paper's)",
+        help="stiffness to test, N m/rad (default %(default)s, the paper's)",
     )
-    parser.add_argument("--unit", default=UNIT, help="motor and gear of the catalogue (default %(default)s)")
-    parser.add_argument(
-        "--train", choices=TRAINS, help="of the gear, where the unit's own is another (default: the unit's)"
-    )
+    parser.add_argument("--unit", default=UNIT, help="motor-gear unit of the catalogue (default %(default)s)")
+    parser.add_argument("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
     parser.add_argument(
         "--catalogue",
         type=Path,
@@ -87,11 +92,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_force(parser)
     parser.add_argument("--json", action="store_true", help="print design.json to stdout and nothing else")
-    parser.add_argument("--fail-on", choices=["unmet"], help="status 1 when the stiffness misses a demand")
+    parser.add_argument("--fail-on", choices=["unmet"], help="exit status 1 if the stiffness misses a demand")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Judge the stiffness, find those that meet all demands, write the results."""
+    """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
     from rsea_ros.design.catalogue import unit_named
     from rsea_ros.design.judge import judge, least_stiffness
     from rsea_ros.design.margins import robust_stiffness
@@ -146,7 +151,7 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
             f"{check.unit}"
         )
     print(
-        f"least stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
+        f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
         f"{least.rate:.0f} N/m"
     )
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):

@@ -16,11 +16,11 @@ from rsea_ros.identification.result import Verdict
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
-HELP = "frequency response and parameters with confidence from recorded runs"
+HELP = "identify frequency response and parameters with intervals from recorded runs"
 EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
-"""Columns of the table where no terminal says how many it has."""
+"""Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,7 +58,9 @@ def run(args: argparse.Namespace) -> int:
 
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.cli._provenance import provenance
-        from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
+        from rsea_ros.identification.identify import (
+            identify,
+        )  # takes 0.7 s, which a refused bag need not wait for
         from rsea_ros.report.identification.files import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
@@ -71,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print(result: Identification, report: Path) -> None:
-    """Print the verdict, the table, and a line for each thing to know beside it."""
+    """Print the verdict, the table, and a line for each remark."""
     from rich.console import Console
 
     from rsea_ros.report.fault_words import fault_lines

@@ -17,7 +17,7 @@ EXAMPLE = "rsea test test/cli -x"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Take no arguments of its own: all go to pytest."""
+    """Take no arguments; all go to pytest."""
     parser.set_defaults(pass_on=[])
 
 

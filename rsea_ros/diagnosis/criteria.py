@@ -17,9 +17,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from rsea_ros.diagnosis.result import Reason, Status, Verdict
-from rsea_ros.diagnosis.score import Score, bootstrap_means
+from rsea_ros.diagnosis.score import Score, bootstrap_means, likelier_by
 from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
-from rsea_ros.diagnosis.tempering import likelier_by
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.signals import Fault
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.criteria import break_tie, refusal
-from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.score import Score, likelier_by, temper, tempered_loss
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.diagnosis.tempering import likelier_by, temper, tempered_loss
 from rsea_ros.identification.unknowns import Unknown
 
 FAR, BLOCKS, SAMPLES = DEFAULT.floor.far, 40, 100.0

@@ -23,9 +23,8 @@ from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.evidence import Claim
-from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.diagnosis.tempering import tempered_loss
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
