@@ -7,7 +7,8 @@ A mode is too sharp for that: near it the nominal values need new derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +24,8 @@ from rsea_ros.signals import FloatArray
 _STEPS = 2
 _SHARES = (1.0, 0.3)
 """Of a step that are tried, in turn."""
+_GENTLY = 0.1
+"""Of a guess from which no step helped: the size tried next."""
 _DAMPING = 1e-6
 """Of the curvature: keeps apart what the data do not."""
 
@@ -47,6 +50,24 @@ def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]
 
     A guess may also name values of the rig: these then differ from where the derivatives were taken.
     """
+    best = _best_of(present, effect, guesses)
+    if best is None or best.cost >= present.cost:
+        gentler = _best_of(present, effect, [g for g in (_near_null(effect, g) for g in guesses) if g])
+        best = min((b for b in (best, gentler) if b is not None), key=lambda b: b.cost, default=None)
+    return best
+
+
+def _near_null(effect: Effect, guess: Mapping[str, float]) -> dict[str, float] | None:
+    """Return a guess a tenth as large, from which two linear steps cannot lead far astray; None without one."""
+    main = effect.main
+    if main.name not in guess or not math.isfinite(main.null):
+        return None
+    return {**guess, main.name: main.null + _GENTLY * (guess[main.name] - main.null)}
+
+
+def _best_of(
+    present: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]]
+) -> ScreenedEffect | None:
     best: ScreenedEffect | None = None
     for guess in guesses:
         parameters = {name: value for name, value in guess.items() if "." not in name}
