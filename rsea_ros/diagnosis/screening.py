@@ -58,7 +58,7 @@ def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]
 
 
 def _near_null(effect: Effect, guess: Mapping[str, float]) -> dict[str, float] | None:
-    """Return a guess a tenth as large, from which two linear steps cannot lead far astray; None without one."""
+    """Return a guess a tenth as large, where an effect is nearly linear; None where it has no such size."""
     main = effect.main
     if main.name not in guess or not math.isfinite(main.null):
         return None
