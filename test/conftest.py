@@ -44,7 +44,7 @@ DEAREST = (
     "diagnosis/test_two_causes", "cli/test_bad_input", "model/test_pure_torque", "nodes/test_loop",
     "diagnosis/test_puzzle", "nodes/test_controller_on_wire", "cli/test_nothing_lost", "hardware/test_faults",
     "test_inputs", "nodes/test_experiment_node", "identification/test_identify", "nodes/test_watch",
-    "identification/test_moving_output", "nodes/test_driver_honest", "cli/test_paper", "test_launcher",
+    "paper/test_moving_output", "nodes/test_driver_honest", "cli/test_paper", "test_launcher",
     "report/", "nodes/test_parameters", "control/test_verb", "nodes/test_several_joints",
     "laws/test_hidden_laws", "nodes/test_identify_diagnosis", "diagnosis/test_detents", "nodes/test_model",
     "cli/test_diagnose", "nodes/test_controller", "cli/test_run_launch_topics", "fleet/test_task",
