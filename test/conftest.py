@@ -40,11 +40,15 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 DEAREST = (
-    "diagnosis/test_hidden_effects", "cli/test_bad_", "model/test_pure_torque", "cli/test_demo",
-    "cli/test_ctrl_c", "diagnosis/test_puzzle", "nodes/test_driver_on_wire",
-    "identification/test_identify", "nodes/test_loop", "report/", "hardware/test_faults",
-    "test_realdata", "nodes/test_controller", "nodes/test_model", "nodes/test_identify_diagnosis",
-    "nodes/test_parameters", "test_package", "cli/test_diagnose",
+    "test_realdata", "cli/test_demo", "diagnosis/test_hidden_effects", "nodes/test_driver_on_wire",
+    "diagnosis/test_two_causes", "cli/test_bad_input", "model/test_pure_torque", "nodes/test_loop",
+    "diagnosis/test_puzzle", "nodes/test_controller_on_wire", "cli/test_nothing_lost", "hardware/test_faults",
+    "test_inputs", "nodes/test_experiment_node", "identification/test_identify", "nodes/test_watch",
+    "paper/test_moving_output", "nodes/test_driver_honest", "cli/test_paper", "test_launcher",
+    "report/", "nodes/test_parameters", "control/test_verb", "nodes/test_several_joints",
+    "laws/test_hidden_laws", "nodes/test_identify_diagnosis", "diagnosis/test_detents", "nodes/test_model",
+    "cli/test_diagnose", "nodes/test_controller", "cli/test_run_launch_topics", "fleet/test_task",
+    "test_package", "test_readme", "library/test_door", "independent/test_bench",
 )  # fmt: skip
 """What takes longest, first, so that no worker is left with it at the end; what computes and what waits for
 nodes by turns, so that the cores are busy and the nodes are not late."""

@@ -16,7 +16,8 @@ import rsea_ros.files as files
 import rsea_ros.replaced as replaced
 from msg_adapters import read_record, write_record
 from rsea_ros.checks import usable
-from rsea_ros.cli import paper
+from rsea_ros.checks.finding import Findings
+from rsea_ros.cli import _checks, paper
 from rsea_ros.cli.main import main
 from rsea_ros.control import study
 from rsea_ros.design import judge, margins
@@ -100,7 +101,7 @@ def folder(record, tmp_path, monkeypatch) -> Path:
     for module, names, value in (
         (identify, "identify", found), (diagnose, "diagnose", found), (study, "study", found),
         (judge, "judge", found), (judge, "least_stiffness", 1.0), (margins, "robust_stiffness", np.inf),
-        (usable, "check_diagnosable", None),
+        (usable, "check_diagnosable", None), (_checks, "check_record", Findings("run.mcap", RIG, (), ())),
         (results, "identification_json", JSON), (results, "identification_report", "page"),
         (diagnosis_files, "diagnosis_json", JSON), (diagnosis_files, "diagnosis_report", "page"),
         (diagnosis_files, "overlay_records", {"/rsea": record}),

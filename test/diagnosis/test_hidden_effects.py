@@ -22,7 +22,7 @@ from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
-DURATION = 24.0
+DURATION = 14.0
 
 
 @dataclass(frozen=True)

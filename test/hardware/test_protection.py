@@ -66,12 +66,12 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
 
 
 def test_a_supervised_toy_that_is_driven_on_is_left_alone(toy):
-    device = toy(supervised="yes", watchdog=0.5)
+    device = toy(supervised="yes", watchdog=1.0)
     loop = guarded(device)
     loop.open()
     loop.enable()
     begun = time.monotonic()
-    while time.monotonic() - begun < 0.7:
+    while time.monotonic() - begun < 1.3:
         loop.cycle(10.0, 0.0)
         time.sleep(0.02)
     loop.disable()

@@ -95,8 +95,8 @@ def test_a_page_sees_commands_and_records(bench, listener):
         await page.until(lambda: {"torque_command", "ft"} <= recorded(page.state))
         assert page.state["rates"]["ft"] > 100 and not page.errors
         page.close()  # the phone is gone while it holds the command
-        left = time.monotonic()
         again = await Page(address(watch, listener), asyncio.get_running_loop()).connect()
+        left = time.monotonic()
         await again.until(lambda: again.last.get("command") == 0.0)
         assert time.monotonic() - left < PATIENCE + 3.0
         await again.send(do="stop")

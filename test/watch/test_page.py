@@ -38,7 +38,7 @@ def text(page, name):
 
 
 def held(commander):
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0
     while (torque := commander.torque(time.monotonic())) is None or torque < 0.5:
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -65,10 +65,12 @@ def test_the_torque_is_zero_when_the_page_is_left(page, commander, leave):
     page.value("document.getElementById('go').click()")
     held(commander)
     page.value(leave)
-    left = time.monotonic()
+    left, late = time.monotonic(), 0.0
     while commander.holder is not None:
-        assert time.monotonic() < left + PATIENCE
+        before = time.monotonic()
         time.sleep(0.002)
+        late += time.monotonic() - before - 0.002  # by which this machine stood still
+        assert time.monotonic() < left + PATIENCE + late
     time.sleep(RELEASE)
     assert commander.torque(time.monotonic() + RELEASE) in (0.0, None)
 

@@ -1,0 +1,14 @@
+"""The order in which the files of tests are handed out (conftest.py) names files that exist."""
+
+from pathlib import Path
+
+import pytest
+
+from test.conftest import DEAREST
+
+HERE = Path(__file__).parent
+
+
+@pytest.mark.parametrize("name", DEAREST)
+def test_what_takes_longest_is_there(name):
+    assert list(HERE.glob(f"{name}*"))
