@@ -82,7 +82,7 @@ def _drift(name: str, drift: Number, linear: Linear, duration: float) -> Finding
 
 
 def _left_open(kind: str, name: str, sd: float) -> Finding:
-    """Return that these data do not determine a clock. sd: s, of its offset, or of its drift over the record."""
+    """Return that these data do not determine a clock. sd: s, of its offset or of its drift by the end."""
     detail = f"not determined: these data leave {1e3 * sd:.2g} ms, one sigma"
     return Finding("green", kind, name, detail=detail)
 
