@@ -8,6 +8,7 @@ Data: ../shared/realdata, beside the repository; its README has origins and lice
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -46,6 +47,8 @@ def _timed(run: Callable[[], list[Score]]) -> tuple[list[Score], float]:
 def _row(score: Score, seconds: float) -> str:
     reached = "reached" if score.error <= score.asked else "**not reached**"
     error, asked = (f"{v:.3g} {score.unit}" for v in (score.error, score.asked))
+    if math.isinf(score.asked):
+        asked = reached = ""
     return f"| {score.test} | {error} | {score.published} | {asked} | {reached} | {seconds:.0f} |"
 
 

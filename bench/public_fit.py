@@ -29,7 +29,7 @@ REFINE = 4
 
 @dataclass(frozen=True)
 class Score:
-    """A test: what was scored, its error, published errors, and the limit that was asked for."""
+    """A test: what was scored, its error, published errors, and the limit asked for, inf for none."""
 
     test: str
     error: float

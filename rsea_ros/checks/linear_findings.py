@@ -14,6 +14,8 @@ _SURE = 4.0
 """Sigmas."""
 _BESIDE = 2.0
 """Residual over noise above which something in the machine may stand behind a clock."""
+_OPEN = 10.0 * _ALLOWED
+"""s. One sigma from which a number would say nothing of a clock."""
 _TOLD = 0.5
 JOINT = ("velocity", "position")
 _RELATIVE = "against the model; a delay of the drive looks the same"
@@ -32,6 +34,8 @@ def clock_findings(linear: Linear, duration: float) -> list[Finding]:
 
 def _offset(name: str, offset: Number, linear: Linear) -> Finding:
     """Return the finding of an offset; only sensors that disagree with each other make a fault."""
+    if offset.sd > _OPEN:
+        return _left_open("clock_offset", name, offset.sd)
     others = [n for n in linear.offset if (n in JOINT) != (name in JOINT)]
     low, high = offset.ci95
     light: Light = "green"
@@ -58,6 +62,8 @@ def _offset(name: str, offset: Number, linear: Linear) -> Finding:
 
 
 def _drift(name: str, drift: Number, linear: Linear, duration: float) -> Finding:
+    if drift.sd * duration > _OPEN:
+        return _left_open("clock_drift", name, drift.sd * duration)
     low, high = drift.ci95
     sure = abs(drift.value) > _SURE * drift.sd and abs(drift.value) * duration > _ALLOWED
     amber = sure and _is_clear(linear, (name,))
@@ -73,6 +79,12 @@ def _drift(name: str, drift: Number, linear: Linear, duration: float) -> Finding
         detail=f"of its clock against the command's{_beside(linear, name)}",
         remedy="discipline the clocks (PTP, chrony), or stamp by one" if amber else "",
     )
+
+
+def _left_open(kind: str, name: str, sd: float) -> Finding:
+    """Return that these data do not determine a clock. sd: s, of its offset or of its drift by the end."""
+    detail = f"not determined: these data leave {1e3 * sd:.2g} ms, one sigma"
+    return Finding("green", kind, name, detail=detail)
 
 
 def _is_clear(linear: Linear, names: Sequence[str]) -> bool:

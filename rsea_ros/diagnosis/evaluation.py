@@ -56,9 +56,10 @@ class HeldOut:
     nominal: Rig
     record: Checked | None
 
-    @property
-    def _case(self) -> Case:
-        assert self.record is not None
+    @cached_property
+    def _case(self) -> Case | None:
+        if self.record is None:
+            return None
         case = case_from(self.record.record, self.nominal, self.record.masked)
         return replace(case, noise=self.cases[0].noise)
 
@@ -66,10 +67,9 @@ class HeldOut:
         self, problem: Problem, theta: FloatArray, outputs: list[dict[str, FloatArray]] | None = None
     ) -> Score:
         """Return the score of a model. outputs: its channels on the cases, where simulated already."""
-        if self.record is None:
+        if self.record is None or (case := self._case) is None:
             everything = replace(problem, cases=self.cases)
             return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta))
-        case = self._case
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
         return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride))

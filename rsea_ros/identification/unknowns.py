@@ -11,7 +11,7 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect, Parameter
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.model.rig_fields import FIELDS
+from rsea_ros.model.rig_fields import FIELDS, LEAST_SIZE
 from rsea_ros.signals import FloatArray
 
 CLOCK, CLOCK_RATE = "clock", "clock_rate"
@@ -113,9 +113,10 @@ class Unknown:
         return math.log(value) if self.logarithmic else value
 
     def outer(self, coordinate: float) -> float:
-        """Return the value in SI, inside the bounds."""
+        """Return the value in SI, inside the bounds; 0 where that is one and only rounding is left."""
         value = math.exp(min(coordinate, 700.0)) if self.logarithmic else coordinate
-        return min(max(value, self.low), self.high)
+        value = min(max(value, self.low), self.high)
+        return 0.0 if abs(value) < LEAST_SIZE and self.low <= 0.0 else value
 
 
 def unknowns_of_rig(rig: Rig) -> tuple[Unknown, ...]:

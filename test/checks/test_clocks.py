@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
 
 from rsea_ros.checks.check import check_record
+from rsea_ros.checks.linear import Number
+from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Channel
 
@@ -50,3 +54,19 @@ def test_what_all_sensors_share_is_a_delay_as_well():
     assert clock(findings, "clock_offset", "ft").value == pytest.approx(2000.0, abs=60.0)
     assert "a delay of the drive looks the same" in clock(findings, "clock_offset", "ft").detail
     assert not {f.kind for f in findings.faults}
+
+
+@pytest.mark.parametrize(("sd", "shown"), [(20e-6, True), (2e-3, True), (94e-3, False)])
+def test_a_clock_that_the_data_leave_wide_open_gets_no_number(sd, shown):
+    """Short runs of a hobby servo in its loop: an offset of -22535.4 ± 93966 µs was reported, in green."""
+    duration = 100.0
+    linear = SimpleNamespace(
+        settled=True,
+        offset={"position": Number(-0.3 * sd, sd)},
+        drift={"position": Number(-0.3 * sd / duration, sd / duration)},
+        misfit={"position": 1.0},
+    )
+    offset, drift = clock_findings(linear, duration)
+    assert (offset.value is not None) == shown
+    assert (drift.value is not None) == shown
+    assert shown or all("not determined" in f.detail for f in (offset, drift))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.solver import jacobian_columns, power, solve
-from rsea_ros.identification.unknowns import Unknown
+from rsea_ros.identification.unknowns import Unknown, apply, start_vector, unknowns_of_rig
+from rsea_ros.model.rig_file import load_rig
 
 T, NOISE = np.linspace(0.0, 1.0, 200), 1e-4
 
@@ -61,3 +62,12 @@ def test_derivatives_across_the_cliff_are_zero():
 def test_power_of_what_ran_away_is_infinite(worst):
     assert power(np.array([1.0, worst])) == np.inf
     assert power(np.array([1.0, 2.0])) == 5.0
+
+
+def test_a_value_that_may_vanish_is_none_where_rounding_left_of_it():
+    """A fit ended at a damping of 9e-15 N m s/rad, which no rig may have: the diagnosis broke off."""
+    rig = load_rig("paper_high_impedance")
+    unknowns = unknowns_of_rig(rig)
+    theta = start_vector(unknowns)
+    theta[[u.name for u in unknowns].index("spring.damping")] = 9.12863e-15
+    assert apply(rig, unknowns, theta)[0]["spring.damping"] == 0.0
