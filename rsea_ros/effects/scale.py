@@ -37,7 +37,7 @@ class Scale:
     def factor(self, unit: str) -> float:
         """Return by how much a number of a unit is larger; 1 for a unit that says nothing of the machine."""
         powers, most = _POWERS.get(unit, ()), widest(unit)
-        factor = math.prod(getattr(self, name) ** power for name, power in powers)
+        factor = math.prod(float(getattr(self, name)) ** power for name, power in powers)
         return min(max(factor, 1.0 / most), most)
 
 
