@@ -31,8 +31,8 @@ CURVES = {
     "forward.piece_fits": (3, 5, 15),
     "forward.full_fits": (1, 2, 6),
     "forward.hope_one": (0.8, 0.9, 1.0),
-    "naming.confirmed": (0.8, 0.9, 0.995),
     "naming.confirmed_at_floor": (0.5, 0.9, 0.98),
+    "naming.confirmed": (0.8, 0.9, 0.995),
 }
 """Values of each setting that are played beside its own."""
 CASES = (
@@ -118,13 +118,16 @@ def read(log: Path) -> list[Played]:
 def page(played: Sequence[Played]) -> str:
     """Return docs/settings.md: for each setting the outcomes over its values, and whether they change."""
     own = {s.name: s for s in DEFAULT.listed()}
-    count = len({p.case for p in played})
+    done = {(p.case, p.setting, p.value) for p in played}
+    whole = [name for name in CASES if all((name, s, v) in done for s, v in _values())]
+    names = ", ".join(f"`{name}`" for name in whole)
     parts = [
         "# Curves of the settings", "",
-        f"Ten numbers that steer a verdict, each moved alone over {count} short records ({DURATION:g} s at "
-        "280 Hz): mild effects, which a threshold loses first, two and three at once, nothing wrong, and two "
-        "causes that no effect explains. Short and few: a curve shows which way a number acts and how far it "
-        "can move before an outcome changes, not how often a diagnosis is right ([results](results.md)).", "",
+        f"Ten numbers that steer a verdict, each moved alone over {len(whole)} short records ({DURATION:g} s "
+        "at 280 Hz): mild effects, which a threshold loses first, several at once, nothing wrong, and causes "
+        "that no effect explains. Short and few: a curve shows which way a number acts and how far it can "
+        "move before an outcome changes, not how often a diagnosis is right ([results](results.md)).", "",
+        f"The records: {names}.", "",
         "Right: the hidden causes and no other are named. Wrong: causes named that are none, in all records. "
         "Missed: hidden causes not named. Changed: records whose causes, their statuses or verdict differ "
         "from those at the value in use, in bold.", "",
@@ -132,7 +135,7 @@ def page(played: Sequence[Played]) -> str:
         "",
     ]  # fmt: skip
     for name in CURVES:
-        rows = list(_rows(name, float(own[name].value), played))
+        rows = list(_rows(name, float(own[name].value), [p for p in played if p.case in whole]))
         flat = all(changed == 0 for *_, changed in rows)
         parts += [f"## {name}", "", f"{own[name].meaning[:1].upper()}{own[name].meaning[1:]}.", ""]
         parts += ["| value | right | wrong | missed | changed |", "|---|---|---|---|---|"]
@@ -144,12 +147,11 @@ def page(played: Sequence[Played]) -> str:
 
 
 def _rows(name: str, own: float, played: Sequence[Played]) -> Iterator[tuple[float, int, int, int, int]]:
-    """Yield value, right, wrong, missed and changed, over the cases that were played with every value."""
+    """Yield value, right, wrong, missed and changed."""
     base = {p.case: p for p in played if p.setting == ""}
     curve = {v: {p.case: p for p in played if (p.setting, p.value) == (name, v)} for v in CURVES[name]}
-    whole = set(base).intersection(*curve.values())
     for value, outcomes in sorted({**curve, own: base}.items()):
-        some = [outcomes[case] for case in sorted(whole)]
+        some = list(outcomes.values())
         yield (
             value,
             sum(p.right for p in some),

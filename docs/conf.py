@@ -35,18 +35,16 @@ def effects_page() -> str:
     parts = [
         "# The effects", "",
         "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
-        "Bounds and sizes are those for the paper's actuator in its high-impedance test: largest torque "
-        f"{scale.TORQUE:g} N m, spring {scale.STIFFNESS:g} N m/rad, reflected inertia {scale.INERTIA:g} "
-        f"kg m^2, largest speed {scale.SPEED:g} rad/s, {1.0 / scale.PERIOD:.0f} samples a second. On another "
-        "machine they are multiplied by powers of four, according to the column *grows with*: 2 N m of "
-        "friction are typical where the largest torque is 30 N m, 2 mN m where it is 30 mN m. Bounds in s "
-        "and Hz only widen.", "",
+        f"Bounds and sizes are for {scale.MACHINE}: largest torque, spring, reflected inertia, largest "
+        "speed, and rate of the paper's actuator in its high-impedance test. On another machine they are as "
+        "many times larger as the column *grows with* says, in powers of four: 2 N m of friction are typical "
+        "where the largest torque is 30 N m, 2 mN m where it is 30 mN m. Bounds in s and Hz only widen.", "",
     ]  # fmt: skip
     for name, effect in sorted(catalogue().items()):
         page = EffectPage(effect)
         rows = [
             f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} | "
-            f"{page.goes_with(p).removeprefix(', times ')} | {p.reason} |"
+            f"{page.grows_with(p)} | {p.reason} |"
             for p in page.parameters.values()
         ]
         alike = ", ".join(f"[`{n}`](#{n.replace('_', '-')})" for n in effect.claims.confusable_with)

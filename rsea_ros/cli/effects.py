@@ -20,6 +20,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros import effects
     from rsea_ros.effects._page import EffectPage
     from rsea_ros.effects.catalogue import effect_named
+    from rsea_ros.effects.scale import MACHINE
 
     if args.name is None:
         print(repr(effects))
@@ -28,4 +29,5 @@ def run(args: argparse.Namespace) -> int:
     page = EffectPage(effect_named(args.name))
     print(page)
     print(f"\n{page.description}")
+    print(f"\nBounds and sizes are for {MACHINE}; on others they grow as named, in powers of four.")
     return 0

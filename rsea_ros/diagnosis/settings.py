@@ -17,6 +17,11 @@ MOST_CAUSES = 4
 _CHOSEN = "chosen on the benchmark; bench/settings_curve.py shows the outcomes over it"
 
 
+def _flat(low: str, high: str) -> str:
+    """Return the reason of a number whose outcomes do not change over a range."""
+    return f"flat from {low} to {high} on the short records of docs/settings.md: between what was tried"
+
+
 class Setting(NamedTuple):
     """One setting as a report shows it. name: `group.field`."""
 
@@ -43,8 +48,13 @@ class FloorSettings:
         "below it in every channel the search ends",
         "4 standard deviations of a white residual at 80 s of 280 Hz (noise_level.py)",
     )
-    reached: float = number(1.1, "1", "up to it on the test blocks a channel has reached its floor")
-    misfit: float = number(1.5, "1", "above it a channel misfits: causes must take half of that away")
+    reached: float = number(
+        1.1, "1", "up to it on the test blocks a channel has reached its floor",
+        "at 1.05 a record with nothing wrong is unexplained; no change up to 1.4 (docs/settings.md)",
+    )  # fmt: skip
+    misfit: float = number(
+        1.5, "1", "above it a channel misfits: causes must take half of that away", _flat("1.2", "3")
+    )
     large_misfit: float = number(3.0, "1", "above it a channel misfits much: causes may explain it alone")
     share_left: float = number(0.5, "1", "of a misfit: what may be left where causes are named")
     far: float = number(
@@ -66,14 +76,18 @@ class AcceptanceSettings:
     price: float = number(
         2.0, "1", "loss that each parameter must bring", "what a useless one gains (Akaike 1974)"
     )
-    matters: float = number(0.02, "1", "fall of some channel's residual below which a gain does not matter")
+    matters: float = number(
+        0.02, "1", "fall of some channel's residual below which a gain does not matter", _flat("0.005", "0.1")
+    )
     response_left: float = number(
         0.5, "1", "share of a missed response (coherence^2) below which seeing it matters by itself"
     )
-    fall: float = number(0.1, "1", "fall of some channel's residual that one more cause must bring")
+    fall: float = number(
+        0.1, "1", "fall of some channel's residual that one more cause must bring", _flat("0.03", "0.3")
+    )
     fall_in_doubt: float = number(
         0.3, "1", "fall of the worst channel for a pair, a replacement, or a third cause that leaves much",
-        "such bend to whatever is left: they must bring three times as much",
+        f"{_flat('0.1', '0.5')}; such bend to whatever is left: they must bring three times as much",
     )  # fmt: skip
     causes_in_doubt: int = number(2, "1", "causes from which one more counts as doubtful while far")
     room: float = number(
@@ -120,11 +134,17 @@ class PieceSettings:
 class ForwardSettings:
     """Which effects a forward step fits, and how thoroughly."""
 
-    piece_fits: int = number(9, "1", "effects that are fitted to the pieces after the screening")
-    full_fits: int = number(3, "1", "effects of each closeness that are fitted to all training blocks")
+    piece_fits: int = number(
+        9, "1", "effects that are fitted to the pieces after the screening", _flat("3", "15")
+    )
+    full_fits: int = number(
+        3, "1", "effects of each closeness that are fitted to all training blocks", _flat("1", "6")
+    )
     behind_first: float = number(4.0, "1", "of the best cost on pieces: how close the first of them must be")
     behind_next: float = number(1.1, "1", "of the best cost on pieces: how close the others must be")
-    hope_one: float = number(0.98, "1", "of the present cost on pieces: no hope above it, while far")
+    hope_one: float = number(
+        0.98, "1", "of the present cost on pieces: no hope above it, while far", _flat("0.8", "1")
+    )
     hope_two: float = number(0.9, "1", "the same for two effects")
     hope_on_angle: float = number(0.5, "1", "the same for an effect simulated on the measured rotor angle")
     moved: float = number(0.02, "1", "change of what a channel leaves, from which a fit is repeated")
@@ -143,11 +163,13 @@ class NamingSettings:
 
     confirmed_at_floor: float = number(
         0.8, "1", "probability from which a cause is confirmed where all causes together leave only noise",
-        "another law could leave that too, but hardly by chance",
+        "another law could leave that too, but hardly by chance; at 0.9 a mild right cause is no more than "
+        "leading (docs/settings.md)",
     )  # fmt: skip
     confirmed: float = number(
-        0.98, "1", "the same where more is missing", "two wrong names in a hundred are the most that may be"
-    )
+        0.98, "1", "the same where more is missing",
+        f"{_flat('0.8', '0.995')}; two wrong names in a hundred are the most that may be",
+    )  # fmt: skip
     likely: float = number(
         0.5, "1", "probability of a cause and its rivals from which it is named if it surely helps at all",
         "likelier than none of these",

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 
 from rsea_ros.effects.effect import Effect, Parameter
+from rsea_ros.effects.equation import without_equation
 from rsea_ros.effects.scale import powers_of
 
 
@@ -39,36 +40,41 @@ class EffectPage:
 
     @property
     def description(self) -> str:
-        """The docstring of the effect's file: equation, meaning and source."""
-        return (sys.modules[_module(self.effect)].__doc__ or "").strip()
+        """The docstring of the effect's file without its equation: meaning and source."""
+        return without_equation(sys.modules[_module(self.effect)].__doc__)
 
     def __repr__(self) -> str:
         """Return name, meaning, equation and parameters as text."""
         rows = [
             f"  {p.name} ({p.unit}): typical {p.typical:g}, vanishes at {p.null:g}, "
-            f"fitted within {p.low:g} to {p.high:g}{self.goes_with(p)}: {p.reason}"
+            f"fitted within {p.low:g} to {p.high:g}" + _after(", growing with ", self.grows_with(p))
+            + f": {p.reason}"
             for p in self.effect.parameters
         ]
         return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows])
 
     @staticmethod
-    def goes_with(parameter: Parameter) -> str:
-        """Return with which numbers of the machine bounds and sizes grow, after a comma; empty for none."""
+    def grows_with(parameter: Parameter) -> str:
+        """Return with which numbers of the machine bounds and sizes grow, as a fraction; empty for none."""
         powers = () if parameter.is_fixed else powers_of(parameter.unit)
-        shown = " ".join(name if power == 1 else f"{name}^{power}" for name, power in powers)
-        return f", times {shown}" if shown else ""
+        over, under = (
+            " ".join(name if abs(k) == 1 else f"{name}^{abs(k)}" for name, k in powers if k * side > 0)
+            for side in (1, -1)
+        )
+        return (over or "1") + _after(" / ", under) if powers else ""
 
     def _repr_html_(self) -> str:
         head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th>"
         head += "<th>grows with</th><th>why</th></tr>"
         rows = "".join(
             f"<tr><td>{escape(p.name)}</td><td>{escape(p.unit)}</td><td>{p.typical:g}</td><td>{p.null:g}</td>"
-            f"<td>{p.low:g} to {p.high:g}</td><td>{self.goes_with(p).removeprefix(', times ')}</td>"
+            f"<td>{p.low:g} to {p.high:g}</td><td>{self.grows_with(p)}</td>"
             f"<td>{escape(p.reason)}</td></tr>"
             for p in self.effect.parameters
         )
         description = escape(self.description)
-        return f"<h4>{escape(self.name)}</h4><table>{head}{rows}</table><pre>{description}</pre>"
+        equation = f"<p><code>{escape(self.equation)}</code></p>"
+        return f"<h4>{escape(self.name)}</h4>{equation}<table>{head}{rows}</table><pre>{description}</pre>"
 
 
 def catalogue_table(pages: Sequence[EffectPage]) -> str:
@@ -79,6 +85,10 @@ def catalogue_table(pages: Sequence[EffectPage]) -> str:
         for p in pages
     )
     return f"<table>{head}{rows}</table>"
+
+
+def _after(joint: str, text: str) -> str:
+    return joint + text if text else ""
 
 
 def _module(effect: Effect) -> str:

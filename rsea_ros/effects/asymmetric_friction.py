@@ -1,14 +1,15 @@
 """Friction that differs between the two directions of motion.
 
-    T = -offset - 1/2 viscous_difference * |w|,   w the speed of the gear output against the housing
+    T = -offset - ½ viscous_difference · |ω|
 
-offset (N m) is the one-sided part: what the drive takes more forward than backward. viscous_difference
-(N m s/rad) is how much the viscous coefficient forward exceeds the one backward; their mean is b_m, and it
-counts up to 2 b_m, where one of them is zero. Source: Janot, Gautier, Brunot, Data set and reference models
-of EMPS, 2019 (offset).
+ω is the speed of the gear output against the housing. offset (N m) is the one-sided part: what the drive
+takes more forward than backward. viscous_difference (N m s/rad) is how much the viscous coefficient forward
+exceeds the one backward; their mean is b_m, and it counts up to 2 b_m, where one of them is zero. Source:
+Janot, Gautier, Brunot, Data set and reference models of EMPS, 2019 (offset).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import B_M, GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -37,5 +38,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction that differs between forward and backward",
-    equation="T = -offset - ½ viscous_difference · |ω|",
+    equation=equation_of(__doc__),
 )

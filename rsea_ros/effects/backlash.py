@@ -1,6 +1,6 @@
 """Backlash: play between the gear output and the spring chassis.
 
-    T_s = K_s y + b_s y',   J_sc y'' + b_s y' + K_s y = C,   |d - y| <= gap / 2
+    T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2
 
 y is the chassis, which has its own inertia, d the gear output, both against the distal side. The flanks
 only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from rsea_ros.effects._chassis import over_step, path
 from rsea_ros.effects.compensable import Gap
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import (
     B_S,
@@ -106,5 +107,5 @@ EFFECT = Effect(
     tags=("play",),
     compensation=Gap(lambda p: p[0]),
     about="play between the gear output and the spring",
-    equation="T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2",
+    equation=equation_of(__doc__),
 )

@@ -1,9 +1,10 @@
 """Base that gives: the clamped end of the spring is a mass on a stiff spring.
 
-    inertia q'' + c q' + stiffness q = T_s,   c = 2 damping_ratio sqrt(stiffness inertia)
+    inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s,
+    T_ft = T_s - above_sensor · inertia · q̈
 
 q is the angle of the base. The F/T sensor sits between it and the spring, or with above_sensor = 1 under it;
-between, it bears a share of the base's inertia:  T_ft = T_s - above_sensor * inertia q''
+between, it bears a share of the base's inertia.
 
 Source: Ewins, Modal Testing, 2000, section 2.4 (a mode excited by a force).
 """
@@ -14,6 +15,7 @@ from dataclasses import replace
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
@@ -90,6 +92,5 @@ EFFECT = Effect(
     tags=("mode",),
     part="what holds it",
     about="the clamped end of the spring gives",
-    equation="inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s, "
-    "T_ft = T_s - above_sensor · inertia · q̈",
+    equation=equation_of(__doc__),
 )

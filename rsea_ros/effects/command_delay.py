@@ -1,15 +1,16 @@
 """Command that takes effect later than its stamp says.
 
-    T_m(t) = T_command(t - delay),   of a position loop r(t) = target(t - delay)
+    T_motor(t) = T_command(t - delay)
 
-Commands are kept on the grid of the step; a delay that is no whole number of steps mixes two of them, which
-is the exact mean over the step of the held command. Source: Astrom, Wittenmark, Computer-Controlled Systems,
-1997, ch. 2 (systems with a time delay).
+A position loop's target is late: r(t) = target(t - delay). Commands are kept on the grid of the step; a delay
+that is no whole number of steps mixes two of them, which is the exact mean over the step of the held command.
+Source: Astrom, Wittenmark, Computer-Controlled Systems, 1997, ch. 2 (systems with a time delay).
 """
 
 import numpy as np
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, REFERENCE, STEP, TARGETED, Port
 
 LENGTH = 1023
@@ -61,5 +62,5 @@ EFFECT = Effect(
     response=lambda p, s: np.exp(-p[0] * s),
     part="command",
     about="the command takes effect later than its stamp says",
-    equation="T_motor(t) = T_command(t - delay)",
+    equation=equation_of(__doc__),
 )

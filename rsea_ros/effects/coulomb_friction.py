@@ -1,14 +1,15 @@
 """Coulomb friction of the gear train: a torque of fixed size against the motion.
 
-    T = -torque * sign(w),   w the speed of the gear output against the housing
+    T = -torque · sign(ω), smooth below creep_velocity
 
-The sign is smoothed below creep_velocity (presliding), see _friction.py. Source: Armstrong-Helouvry, Control
-of Machines with Friction, 1991, ch. 2.
+ω is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding),
+see _friction.py. Source: Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2.
 """
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -48,5 +49,5 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=1),
     about="friction torque of fixed size against the motion",
-    equation="T = -torque · sign(ω), smooth below creep_velocity",
+    equation=equation_of(__doc__),
 )

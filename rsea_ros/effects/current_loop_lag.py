@@ -1,6 +1,6 @@
 """Lag of the motor's current loop, first order.
 
-    time_constant * T_m' + T_m = T_command
+    time_constant · Ṫ_motor + T_motor = T_command
 
 The torque of a step is the exact mean of T_m over it for a command that is held. Source: Leonhard, Control of
 Electrical Drives, 2001 (the closed current loop as a lag).
@@ -9,6 +9,7 @@ Electrical Drives, 2001 (the closed current loop as a lag).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 
@@ -41,5 +42,5 @@ EFFECT = Effect(
     states=1,
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the motor's current",
-    equation="time_constant · Ṫ_motor + T_motor = T_command",
+    equation=equation_of(__doc__),
 )

@@ -1,10 +1,9 @@
 """Current loop of second order, which overshoots.
 
-    time_constant^2 T_m'' + 2 zeta time_constant T_m' + T_m = T_command
-    overshoot = exp(-pi zeta / sqrt(1 - zeta^2))
+    time_constant² · T̈ + 2ζ · time_constant · Ṫ + T = T_command, overshoot = exp(-πζ / √(1 - ζ²))
 
-overshoot is that of its step response, relative. The torque of a step is the exact mean of T_m over it for
-a command that is held. Source: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems, 2010,
+overshoot is that of the step response, relative. The torque of a step is the exact mean of T_m over it for a
+command that is held. Source: Franklin, Powell, Emami-Naeini, Feedback Control of Dynamic Systems, 2010,
 section 3.4.
 """
 
@@ -13,6 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
 
 
@@ -63,6 +63,5 @@ EFFECT = Effect(
     states=2,
     response=response,
     about="second-order lag of the motor's current, with overshoot",
-    equation="time_constant² · T̈ + 2ζ · time_constant · Ṫ + T = T_command, "
-    "overshoot = exp(-πζ / √(1 - ζ²))",
+    equation=equation_of(__doc__),
 )  # fmt: skip

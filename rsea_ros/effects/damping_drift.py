@@ -1,13 +1,14 @@
 """Gear whose damping changes during the record, as its grease warms.
 
-    T = -b_m (1 + relative_change * t / duration) w
+    T = -b_m · (1 + relative_change · t / duration) · ω
 
-b_m is the damping of rotor and gear at the gear output, w its speed against the housing. Source: Bittencourt,
+b_m is the damping of rotor and gear at the gear output, ω its speed against the housing. Source: Bittencourt,
 Gunnarsson, Static friction in a robot joint, J. Dyn. Syst. Meas. Control 134, 2012 (viscous friction falls as
 it warms).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import B_M, DURATION, GEAR_TORQUE, GEAR_VELOCITY, TIME, Port
 
 
@@ -30,5 +31,5 @@ EFFECT = Effect(
     function=apply,
     reads=(GEAR_VELOCITY,),
     about="damping of the gear that changes during the record",
-    equation="T = -b_m · (1 + relative_change · t / duration) · ω",
+    equation=equation_of(__doc__),
 )

@@ -1,6 +1,6 @@
 """Dead zone of the drive: a command that is too small makes no torque.
 
-    T_m = sign(u) (|u| - (1 - jump) width)   for |u| > width, else 0
+    T_motor = sign(u) · (|u| - (1 - jump) · width) for |u| > width, else 0
 
 jump 0: the torque begins at zero (a dead zone); jump 1: it begins with all that is commanded (a dead band,
 as firmware has it). A jump is a ramp over 1/1000 of the width. Source: Tao, Kokotovic, Adaptive Control
@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, Port
 
@@ -60,5 +61,5 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="commands that are too small make no torque",
-    equation="T_motor = sign(u) · (|u| - (1 - jump) · width) for |u| > width, else 0",
+    equation=equation_of(__doc__),
 )

@@ -1,16 +1,18 @@
 """Load-dependent friction that the motor's torque and the load's make unequally, as in gears that drive
 better than they are driven.
 
-    T = -(|motor_coefficient T_m + load_coefficient T_s| + quadratic min(|T_m|, |T_s|)^2) * sign(w)
+    T = -(|motor_coefficient · T_m + load_coefficient · T_s| + quadratic · min(|T_m|, |T_s|)²) · sign(ω),
+    smooth below creep_velocity
 
-The quadratic part acts where motor and spring work against each other (T_m T_s > 0). T_m is the motor's
-torque, T_s that in the spring, w the speed of the gear output against the housing; the sign is smoothed below
+The quadratic part acts where motor and spring work against each other (T_m · T_s > 0). T_m is the motor's
+torque, T_s that in the spring, ω the speed of the gear output against the housing; the sign is smoothed below
 creep_velocity (presliding), see _friction.py. Source: Duclusaud, Passault, Padois, Ly, Extended friction
 models for the physics simulation of servo actuators, 2024, models M5 and M6 (their Stribeck factor apart).
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 
 
@@ -56,6 +58,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows unequally with the motor's torque and the load",
-    equation="T = -(|motor_coefficient · T_m + load_coefficient · T_s| + quadratic · min(|T_m|, |T_s|)²) "
-    "· sign(ω), smooth below creep_velocity",
+    equation=equation_of(__doc__),
 )

@@ -1,8 +1,8 @@
 """Encoder disc or magnet that sits off its axis: an angle error that repeats with the rotor.
 
-    position = q + amplitude * sin(cycles_per_revolution * rotor_angle + phase)
+    position = q + amplitude · sin(cycles_per_revolution · θ_rotor + phase)
 
-rotor_angle is the gear's ratio times q. The velocity is that of the same encoder. Source: Lu, Trumper,
+θ_rotor is the gear's ratio times q. The velocity is that of the same encoder. Source: Lu, Trumper,
 Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007 (first harmonic: eccentricity).
 """
 
@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import OUTPUT_ANGLE, POSITION, TURNS, VELOCITY, Port
 
@@ -51,5 +52,5 @@ EFFECT = Effect(
     function=apply,
     guesses=guesses,
     about="angle error of the encoder that repeats with the rotor's angle",
-    equation="position = q + amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
+    equation=equation_of(__doc__),
 )  # fmt: skip

@@ -1,11 +1,12 @@
 """F/T sensor whose zero is off.
 
-T_ft = T + bias
+    T_ft = T + bias
 
 Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, Port
 
 
@@ -28,5 +29,5 @@ EFFECT = Effect(
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),
     function=apply,
     about="zero of the F/T sensor that is off",
-    equation="T_ft = T + bias",
+    equation=equation_of(__doc__),
 )

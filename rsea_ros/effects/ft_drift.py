@@ -1,12 +1,13 @@
 """F/T sensor whose zero walks away during the record, straight on or settling as the sensor warms up.
 
-    T_ft = T + drift * s(t) / s(duration),   s(t) = 1 - exp(-t / time_constant), or t without one
+    T_ft = T + drift · s(t) / s(duration), s(t) = 1 - exp(-t / time_constant), or t without one
 
 Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input: the temperature).
 """
 
 from rsea_ros.effects._drift import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
 
 
@@ -30,5 +31,5 @@ EFFECT = Effect(
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_bias",)),
     function=apply,
     about="zero of the F/T sensor that walks during the record",
-    equation="T_ft = T + drift · s(t) / s(duration), s(t) = 1 - exp(-t / time_constant), or t without one",
+    equation=equation_of(__doc__),
 )

@@ -1,11 +1,12 @@
 """F/T sensor whose calibration is off.
 
-T_ft = gain * T
+    T_ft = gain · T
 
 Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (modifying input).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, Port
 
 
@@ -29,5 +30,5 @@ EFFECT = Effect(
     function=apply,
     response=lambda p, s: p[0] + 0.0 * s,
     about="calibration of the F/T sensor that is off",
-    equation="T_ft = gain · T",
+    equation=equation_of(__doc__),
 )

@@ -1,6 +1,6 @@
 """Lag of the F/T sensor's own filter, first order.
 
-    time_constant * T_ft' + T_ft = T
+    time_constant · Ṫ_ft + T_ft = T
 
 integrated exactly for a torque that goes straight from step to step. Source: Bentley, Principles of
 Measurement Systems, 2005, section 4.1 (element of first order).
@@ -9,6 +9,7 @@ Measurement Systems, 2005, section 4.1 (element of first order).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import FT, STEP, Port
 
 OUT, LAST, STARTED = range(3)
@@ -44,5 +45,5 @@ EFFECT = Effect(
     states=3,
     response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the F/T sensor",
-    equation="time_constant · Ṫ_ft + T_ft = T",
+    equation=equation_of(__doc__),
 )

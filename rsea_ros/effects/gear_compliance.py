@@ -1,6 +1,6 @@
 """Gear train that gives between the rotor and the spring chassis.
 
-    T = stiffness * (q_gear - q_chassis)
+    T = stiffness · (q_gear - q_chassis)
 
 The chassis then moves on its own, with its own inertia. Source: Spong, Modeling and control of elastic joint
 robots, J. Dyn. Syst. Meas. Control 109, 1987.
@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, RigLike
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import Port
 
@@ -40,5 +41,5 @@ EFFECT = Effect(
     structure=change,
     guesses=beside_softer_rotor,
     about="gear train that gives between rotor and spring",
-    equation="T = stiffness · (q_gear - q_chassis)",
+    equation=equation_of(__doc__),
 )

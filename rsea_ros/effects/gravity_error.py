@@ -1,16 +1,17 @@
 """Payload that the rig does not know of: more or less weight on the output, on an arm.
 
-    T = -torque * sin(q),   q the absolute angle of the end that moves
+    T = -torque · sin(q)
 
-torque is what m g l exceeds the rig's by. Its inertia is the fit's affair. Only where an end is free: on a
-bench with both ends clamped nothing turns far enough, and it would pass for a motor constant.
-Source: Craig, Introduction to Robotics, 2005, section 6.
+q is the absolute angle of the end that moves, torque what m g l exceeds the rig's by. Its inertia is the
+fit's affair. Only where an end is free: on a bench with both ends clamped nothing turns far enough, and it
+would pass for a motor constant. Source: Craig, Introduction to Robotics, 2005, section 6.
 """
 
 from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 
@@ -39,5 +40,5 @@ EFFECT = Effect(
     claims=Claims("position", "odd", amplitude_exponent=None),
     structure=change,
     about="weight on the output that the rig does not know of",
-    equation="T = -torque · sin(q)",
+    equation=equation_of(__doc__),
 )

@@ -1,6 +1,6 @@
 """Stop in the spring: beyond an angle it meets something stiff.
 
-    T_s = K_s d + stiffness * (|d| - angle) * sign(d)   for |d| > angle
+    T_s = K_s · d + stiffness · (|d| - angle) · sign(d) for |d| > angle
 
 The stop sits beside the spring, so the F/T sensor sees its torque too. Source: Gilardi, Sharf, Literature
 survey of contact dynamics modelling, Mech. Mach. Theory 37, 2002 (contact as a spring).
@@ -9,6 +9,7 @@ survey of contact dynamics modelling, Mech. Mach. Theory 37, 2002 (contact as a 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import beside_softer_rotor
 from rsea_ros.effects.signal_table import DEFLECTION, SPRING_TORQUE, Port
 
@@ -43,5 +44,5 @@ EFFECT = Effect(
     reads=(DEFLECTION,),
     guesses=beside_softer_rotor,
     about="a stop that the spring meets beyond an angle",
-    equation="T_s = K_s · d + stiffness · (|d| - angle) · sign(d) for |d| > angle",
+    equation=equation_of(__doc__),
 )

@@ -1,14 +1,15 @@
 """Friction that grows with the load which the gear train carries.
 
-    T = -coefficient * |T_s| * sign(w)
+    T = -coefficient · |T_s| · sign(ω), smooth below creep_velocity
 
-T_s is the torque in the spring, w the speed of the gear output against the housing; the sign is smoothed
+T_s is the torque in the spring, ω the speed of the gear output against the housing; the sign is smoothed
 below creep_velocity (presliding), see _friction.py. Source: the motor's data sheet (no-load drag is a
 fraction of the paper's b_m).
 """
 
 from rsea_ros.effects._friction import PRESLIDING, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, LOAD, Port
 
 
@@ -40,5 +41,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY, LOAD),
     tags=("friction",),
     about="friction that grows with the torque in the spring",
-    equation="T = -coefficient · |T_s| · sign(ω), smooth below creep_velocity",
+    equation=equation_of(__doc__),
 )

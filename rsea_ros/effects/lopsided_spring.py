@@ -1,6 +1,6 @@
 """Spring that is stiffer one way than the other.
 
-    T_s = K_s d (1 + quadratic d)
+    T_s = K_s · d · (1 + quadratic · d)
 
 On its softer side it keeps its largest torque beyond d = -1 / (2 quadratic), where the parabola would turn
 back. A diagnosis does not try it unasked: springs are made symmetric, and beside friction that differs
@@ -10,6 +10,7 @@ asymmetric).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, K_S, SPRING_TORQUE, Port
 
 
@@ -38,5 +39,5 @@ EFFECT = Effect(
     is_searched=False,
     reads=(DEFLECTION,),
     about="spring that is stiffer one way than the other",
-    equation="T_s = K_s · d · (1 + quadratic · d)",
+    equation=equation_of(__doc__),
 )

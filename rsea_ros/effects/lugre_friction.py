@@ -1,16 +1,17 @@
 """LuGre friction of the gear train: bristles that bend before they slip.
 
-    T = -(bristle_stiffness z + bristle_damping z'),   z' = w - bristle_stiffness |w| z / g(w)
-    g(w) = coulomb_torque + stribeck_torque exp(-(w / stribeck_velocity)^2)
+    T = -(bristle_stiffness · z + bristle_damping · ż), ż = ω - bristle_stiffness · |ω| · z / g(ω),
+    g = coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)
 
-w is the speed of the gear output against the housing. With w of the middle of a step z is an exponential of
-the way, exactly, and what acts is its mean over the step. Source: Canudas de Wit, Olsson, Astrom,
-Lischinsky, IEEE Trans. Autom. Control 40, 1995, eqs. (1) to (4).
+ω is the speed of the gear output against the housing. With ω of the middle of a step z is an exponential of
+the way, exactly, and what acts is its mean over the step. Source: Canudas de Wit, Olsson, Astrom, Lischinsky,
+IEEE Trans. Autom. Control 40, 1995, eqs. (1) to (4).
 """
 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, STEP, Port
 from rsea_ros.effects.spring_hysteresis import reached
 
@@ -69,7 +70,5 @@ EFFECT = Effect(
     reads=(GEAR_VELOCITY,),
     tags=("friction",),
     about="friction of bristles that bend before they slip",
-    equation="T = -(bristle_stiffness · z + bristle_damping · ż), "
-    "ż = ω - bristle_stiffness · |ω| · z / g(ω), "
-    "g = coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)",
+    equation=equation_of(__doc__),
 )  # fmt: skip

@@ -1,6 +1,6 @@
 """Mains that the F/T sensor's cable picks up.
 
-T_ft = T + amplitude * sin(2 pi frequency t + phase)
+    T_ft = T + amplitude · sin(2π · frequency · t + phase)
 
 Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 """
@@ -8,6 +8,7 @@ Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, TIME, Port
 
@@ -41,5 +42,5 @@ EFFECT = Effect(
     function=apply,
     guesses=at_lines("ft", sine=("amplitude", "phase")),
     about="mains hum in the F/T sensor",
-    equation="T_ft = T + amplitude · sin(2π · frequency · t + phase)",
+    equation=equation_of(__doc__),
 )

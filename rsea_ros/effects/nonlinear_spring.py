@@ -1,6 +1,6 @@
 """Spring that hardens (cubic > 0) or softens (cubic < 0) as it deflects.
 
-    T_s = K_s d (1 + cubic d^2)
+    T_s = K_s · d · (1 + cubic · d²)
 
 A softening spring keeps its largest torque beyond d = 1 / sqrt(-3 cubic), where the cubic would turn back.
 Source: Kovacic, Brennan, The Duffing Equation, 2011, ch. 1.
@@ -9,6 +9,7 @@ Source: Kovacic, Brennan, The Duffing Equation, 2011, ch. 1.
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, K_S, SPRING_TORQUE, Port
 
 
@@ -35,5 +36,5 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="spring that hardens or softens as it deflects",
-    equation="T_s = K_s · d · (1 + cubic · d²)",
+    equation=equation_of(__doc__),
 )

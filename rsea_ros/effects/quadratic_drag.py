@@ -1,14 +1,16 @@
 """Drag that grows with the square of the speed: oil that churns, air, a fan on the rotor.
 
-    T = -coefficient * w |w|,   w the speed of the gear output against the housing
+    T = -coefficient · ω · |ω|
 
-The step's torque is solved for with the speed that it leaves in the middle of the step, so no drag is too
-strong for it. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, section 2.
+ω is the speed of the gear output against the housing. The step's torque is solved for with the speed that it
+leaves in the middle of the step, so no drag is too strong for it. Source: Armstrong-Helouvry, Dupont, Canudas
+de Wit, Automatica 30, 1994, section 2.
 """
 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, MOBILITY, Port
 
 
@@ -36,5 +38,5 @@ EFFECT = Effect(
     states=1,
     reads=(GEAR_VELOCITY,),
     about="drag that grows with the square of the speed",
-    equation="T = -coefficient · ω · |ω|",
+    equation=equation_of(__doc__),
 )

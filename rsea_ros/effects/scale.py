@@ -14,6 +14,10 @@ TORQUE, STIFFNESS, INERTIA, SPEED, PERIOD = 30.0, 1500.0, 1.0, 0.6, 1.0 / 280.0
 """The machine for which the catalogue states its numbers: largest torque of a run, N m, stiffness of its
 spring, N m/rad, reflected inertia, kg m^2, largest speed, rad/s, and time between samples, s. The paper's
 actuator in its high-impedance test."""
+MACHINE = (
+    f"a machine of {TORQUE:g} N m, {STIFFNESS:g} N m/rad, {INERTIA:g} kg m^2, {SPEED:g} rad/s "
+    f"and {1.0 / PERIOD:.0f} samples a second"
+)
 _GRID = 4.0
 """Scales are powers of it: a size is typical to a factor of two, and records of one machine share it."""
 _MOST = 6
@@ -33,7 +37,7 @@ class Scale:
     def factor(self, unit: str) -> float:
         """Return by how much a number of a unit is larger; 1 for a unit that says nothing of the machine."""
         powers, most = _POWERS.get(unit, ()), widest(unit)
-        factor: float = math.prod(getattr(self, name) ** power for name, power in powers)
+        factor = math.prod(float(getattr(self, name)) ** power for name, power in powers)
         return min(max(factor, 1.0 / most), most)
 
 

@@ -1,20 +1,20 @@
 """Hysteresis of the spring: torque that depends on the way the deflection came.
 
-    T = torque * z,   dz/dd = (1 - (beta sign(z dd) + gamma) |z|) / angle,   beta + gamma = 1
+    T = torque · z, dz/dd = (1 - (β · sign(z · ḋ) + gamma) · |z|) / angle, β = 1 - gamma
 
 Bouc-Wen with n = 1, scaled so that `torque` is where z ends; gamma = 0 is Dahl's model, at 1/2 unloading is
-straight. Over a way in one direction z is an exponential of the way while it loads, with the rate
-beta + gamma, and another while it unloads, with beta - gamma: both exact, and so is where z passes zero.
-A spring whose loading bends less than its unloading, gamma < -1/2, need not end at all: there
-beta + gamma = 1 - (gamma + 1/2)^2, which hardens below -3/2.
-Source: Dahl, AIAA J. 14, 1976; Wen, J. Eng. Mech. 102, 1976; Ismail, Ikhouane, Rodellar, Arch. Comput.
-Methods Eng. 16, 2009, eq. (2).
+straight. Over a way in one direction z is an exponential of the way while it loads, with the rate β + gamma =
+1, and another while it unloads, with β - gamma: both exact, and so is where z passes zero. A spring whose
+loading bends less than its unloading, gamma < -1/2, need not end at all: there β + gamma = 1 - (gamma +
+1/2)^2, which hardens below -3/2. Source: Dahl, AIAA J. 14, 1976; Wen, J. Eng. Mech. 102, 1976; Ismail,
+Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16, 2009, eq. (2).
 """
 
 import math
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMIT, DEFLECTION, DEFLECTION_SPAN, SPRING_TORQUE, Port
 
 Z, LAST, STARTED = range(3)
@@ -99,5 +99,5 @@ EFFECT = Effect(
     states=3,
     reads=(DEFLECTION,),
     about="spring torque that depends on the way the deflection came",
-    equation="T = torque · z, dz/dd = (1 - (β · sign(z · ḋ) + gamma) · |z|) / angle, β = 1 - gamma",
+    equation=equation_of(__doc__),
 )

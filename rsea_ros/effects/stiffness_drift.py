@@ -1,11 +1,12 @@
 """Spring whose stiffness changes during the record, as by warming.
 
-T_s = K_s (1 + relative_change * t / duration) d
+    T_s = K_s · (1 + relative_change · t / duration) · d
 
 Source: Lakes, Viscoelastic Materials, 2009 (stiffness over time and temperature).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import DEFLECTION, DURATION, K_S, SPRING_TORQUE, TIME, Port
 
 
@@ -28,5 +29,5 @@ EFFECT = Effect(
     function=apply,
     reads=(DEFLECTION,),
     about="stiffness of the spring that changes during the record",
-    equation="T_s = K_s · (1 + relative_change · t / duration) · d",
+    equation=equation_of(__doc__),
 )

@@ -1,8 +1,9 @@
 """Stribeck friction of the gear train: more friction near rest than at speed.
 
-    T = -(coulomb_torque + stribeck_torque * exp(-(w / stribeck_velocity)^2)) * sign(w)
+    T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω),
+    smooth below creep_velocity
 
-w is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding),
+ω is the speed of the gear output against the housing; the sign is smoothed below creep_velocity (presliding),
 see _friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994, eq. (3).
 """
 
@@ -11,6 +12,7 @@ import math
 from rsea_ros.compiler import njit
 from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
 
 
@@ -59,6 +61,5 @@ EFFECT = Effect(
     tags=("friction",),
     compensation=against(level, creep=3),
     about="friction that is larger near rest than at speed",
-    equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω), "
-    "smooth below creep_velocity",
+    equation=equation_of(__doc__),
 )

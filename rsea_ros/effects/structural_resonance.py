@@ -1,14 +1,15 @@
 """Resonance of the structure that carries the F/T sensor: a mode that the spring's torque shakes.
 
-    T_ft = T (1 - participation * s^2 / (s^2 + 2 damping_ratio w s + w^2)),   w = 2 pi frequency
+    T_ft = T · (1 - participation · s² / (s² + 2 damping_ratio Ω s + Ω²)), Ω = 2π frequency
 
-that is y'' + 2 damping_ratio w y' + w^2 y = T and T_ft = T - participation y'', integrated exactly for a
+that is ÿ + 2 damping_ratio · Ω · ẏ + Ω² · y = T and T_ft = T - participation · ÿ, integrated exactly for a
 torque that goes straight from step to step. Source: Ewins, Modal Testing, 2000, section 2.4.
 """
 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_lines
 from rsea_ros.effects.signal_table import FT, STEP, Port
 
@@ -57,5 +58,5 @@ EFFECT = Effect(
     tags=("mode",),
     part="what holds it",
     about="a mode of the structure that the F/T sensor sees beside the spring",
-    equation="T_ft = T · (1 - participation · s² / (s² + 2 damping_ratio Ω s + Ω²)), Ω = 2π frequency",
+    equation=equation_of(__doc__),
 )

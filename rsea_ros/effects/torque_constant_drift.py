@@ -1,13 +1,15 @@
 """Torque constant that changes during the record: magnets lose flux as they warm, 0.1 to 0.2 % a kelvin.
 
-    T_m = T_command * (1 + relative_change * s(t) / s(duration)),   s(t) = 1 - exp(-t / time_constant)
+    T_motor = T_command · (1 + relative_change · s(t) / s(duration)), s(t) = 1 - exp(-t / time_constant),
+    or t without one
 
-or s(t) = t without a time constant. The measured current does not show it. Source: Sebastian, Temperature
-effects on torque production and efficiency of PM motors, IEEE Trans. Ind. Appl. 31, 1995.
+The measured current does not show it. Source: Sebastian, Temperature effects on torque production and
+efficiency of PM motors, IEEE Trans. Ind. Appl. 31, 1995.
 """
 
 from rsea_ros.effects._drift import SETTLING, progress
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.signal_table import COMMAND, DURATION, STEP, TIME, Port
 
 
@@ -30,6 +32,5 @@ EFFECT = Effect(
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),
     function=apply,
     about="the motor's torque constant changes during the record",
-    equation="T_motor = T_command · (1 + relative_change · s(t) / s(duration)), "
-    "s(t) = 1 - exp(-t / time_constant), or t without one",
+    equation=equation_of(__doc__),
 )

@@ -1,6 +1,6 @@
 """Torque constant other than believed: the motor makes more or less torque than its current says.
 
-    T_m = gain * T_command
+    T_motor = gain · T_command
 
 The measured current is turned into torque with the same wrong constant, so it does not show this. For one
 motor the maker's framework states 6.826 N m/A and its data sheet 4.81 N m/A. Source: Hughes, Drury, Electric
@@ -10,6 +10,7 @@ Motors and Drives, 2013, ch. 3 (torque and current).
 from collections.abc import Sequence
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import COMMAND, Port
 
@@ -50,5 +51,5 @@ EFFECT = Effect(
     guesses=guesses,
     response=lambda p, s: p[0] + 0.0 * s,
     about="the motor makes more or less torque than its current says",
-    equation="T_motor = gain · T_command",
+    equation=equation_of(__doc__),
 )

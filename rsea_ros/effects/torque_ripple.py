@@ -1,9 +1,9 @@
 """Torque ripple of the motor: cogging, or a harmonic of the rotor.
 
-    T = amplitude * sin(cycles_per_revolution * rotor_angle + phase)
+    T = amplitude · sin(cycles_per_revolution · θ_rotor + phase)
 
-rotor_angle is that of the rotor against the housing, the gear's ratio times that of the output. The torque of
-a step is the mean over it, so ripple faster than the step averages out instead of aliasing. Source: Jahns,
+θ_rotor is the angle of the rotor against the housing, the gear's ratio times that of the output. The torque
+of a step is the mean over it, so ripple faster than the step averages out instead of aliasing. Source: Jahns,
 Soong, Pulsating torque minimization techniques for PM AC motor drives, IEEE Trans. Ind. Electron. 43, 1996.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from rsea_ros.compiler import njit
 from rsea_ros.effects.compensable import OfRotorAngle
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 
@@ -69,5 +70,5 @@ EFFECT = Effect(
         lambda p, start, end: float(mean_ripple.py_func(p, 0.5 * (start + end), end - start))
     ),
     about="torque that repeats with the rotor's angle",
-    equation="T = amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
+    equation=equation_of(__doc__),
 )

@@ -1,15 +1,16 @@
 """Torque limit that falls with speed: what the supply's voltage leaves after the motor's own.
 
-    -limit (1 + w / no_load_speed) <= T_m <= limit (1 - w / no_load_speed)
+    -limit · (1 + ω / no_load_speed) ≤ T_motor ≤ limit · (1 - ω / no_load_speed)
 
-limit is the torque at rest, w the speed of the gear output against the housing. A supply that gives way
-under current, V = V_0 - R_b i, only makes the limit at rest smaller: the line stays straight. Source:
-Hughes, Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at constant voltage).
+limit is the torque at rest, ω the speed of the gear output against the housing. A supply that gives way under
+current, V = V_0 - R_b i, only makes the limit at rest smaller: the line stays straight. Source: Hughes,
+Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at constant voltage).
 """
 
 import math
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.equation import equation_of
 from rsea_ros.effects.guess import at_limits
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, OUTPUT_VELOCITY, Port
 
@@ -47,5 +48,5 @@ EFFECT = Effect(
     guesses=at_limits,
     tags=("limit",),
     about="torque limit that falls with speed, by the supply's voltage",
-    equation="-limit · (1 + ω / no_load_speed) ≤ T_motor ≤ limit · (1 - ω / no_load_speed)",
+    equation=equation_of(__doc__),
 )  # fmt: skip

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.scale import Scale
 from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import ratios_of, reweighted
@@ -93,11 +95,17 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
-    scale = scale_of(cases, rig)
-    stated = ((effect_named(e.name).at(scale).reaching(e.parameters), e.parameters) for e in rig.effects)
-    effects = [unknowns_of_effect(effect, parameters, rig.known) for effect, parameters in stated]
+    effects = [unknowns_of_effect(e, stated, rig.known) for e, stated in _stated_effects(rig, cases)]
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),
         *(clocks(channels, rig) if not is_inverse(rig) else ()),
     )
+
+
+def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, Mapping[str, float]]]:
+    """Yield the effects that a rig states with their parameters, bounds as the machine and these have it."""
+    scale = scale_of(cases, rig) if rig.effects else Scale()
+    for e in rig.effects:
+        yield effect_named(e.name).at(scale).reaching(e.parameters), e.parameters
+
