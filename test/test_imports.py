@@ -68,8 +68,8 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "screening", "residual_peaks"},
-    {"result", "data_split", "coherence"},
+    {"settings", "residual_peaks"},
+    {"result", "data_split", "coherence", "screening"},
     {"score", "problem_variants", "residual_analysis", "initial_guess"},
     {"candidate", "criteria", "next_experiment"},
     {"selection", "step_fits"},
@@ -86,6 +86,7 @@ NAMING = (
     {"weighing"},
     {"status"},
     {"causes"},
+    {"outcome"},
     {"conclusion"},
 )
 """Layers of its folder naming: how the selected causes are named."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.effect import Effect
 from rsea_ros.laws.base import FITTED, Base
 from rsea_ros.laws.file import Draft
@@ -75,7 +76,7 @@ def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> f
 def _score(base: Base, refined: Refined, sets: tuple[int, ...]) -> Score:
     """Return the score of refined laws on some sets of blocks."""
     problem = replace(refined.solution.problem, cases=base.cases)
-    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta))
+    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta), DEFAULT.blocks)
 
 
 def gain_on_tests(base: Base, refined: Refined) -> tuple[float, tuple[float, float]]:

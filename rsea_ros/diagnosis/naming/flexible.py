@@ -25,13 +25,16 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
 _KNOTS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
-"""Quantiles of a regressor's size between which the spline is straight, each sign for itself."""
+"""Quantiles of a regressor's size between which the spline is straight, each sign for itself: six pieces a
+sign, finer at both ends, where friction and stops act. The coefficients are fitted with them."""
 _LAGS = (1, 2, 4, 8)
-"""Samples by which a law of the command's past may look back."""
+"""Samples by which a law of the command's past may look back, doubling. Fixed like the knots."""
 _RIDGE = 1e-6
-"""Of each column's power: keeps parts of the spline apart that the data do not."""
+"""Of each column's power: keeps parts of the spline apart that the data do not. Numerical: a thousandth of a
+column's size."""
 _STEP = 1e-2
-"""Of the largest command: torque at which the responses are taken."""
+"""Of the largest command: torque at which the responses are taken. Numerical: small, so that they are linear,
+and far above rounding."""
 
 
 @dataclass(frozen=True)
