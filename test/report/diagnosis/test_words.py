@@ -19,6 +19,7 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.profile import BINS, Profile, profiles
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.diagnosis.settings import settings_section
 from rsea_ros.report.diagnosis.terminal import terminal_lines
 from rsea_ros.report.diagnosis.where import finding, where_figure
@@ -81,7 +82,7 @@ def test_json_sentence_and_page_speak_of_one_channel(diagnosed):
     """The sentence spoke of the F/T torque where the headline spoke of the first cause's channel."""
     d = diagnosed.diagnosis
     assert d.channel == d.causes[0].channel
-    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in d.sentence
+    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in diagnosis_sentence(d)
     elsewhere = terminal(replace(d, channel="position"))
     assert elsewhere[1].startswith("residual    position ")
 
