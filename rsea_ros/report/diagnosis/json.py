@@ -9,7 +9,8 @@ from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, E
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, next_run
-from rsea_ros.report.identification.json import fault_json, finite, numbers, parameter
+from rsea_ros.report.identification.json import parameter
+from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
 
 SCHEMA = 1
