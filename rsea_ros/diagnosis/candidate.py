@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks, with_common_clock_in_delay, with_doubled_step
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
@@ -28,7 +28,7 @@ class Candidate:
     outputs: list[dict[str, FloatArray]]
     validation: Score
     cases: tuple[Case, ...]
-    settings: DiagnosisSettings
+    settings: DiagnosisSettings = DEFAULT
 
     @property
     def problem(self) -> Problem:
@@ -135,9 +135,12 @@ def scored_against(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
     return replace(model, cases=cases, validation=validation)
 
 
-def leaves_only_noise(model: Candidate) -> bool:
-    """Tell whether the residual of every channel is noise, on all blocks but the test blocks."""
-    blocks, limit = (*TRAIN, *VALIDATION), model.settings.floor.only_noise
+def leaves_only_noise(model: Candidate, limit: float) -> bool:
+    """Tell whether the residual of every channel is noise, on all blocks but the test blocks.
+
+    limit: RMS of the residual over the noise, below which it is.
+    """
+    blocks = (*TRAIN, *VALIDATION)
     score = score_on(model.problem, model.cases, blocks, model.outputs, model.settings.blocks)
     return score.missed == 0.0 and all(score.ratio(n) < limit for n in score.sums)
 
