@@ -13,6 +13,7 @@ from rich.console import Console
 
 from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
 from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
+from rsea_ros.identification import coloured, noise_level
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
@@ -166,3 +167,10 @@ def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnose
     section = settings_section(changed)
     assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
     assert section.count("<b>") == 1
+
+
+def test_the_numbers_of_the_noise_are_shown_beside_the_settings(diagnosed):
+    written = diagnosis_json(diagnosed.diagnosis)["noise_numbers"]
+    assert (written["noise.above"], written["noise.fewest"]) == (noise_level.ABOVE, coloured.FEWEST)
+    section = settings_section(DiagnosisSettings())
+    assert all(f"<code>{name}</code>" in section for name in written)
