@@ -120,15 +120,15 @@ class _Step:
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
     def taken(
-        self, at: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
+        self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
     ) -> tuple[ScreenedEffect, FloatArray] | None:
         """Return where a step, or a share of it, leads and the residual there; None where none helps."""
-        slope = self._matrix.T @ residual + self._prior**2 * (at.theta - self._centre)
-        aim = bounded_step(self._problem, at.theta, self._normal, slope)
+        slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
+        aim = bounded_step(self._problem, start.theta, self._normal, slope)
         for share in shares:
-            theta = at.theta + share * (aim - at.theta)
-            left = self._problem.residual(theta)
-            cost = self.cost(theta, left)
-            if cost < at.cost:
-                return replace(at, theta=theta, cost=cost), left
+            theta = start.theta + share * (aim - start.theta)
+            stepped = self._problem.residual(theta)
+            cost = self.cost(theta, stepped)
+            if cost < start.cost:
+                return replace(start, theta=theta, cost=cost), stepped
         return None

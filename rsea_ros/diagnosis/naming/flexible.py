@@ -57,10 +57,8 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     matrix = matrix[:, size > 0.0] / size[size > 0.0]
     fits = ~rows.tests
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
-    left = (
-        rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
-    )
-    before, after = (_by_block(rows, v) for v in (rows.residual, left))
+    weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
+    before, after = (_by_block(rows, v) for v in (rows.residual, rows.residual - matrix @ weights))
     cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
     return Flexible(
         gain=1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))),
@@ -109,16 +107,16 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
         return drive.command
     if effect.port is st.Port.SENSOR:
         return out.get("ft")
-    at = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
+    middles = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
     if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
-        return np.asarray(np.interp(at, case.t["velocity"], out["velocity"]))
+        return np.asarray(np.interp(middles, case.t["velocity"], out["velocity"]))
     if st.GEAR_VELOCITY in effect.reads and "position" in out:
         t = case.t["position"]
-        return np.asarray(np.interp(at, t, np.gradient(out["position"], t)))
+        return np.asarray(np.interp(middles, t, np.gradient(out["position"], t)))
     read = next((n for n in ("position", "ft") if n in out), None)
     if effect.port is not st.Port.SPRING or read is None:
         return None
-    return np.asarray(np.interp(at, case.t[read], out[read]))
+    return np.asarray(np.interp(middles, case.t[read], out[read]))
 
 
 def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
@@ -170,5 +168,5 @@ def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, Fl
     """Return channels in which the F/T sensor feels what was taken from the spring's torque."""
     if "ft" not in out or not isinstance(case.drive, Drive):
         return out
-    at = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)
-    return {**out, "ft": out["ft"] - np.interp(case.t["ft"], at, pushed.command - case.drive.command)}
+    middles = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)
+    return {**out, "ft": out["ft"] - np.interp(case.t["ft"], middles, pushed.command - case.drive.command)}

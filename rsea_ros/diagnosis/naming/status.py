@@ -44,13 +44,13 @@ def named(
 
 def _named(place: Place, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
     every = [place.cause, *place.rivals]
-    likely, status = standing([w.evidence for w in every], at_floor, takes_most, settings)
+    likely, status = probabilities_and_status([w.evidence for w in every], at_floor, takes_most, settings)
     others = zip(every[1:], likely[1:], strict=True)
     rivals = tuple((w, p) for w, p in others if p >= settings.naming.rival)
     return Named(place.cause, likely[0], status, rivals)
 
 
-def standing(
+def probabilities_and_status(
     evidence: Sequence[Evidence],
     at_floor: bool,
     takes_most: bool,
