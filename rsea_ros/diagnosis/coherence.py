@@ -24,7 +24,7 @@ _SEGMENTS = 16
 _SHORTEST = 8
 """Samples of a segment: a shorter one has no band to speak of."""
 _LOWEST = 2.0
-"""Hz: below it a drift may hide the command. These five steer a remark and no verdict."""
+"""Hz: below it a drift may hide the command. All of these steer a remark and no verdict."""
 
 
 def missed_response(

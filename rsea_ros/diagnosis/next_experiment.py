@@ -36,7 +36,7 @@ class ExcitationOption:
 
     @property
     def cost(self) -> float:
-        """What it asks of the bench: amplitude first, then bandwidth."""
+        """What it asks of the bench: amplitude first; a decade of bandwidth counts as a tenth more of it."""
         return self.relative * (1.0 + 0.1 * math.log10(self.high / self.low))
 
 

@@ -109,11 +109,18 @@ def bootstrap_means(values: FloatArray, resamples: int = RESAMPLES) -> FloatArra
 
 def gain(with_it: Score, without: Score, channel: str) -> tuple[float, tuple[float, float]]:
     """Return 1 - RMS(residual with) / RMS(residual without) of a channel, and its 95 % bootstrap interval."""
-    a, b = with_it.sums[channel], without.sums[channel]
-    draws = _draws(len(a), RESAMPLES)
-    resampled = 1.0 - np.sqrt(a[draws].sum(axis=1) / np.maximum(b[draws].sum(axis=1), 1e-300))
+    return gain_of(with_it.sums[channel], without.sums[channel])
+
+
+def gain_of(after: FloatArray, before: FloatArray) -> tuple[float, tuple[float, float]]:
+    """Return 1 - RMS(after) / RMS(before) and its 95 % bootstrap interval.
+
+    after, before: squared residuals summed by block, shape (blocks,).
+    """
+    draws = _draws(len(after), RESAMPLES)
+    resampled = 1.0 - np.sqrt(after[draws].sum(axis=1) / np.maximum(before[draws].sum(axis=1), 1e-300))
     low, high = np.quantile(resampled, [0.025, 0.975])
-    return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
+    return 1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))), (float(low), float(high))
 
 
 def _draws(blocks: int, resamples: int) -> IntArray:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.naming.contribution import Rows
-from rsea_ros.diagnosis.score import RESAMPLES
+from rsea_ros.diagnosis.score import gain_of
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -60,9 +60,10 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
     before, after = (_by_block(rows, v) for v in (rows.residual, rows.residual - matrix @ weights))
     cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
+    gain, ci95 = gain_of(after, before)
     return Flexible(
-        gain=1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))),
-        ci95=_interval(before, after),
+        gain=gain,
+        ci95=ci95,
         of_cause=float(before.sum() - after.sum()) / max(cause, 1e-300),
     )
 
@@ -71,13 +72,6 @@ def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
     """Return the power of values in each test block."""
     power = np.bincount(rows.block, values**2 * rows.tests)
     return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
-
-
-def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:
-    picks = np.random.default_rng(0).integers(0, len(before), (RESAMPLES, len(before)))
-    gains = 1.0 - np.sqrt(after[picks].sum(axis=1) / np.maximum(before[picks].sum(axis=1), 1e-300))
-    low, high = np.quantile(gains, [0.025, 0.975])
-    return float(low), float(high)
 
 
 def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
