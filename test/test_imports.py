@@ -214,6 +214,13 @@ def test_a_module_imports_only_from_the_layers_above_it(package, layer):
         assert used_by(package, name) <= allowed | {name}, name
 
 
+def test_what_is_named_comes_through_one_door():
+    package = "rsea_ros.diagnosis.naming"
+    outside = [p for p in MODULES if folder(package) not in p.parents]
+    used = {m for p in outside for m, _ in imports(p, p.read_text(encoding="utf-8")) if m.startswith(package)}
+    assert used == {f"{package}.conclusion"}
+
+
 def folder(package: str) -> Path:
     """Return the folder of a package."""
     return ROOT.joinpath(*package.split("."))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,7 +19,23 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import Fault, FloatArray, Record
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a diagnosis is of: the records as read and as checked, the held-out one as checked, the rig."""
+
+    records: Sequence[Record]
+    checked: Sequence[Checked]
+    holdout: Checked | None
+    rig: Rig
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults of all records, the held-out one last."""
+        every = [*self.checked, *([self.holdout] if self.holdout is not None else [])]
+        return tuple(fault for checked in every for fault in checked.faults)
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,9 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.criteria import is_at_floor
-from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.naming.causes import (
-    alternative_of,
-    latest,
-    rejected_of,
-    undetermined_play,
-)
-from rsea_ros.diagnosis.naming.outcome import Examined, Outcome, outcome_of
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined
+from rsea_ros.diagnosis.naming.causes import alternative_of, latest, rejected_of, undetermined_play
+from rsea_ros.diagnosis.naming.outcome import Outcome, outcome_of
 from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
 from rsea_ros.diagnosis.next_experiment import amplitude_series, separating
 from rsea_ros.diagnosis.residual_analysis import misfits, spectrum

@@ -6,13 +6,9 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most, verdict_of
-from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.naming.causes import (
-    cause_of,
-    dropped_of,
-)
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined
+from rsea_ros.diagnosis.naming.causes import cause_of, dropped_of
 from rsea_ros.diagnosis.naming.status import Named, named
 from rsea_ros.diagnosis.naming.weighing import Weighing
 from rsea_ros.diagnosis.result import Cause, Rejected, Verdict
@@ -20,27 +16,9 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import IdentificationError
-from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Fault, Record
 
 PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
 """The channel that gains and verdicts speak of: the first of these that is measured."""
-
-
-@dataclass(frozen=True)
-class Examined:
-    """What a diagnosis is of: the records as read and as checked, the held-out one as checked, the rig."""
-
-    records: Sequence[Record]
-    checked: Sequence[Checked]
-    holdout: Checked | None
-    rig: Rig
-
-    @property
-    def faults(self) -> tuple[Fault, ...]:
-        """The faults of all records, the held-out one last."""
-        every = [*self.checked, *([self.holdout] if self.holdout is not None else [])]
-        return tuple(fault for checked in every for fault in checked.faults)
 
 
 @dataclass(frozen=True)
