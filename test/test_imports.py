@@ -73,8 +73,8 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "screening", "residual_peaks"},
-    {"result", "data_split", "coherence"},
+    {"settings", "residual_peaks"},
+    {"result", "data_split", "coherence", "screening"},
     {"score", "problem_variants", "residual_analysis", "initial_guess"},
     {"candidate", "criteria", "next_experiment"},
     {"selection", "step_fits"},
@@ -91,6 +91,7 @@ NAMING = (
     {"weighing"},
     {"status"},
     {"causes"},
+    {"outcome"},
     {"conclusion"},
 )
 """Layers of its folder naming: how the selected causes are named."""
@@ -211,6 +212,13 @@ def test_a_module_imports_only_from_the_layers_above_it(package, layer):
     allowed = set().union(*FOLDERS[package][:layer])
     for name in FOLDERS[package][layer]:
         assert used_by(package, name) <= allowed | {name}, name
+
+
+def test_what_is_named_comes_through_one_door():
+    package = "rsea_ros.diagnosis.naming"
+    outside = [p for p in MODULES if folder(package) not in p.parents]
+    used = {m for p in outside for m, _ in imports(p, p.read_text(encoding="utf-8")) if m.startswith(package)}
+    assert used == {f"{package}.conclusion"}
 
 
 def folder(package: str) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from rsea_ros.diagnosis.candidate import Candidate, FitSetup, fit_candidate
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
 from rsea_ros.diagnosis.score import Score, score, score_on
 from rsea_ros.diagnosis.selection import Selection
-from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.diagnosis.settings import BlockSettings, DiagnosisSettings
 from rsea_ros.identification.confidence import Confidence, confidence_of
 from rsea_ros.identification.problem import Case, Problem, case_from, simulated
 from rsea_ros.identification.solver import Solution
@@ -18,7 +19,23 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.record_phase import in_phase
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import Fault, FloatArray, Record
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a diagnosis is of: the records as read and as checked, the held-out one as checked, the rig."""
+
+    records: Sequence[Record]
+    checked: Sequence[Checked]
+    holdout: Checked | None
+    rig: Rig
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults of all records, the held-out one last."""
+        every = [*self.checked, *([self.holdout] if self.holdout is not None else [])]
+        return tuple(fault for checked in every for fault in checked.faults)
 
 
 @dataclass(frozen=True)
@@ -49,12 +66,13 @@ class Evaluated:
 class HeldOut:
     """What models are tested on: the test blocks of the cases, or a record that takes their place.
 
-    nominal: the rig without causes, by which the record is made ready.
+    nominal: the rig without causes, by which the record is made ready. rule: of the blocks.
     """
 
     cases: tuple[Case, ...]
     nominal: Rig
     record: Checked | None
+    rule: BlockSettings
 
     @cached_property
     def _case(self) -> Case | None:
@@ -69,15 +87,16 @@ class HeldOut:
         """Return the score of a model. outputs: its channels on the cases, where simulated already."""
         if self.record is None or (case := self._case) is None:
             everything = replace(problem, cases=self.cases)
-            return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta))
+            return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta), self.rule)
         rig, offsets = apply(problem.rig, problem.unknowns, theta)
         phased = in_phase(rig, self.record.record)
-        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride))
+        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride), self.rule)
 
 
 def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
     """Return what the models of a selection are tested on. record: takes the place of the test blocks."""
-    return HeldOut(selection.cases, selection.models[0].problem.rig, record)
+    rule = selection.last.settings.blocks
+    return HeldOut(selection.cases, selection.models[0].problem.rig, record, rule)
 
 
 def evaluate(
@@ -93,9 +112,9 @@ def evaluate(
     """
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
     setup = FitSetup(
-        cases, settings.fits, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
+        cases, settings, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
     )
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
-    train = score_on(model.problem, cases, blocks, model.outputs)
+    train = score_on(model.problem, cases, blocks, model.outputs, settings.blocks)
     test = held_out_of(selection, holdout).score(model.problem, model.solution.theta, model.outputs)
     return Evaluated(model.solution, model.outputs, train, test)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.diagnosis.settings import ForwardSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.alternatives import extended
@@ -21,13 +22,8 @@ from rsea_ros.identification.solver import Solution, bounded_step, jacobian_colu
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.signals import FloatArray
 
-_STEPS = 2
-_SHARES = (1.0, 0.3)
-"""Of a step that are tried, in turn."""
-_GENTLY = 0.1
-"""Of a guess from which no step helped: the size tried next."""
 _DAMPING = 1e-6
-"""Of the curvature: keeps apart what the data do not."""
+"""Of the curvature: keeps apart what the data do not. Numerical: far below that of any unknown that shows."""
 
 
 @dataclass(frozen=True)
@@ -45,28 +41,31 @@ class ScreenedEffect:
         return self.effect.name
 
 
-def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]]) -> ScreenedEffect | None:
+def screen(
+    present: Solution, effect: Effect, guesses: Sequence[dict[str, float]], rule: ForwardSettings
+) -> ScreenedEffect | None:
     """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 
     A guess may also name values of the rig: these then differ from where the derivatives were taken.
     """
-    best = _best_of(present, effect, guesses)
+    best = _best_of(present, effect, guesses, rule)
     if best is None or best.cost >= present.cost:
-        gentler = _best_of(present, effect, [g for g in (_near_null(effect, g) for g in guesses) if g])
-        best = min((b for b in (best, gentler) if b is not None), key=lambda b: b.cost, default=None)
+        smaller = [_smaller(effect, guess, rule.smaller_guess) for guess in guesses]
+        second = _best_of(present, effect, [guess for guess in smaller if guess is not None], rule)
+        best = min((b for b in (best, second) if b is not None), key=lambda b: b.cost, default=None)
     return best
 
 
-def _near_null(effect: Effect, guess: Mapping[str, float]) -> dict[str, float] | None:
-    """Return a guess a tenth as large, where an effect is nearly linear; None where it has no such size."""
+def _smaller(effect: Effect, guess: Mapping[str, float], share: float) -> dict[str, float] | None:
+    """Return a guess with a share of its size, where an effect is nearly linear; None if it has no null size."""
     main = effect.main
     if main.name not in guess or not math.isfinite(main.null):
         return None
-    return {**guess, main.name: main.null + _GENTLY * (guess[main.name] - main.null)}
+    return {**guess, main.name: main.null + share * (guess[main.name] - main.null)}
 
 
 def _best_of(
-    present: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]]
+    present: Solution, effect: Effect, guesses: Iterable[Mapping[str, float]], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     best: ScreenedEffect | None = None
     for guess in guesses:
@@ -75,7 +74,7 @@ def _best_of(
         needs_derivatives = "mode" in effect.tags or base is not present
         try_guess = _with_new_derivatives if needs_derivatives else _with_present_derivatives
         try:
-            tried = try_guess(base, effect, parameters)
+            tried = try_guess(base, effect, parameters, rule)
         except RseaError:
             continue
         if tried is not None and (best is None or tried.cost < best.cost):
@@ -92,13 +91,16 @@ def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
     return present if (theta == present.theta).all() else replace(present, theta=theta)
 
 
-def _with_new_derivatives(present: Solution, effect: Effect, guess: dict[str, float]) -> ScreenedEffect:
-    solution = solve(*extended(present.problem, present.theta, effect, guess), iterations=_STEPS)
+def _with_new_derivatives(
+    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+) -> ScreenedEffect:
+    problem, theta = extended(present.problem, present.theta, effect, guess)
+    solution = solve(problem, theta, iterations=rule.screening_steps)
     return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
 
 def _with_present_derivatives(
-    present: Solution, effect: Effect, guess: dict[str, float]
+    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
     problem, theta = extended(present.problem, present.theta, effect, guess)
@@ -110,8 +112,8 @@ def _with_present_derivatives(
         return None
     step = _Step(problem, np.column_stack([present.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
-    for _ in range(_STEPS):
-        better = step.taken(best, residual)
+    for _ in range(rule.screening_steps):
+        better = step.taken(best, residual, (1.0, rule.screening_part))
         if better is None:
             break
         best, residual = better
@@ -132,14 +134,16 @@ class _Step:
         """Return the squared residual and what leaving the priors costs."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
-    def taken(self, at: ScreenedEffect, residual: FloatArray) -> tuple[ScreenedEffect, FloatArray] | None:
-        """Return where a step leads and the residual there; None where neither it nor a part of it helps."""
-        slope = self._matrix.T @ residual + self._prior**2 * (at.theta - self._centre)
-        aim = bounded_step(self._problem, at.theta, self._normal, slope)
-        for share in _SHARES:
-            theta = at.theta + share * (aim - at.theta)
-            left = self._problem.residual(theta)
-            cost = self.cost(theta, left)
-            if cost < at.cost:
-                return replace(at, theta=theta, cost=cost), left
+    def taken(
+        self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
+    ) -> tuple[ScreenedEffect, FloatArray] | None:
+        """Return where a step, or a share of it, leads and the residual there; None where none helps."""
+        slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
+        aim = bounded_step(self._problem, start.theta, self._normal, slope)
+        for share in shares:
+            theta = start.theta + share * (aim - start.theta)
+            stepped = self._problem.residual(theta)
+            cost = self.cost(theta, stepped)
+            if cost < start.cost:
+                return replace(start, theta=theta, cost=cost), stepped
         return None

@@ -29,10 +29,6 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
-LEAST_WEIGHT = 0.02
-"""Of all that was tried in a cause's place: a rival with less is none."""
-MOST_RIVALS = 3
-
 
 @dataclass(frozen=True)
 class Contest:
@@ -73,40 +69,41 @@ def weighed(
 
     Another cause that was accepted too is no rival, whichever of the two came first.
     """
-    last = set(selection.last.causes)
-    tried = [t for t in tried if t.name == claim.name or t.name not in last]
+    accepted, rule = selection.last.causes, selection.last.settings.evidence
+    tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
     scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
     priors = [prior_cost(t.problem, t.theta) for t in tried]
     weights = _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
-    of = {t.name: w for t, w in zip(tried, weights, strict=True)}
+    weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
-        Claim(t.name, t.problem, t.theta, s, _score_beside(t, held_out), of[t.name])
+        Claim(t.name, t.problem, t.theta, s, _score_of(t.beside, held_out), weight_of[t.name])
         for t, s in zip(tried, scores, strict=True)
         if t.name != claim.name
     ]
-    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(last)]
+    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
     models = [selection.last, *swapped]
     tested = [_score_of(m, held_out) for m in models]
-    others = _stacked(tested, [m.prior_cost for m in models], [m.size for m in models], far)
-    own = of.get(claim.name, 1.0)
-    for model, with_it, weight in zip(swapped, tested[1:], others[1:], strict=True):
+    among_swapped = _stacked(tested, [m.prior_cost for m in models], [m.size for m in models], far)
+    among_tried = weight_of.get(claim.name, 1.0)
+    for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
         theta = model.solution.theta
         rivals.append(Claim(model.newest, model.problem, theta, with_it, claim.without, weight))
-    heavy = sorted((r for r in rivals if r.weight >= LEAST_WEIGHT), key=lambda r: -r.weight)
+    heavy = sorted((r for r in rivals if r.weight >= rule.least_weight), key=lambda r: -r.weight)
     once = {r.name: r for r in reversed(heavy)}
-    kept = sorted(once.values(), key=lambda r: -r.weight)[:MOST_RIVALS]
-    return Contest(replace(claim, weight=min(own, others[0])), tuple(kept))
+    kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
+    return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
 
 
 def trial_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
     """Return how a trial does on the test blocks."""
     problem = replace(trial.problem, cases=cases)
-    return score_on(problem, cases, TEST, problem.outputs(trial.theta))
+    return score_on(problem, cases, TEST, problem.outputs(trial.theta), trial.beside.settings.blocks)
 
 
-def _score_beside(trial: Trial, held_out: HeldOut) -> Score:
-    """Return how the model does beside which an effect was tried."""
-    return _score_of(trial.beside, held_out)
+def beside_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
+    """Return how the model does on the test blocks that a trial was made beside."""
+    model = trial.beside
+    return score_on(trial.problem, cases, TEST, model.outputs, model.settings.blocks)
 
 
 def _score_of(model: Candidate, held_out: HeldOut) -> Score:
