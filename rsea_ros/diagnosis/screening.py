@@ -57,7 +57,7 @@ def screen(
 
 
 def _smaller(effect: Effect, guess: Mapping[str, float], share: float) -> dict[str, float] | None:
-    """Return a guess with a share of its size, where an effect is nearly linear; None if it has no null size."""
+    """Return a guess of a share of its size, where an effect is nearly linear; None without a null size."""
     main = effect.main
     if main.name not in guess or not math.isfinite(main.null):
         return None
