@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._ros import need_ros
+from rsea_ros.cli._runs import RIG
 
 HELP = "the live view: torques, deflection, flag and health in a browser; records, identifies, diagnoses"
 EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
@@ -17,7 +18,7 @@ EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--rig", default="paper_high_impedance", help="the bench: a name in config/rigs, or a file")
+    add("--rig", default=RIG, help="the bench: a name in config/rigs, or a file")
     add("--host", default="localhost", help="where the page is served; 0.0.0.0: to the network too (a phone)")
     add("--port", type=int, default=8270, help="of the page; 0: any (default %(default)s)")
     add("--command", action="store_true", help="let a page command torque, within the driver's limits")

@@ -27,6 +27,7 @@ from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
+from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.json_values import json_text
 from rsea_ros.signals import UNITS, Fault, Record
@@ -51,8 +52,8 @@ def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
     result = identify([with_faults(_fit_for_fit(run, rig), found, masks=False)], rig)
     row |= identified(result)
     files = {
-        "identification.json": json_text(identification_json(result)),
-        "model.yaml": rig_text(result.rig),
+        IDENTIFICATION_JSON: json_text(identification_json(result)),
+        MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
         files |= _diagnosed(row, with_faults(record, found, masks=True), rig)
@@ -90,7 +91,7 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     causes = [_cause(c) for c in result.causes]
     row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
     return {
-        "diagnosis.json": json_text(diagnosis_json(result)),
+        DIAGNOSIS_JSON: json_text(diagnosis_json(result)),
         "extended.yaml": rig_text(result.extended_rig),
     }
 

@@ -28,11 +28,11 @@ from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.file_names import IDENTIFICATION
 from rsea_ros.report.identification.words import verdict_sentence
 from rsea_ros.signals import Record
 
 DEFAULT = "out/identify"
-NAMES = ("identification.json", "model.yaml", "report.html")
 TABLE = (
     Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
     Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
@@ -64,7 +64,7 @@ class Identify:
         self._commanded, self._asked, self._done = 0.0, False, False
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
         self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
-        check_free(self._out / name for name in NAMES)
+        check_free(self._out / name for name in IDENTIFICATION)
         self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
         self._identified: Report | None = None

@@ -25,6 +25,7 @@ from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.report import file_names
 from rsea_ros.report.control import json as control_json
 from rsea_ros.report.control import page as control_page
 from rsea_ros.report.design import json as design_json
@@ -120,8 +121,8 @@ WRITERS = {
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
     "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
-    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(results.NAMES)),
-    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(diagnosis_files.NAMES)),
+    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(file_names.IDENTIFICATION)),
+    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(file_names.DIAGNOSIS)),
     "control": (["control", "--json", "--out", "out"], ["control.json", "report.html"]),
     "paper": (["paper", "--json", "--out", "out"], ["one.mcap", "paper.json", "report.html"]),
 }
