@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "staging", "new_files", "processes"}
+FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
 FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -29,9 +29,11 @@ OWN = {
     "plugins": {"errors"},
     "interrupts": set(),
     "processes": set(),
-    "files": {"errors", "interrupts"},
-    "staging": {"files"},
-    "new_files": {"errors", "files", "interrupts", "staging"},
+    "locked_folder": set(),
+    "replaced": {"locked_folder"},
+    "files": {"errors", "interrupts", "replaced"},
+    "staging": {"files", "locked_folder", "replaced"},
+    "new_files": {"errors", "files", "interrupts", "replaced", "staging"},
     "units": set(),
     "decimal_number": set(),
     "keys": set(),
