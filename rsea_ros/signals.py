@@ -42,6 +42,11 @@ deflection    angle of the spring by an encoder of its own, positive when the sp
 reference     position asked for by a controller that ran during the record
 """
 
+SENSED = ("ft", "deflection", "position", "velocity")
+"""Channels that judge a model, in the order in which verdicts speak of them."""
+MEASURED = (*SENSED, "motor_torque")
+"""All channels that a fit sees: the motor torque only echoes the command, and judges where no other can."""
+
 
 @dataclass(frozen=True)
 class Channel:

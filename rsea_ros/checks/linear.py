@@ -16,10 +16,8 @@ from rsea_ros.checks.shape import Shape
 from rsea_ros.identification.problem import case_from
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
 
-TIMED = ("ft", "deflection", "position", "velocity")
-"""Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
 _Z95 = 1.959964
 _ROUNDS = 6
 _PARTS = (1.0, 0.5, 0.25, 0.1)
@@ -82,7 +80,7 @@ def _setting(
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
     measured = case_from(record, rig, masked).measured
-    timed = tuple(n for n in TIMED if n in measured)
+    timed = tuple(n for n in SENSED if n in measured)  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))

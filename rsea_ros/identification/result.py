@@ -9,14 +9,12 @@ from typing import Literal
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, Fault, FloatArray
+from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_JUDGED = ("ft", "deflection", "position", "velocity")
-"""Channels that judge a model; the motor torque only echoes the command, and judges where no other can."""
 _TOLD = 0.5
 """Share of what is known of a value that the data must have brought for it to be identified."""
 
@@ -117,7 +115,7 @@ class Identification:
         """Return by channel the RMS of the residual over the noise, of the channels that judge."""
         noise = self.noise_rms
         ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
-        return {n: r for n, r in ratios.items() if n in _JUDGED} or ratios
+        return {n: r for n, r in ratios.items() if n in SENSED} or ratios
 
     @property
     def at_noise(self) -> bool:

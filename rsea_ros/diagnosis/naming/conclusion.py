@@ -36,10 +36,7 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 from rsea_ros.model.prediction import fit_percent
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Record
-
-PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
-"""The channel that gains and verdicts speak of: the first of these that is measured."""
+from rsea_ros.signals import MEASURED, Record
 
 
 def diagnosis_of(
@@ -52,7 +49,7 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return what weighed causes come to. checked: of the records and the held-out one."""
     selection, stages = weighing.selection, weighing.stages
-    channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
+    channel = next((n for n in MEASURED if n in stages[0].test.sums), None)
     if channel is None:
         raise IdentificationError(
             f"{records[0].source}: no sample is left to test on, expected a longer record"

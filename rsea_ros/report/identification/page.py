@@ -19,9 +19,7 @@ from rsea_ros.report.identification.words import doubt_sentences, next_command, 
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
-from rsea_ros.signals import UNITS
-
-_ORDER = ("ft", "deflection", "position", "velocity")
+from rsea_ros.signals import SENSED, UNITS
 
 
 def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:
@@ -44,7 +42,7 @@ def identification_report(identification: Identification, provenance: Provenance
 
 def main_channel(identification: Identification) -> str:
     """Return the channel that the reader looks at first."""
-    present = [n for n in _ORDER if n in identification.residual_rms]
+    present = [n for n in SENSED if n in identification.residual_rms]
     return present[0] if present else next(iter(identification.residual_rms), "")
 
 
@@ -102,7 +100,7 @@ def _parameter_finding(identification: Identification) -> str:
 def _shown(identification: Identification) -> list[Overlay]:
     """Return the overlays worth a figure, the first one first; the motor torque only echoes the command."""
     by_name = {o.channel: o for o in identification.overlays}
-    return [by_name[n] for n in _ORDER if n in by_name] or list(identification.overlays)
+    return [by_name[n] for n in SENSED if n in by_name] or list(identification.overlays)
 
 
 def _over_time(identification: Identification, overlay: Overlay) -> Figure:
