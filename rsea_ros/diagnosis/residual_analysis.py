@@ -9,6 +9,7 @@ from scipy import signal
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -96,16 +97,11 @@ def _binned(
 ) -> list[Misfit]:
     if len(values) < 4 * _BINS:
         return []
-    edges = (
-        np.linspace(values.min(), values.max(), _BINS + 1)
-        if equal
-        else np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))
-    )
-    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
-    power = np.bincount(which, residual**2, _BINS) / np.maximum(np.bincount(which, minlength=_BINS), 1)
+    edges = edges_of(values, _BINS, equal=equal)
+    levels = rms_in(edges, values, residual) / noise
     return [
-        Misfit(what, float(edges[i]), float(edges[i + 1]), unit, float(np.sqrt(power[i])) / noise, channel)
-        for i in range(_BINS)
+        Misfit(what, float(low), float(high), unit, float(level), channel)
+        for (low, high), level in zip(itertools.pairwise(edges), levels, strict=True)
     ]
 
 

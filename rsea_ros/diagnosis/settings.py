@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, TypeVar
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.identification.result import AT_NOISE
 
 T = TypeVar("T")
 MOST_CAUSES = 4
@@ -43,7 +44,7 @@ class FloorSettings:
         "below it in every channel the search ends",
         "4 standard deviations of a white residual at 80 s of 280 Hz (noise_level.py)",
     )
-    reached: float = number(1.1, "1", "up to it on the test blocks a channel has reached its floor")
+    reached: float = number(AT_NOISE, "1", "up to it on the test blocks a channel has reached its floor")
     misfit: float = number(1.5, "1", "above it a channel misfits: causes must take half of that away")
     large_misfit: float = number(3.0, "1", "above it a channel misfits much: causes may explain it alone")
     share_left: float = number(0.5, "1", "of a misfit: what may be left where causes are named")
