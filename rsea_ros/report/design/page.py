@@ -12,7 +12,7 @@ import numpy as np
 from rsea_ros.design.by_train import by_train
 from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import FALL_FACTOR, PAPER_FACTOR, end_to_end
+from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.design.map import Demand, feasible_map
@@ -118,7 +118,6 @@ def _why(least: Design) -> str:
 def _map(designs: Sequence[Design]) -> Figure:
     r, unit = designs[0].requirement, designs[0].unit
     j = np.geomspace(2e-4, 2e-2, 25)
-    omega_2 = (2.0 * math.pi * r.bandwidth) ** 2 / PAPER_FACTOR
     bounds = stiffness_bounds(r, unit)
     spin = np.array([least_for_band(replace(r, inertia=float(v)), unit) for v in j])
     flat = np.ones(len(j))
@@ -126,7 +125,7 @@ def _map(designs: Sequence[Design]) -> Figure:
         Demand(f"{r.bandwidth:g} Hz, with spin", BEFORE, j, spin),
         Demand(f"{math.degrees(r.deflection):g}° at {r.torque:g} N·m", INK, j, bounds["Deflection"] * flat),
         Demand(f"K_s/2 = {r.torque:g} N·m", QUIET, j, bounds["Torque, K_s/2"] * flat),
-        Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, omega_2 * j),
+        Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, undamped_stiffness(r.bandwidth, j)),
     ]
     points = [
         Point(f"{d.stiffness:.0f}", d.stiffness, r.inertia, c)
@@ -138,7 +137,7 @@ def _map(designs: Sequence[Design]) -> Figure:
 
 def _map_title(d: Design) -> str:
     r, spin = d.requirement, d.unit.spin
-    alone = abs(spin) * (2.0 * math.pi * r.bandwidth) ** 2 / (PAPER_FACTOR if spin > 0.0 else FALL_FACTOR)
+    alone = float(undamped_stiffness(r.bandwidth, spin))
     if spin > 0.0:
         return (
             f"However light the chassis, {r.bandwidth:g} Hz need {alone:.0f} N·m/rad with this rotor: "
