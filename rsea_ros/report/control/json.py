@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from rsea_ros.control.large_signal import Reach
 from rsea_ros.control.study import AtRate, Study
+from rsea_ros.report.json_values import finite
 
 
 def control_json(study: Study) -> dict[str, Any]:
@@ -22,8 +22,8 @@ def control_json(study: Study) -> dict[str, Any]:
         "large_signal": [
             {
                 "motor": motor.name,
-                "torque": _finite(motor.torque),
-                "speed": _finite(motor.speed),
+                "torque": finite(motor.torque),
+                "speed": finite(motor.speed),
                 "source": motor.source,
                 "limits": [
                     {
@@ -44,22 +44,22 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
     return {
         "rate_hz": at.design.rate,
         "gains": asdict(at.design.gains),
-        "margins": {n: {k: _finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
+        "margins": {n: {k: finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
         "friction_left": at.design.friction_left,
         "set": {
             "cases": at.swept.cases,
             "unstable": at.swept.unstable,
             "sensitivity": at.swept.sensitivity,
             "where": str(at.swept.where),
-            "margins": {k: _finite(v) for k, v in asdict(at.swept.margins).items()},
+            "margins": {k: finite(v) for k, v in asdict(at.swept.margins).items()},
         },
         "trials": [
             {
                 "what": t.what,
-                "value": _finite(t.value),
+                "value": finite(t.value),
                 "unit": t.unit,
                 "asked": t.asked,
-                "worst": _finite(t.worst),
+                "worst": finite(t.worst),
                 "asked_worst": t.allowed,
                 "met": t.met,
             }
@@ -86,8 +86,4 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
 
 
 def _reach(reach: Reach) -> dict[str, Any]:
-    return {"torque_hz": _finite(reach.torque), "speed_hz": _finite(reach.speed)}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return {"torque_hz": finite(reach.torque), "speed_hz": finite(reach.speed)}

@@ -19,9 +19,7 @@ from rsea_ros.report.design.map import Demand, feasible_map
 from rsea_ros.report.design.surface import Point, bandwidth_surface
 from rsea_ros.report.design.tables import (
     checks_table,
-    hertz,
     margins_table,
-    signed,
     springs_table,
     trains_table,
 )
@@ -84,7 +82,7 @@ def _keys(d: Design) -> list[tuple[str, str]]:
 
 def _sentences(asked: Design, least: Design) -> str:
     r = asked.requirement
-    spin = asked.unit.spin
+    spin, turns = asked.unit.spin, words.signed(asked.unit.turns, 0)
     return section(
         "What the method gives, and what it does not say",
         equation(
@@ -94,7 +92,7 @@ def _sentences(asked: Design, least: Design) -> str:
             f"linear    T / K_s = {asked.linear:.2f} rad = {math.degrees(asked.linear):.0f}°, "
             f"{math.degrees(r.deflection):.0f}° allowed\n"
             f"spin      J_sc + n J_r = {1e3 * r.inertia:.3f} {_term(1e3 * spin)} g·m²  →  "
-            f"{_hz(asked.band_exact)}   ({words.train(asked.unit.train)}, n = {signed(asked.unit.turns, 0)})"
+            f"{_hz(asked.band_exact)}   ({words.train(asked.unit.train)}, n = {turns})"
         ),
         f"<p>The least stiffness that meets all demands on the spring is <b>{least.stiffness:.0f} N·m/rad</b>"
         f" with this motor and gear: {escape(_why(least))}.</p>",
@@ -102,7 +100,7 @@ def _sentences(asked: Design, least: Design) -> str:
 
 
 def _hz(value: float) -> str:
-    return hertz(value) + (" Hz" if math.isfinite(value) else "")
+    return words.hertz(value) + (" Hz" if math.isfinite(value) else "")
 
 
 def _term(value: float) -> str:

@@ -14,8 +14,6 @@ from rsea_ros.report.page.table import table_of_rows
 _WIDTH, _HEIGHT = 190.0, 26.0
 _TOLD = 0.9
 _UNTOLD = 0.5
-_LOPSIDED = 1.5
-"""Ratio of the sides of an interval, from which its ends are shown instead of ± its half."""
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
@@ -60,7 +58,7 @@ def value_text(p: ParameterEstimate) -> tuple[str, str]:
         return value, ""
     low, high = p.ci95
     sides = sorted((p.value - low, high - p.value))
-    if sides[1] <= _LOPSIDED * sides[0]:
+    if sides[1] <= words.LOPSIDED * sides[0]:
         return value, f" ± {half}"
     step = 10.0 ** (math.floor(math.log10(sides[1])) - 2)
     ends = (step * math.floor(low / step), step * math.ceil(high / step))
@@ -72,12 +70,12 @@ def _rounded(value: float, step: float) -> str:
     """Return a value to a decimal step, plain where that is short."""
     decimals = -round(math.log10(step))
     shown = f"{value:.{max(0, decimals)}f}" if decimals < 9 else f"{value:.2e}"
-    return shown.replace("-", "−")
+    return words.minus(shown)
 
 
 def _row(p: ParameterEstimate) -> str:
     value, doubt = value_text(p)
-    change = f"{100.0 * (p.value / p.start - 1.0):+.1f} %".replace("-", "−") if p.start else "–"
+    change = words.minus(f"{100.0 * (p.value / p.start - 1.0):+.1f} %") if p.start else "–"
     return (
         f"<tr><td>{escape(words.parameter(p.name))} {_symbol(p.name)}<small>{escape(p.name)}</small></td>"
         f"<td class='number'><b>{value}</b>{doubt}</td><td class='unit'>{escape(words.unit(p.unit))}</td>"
