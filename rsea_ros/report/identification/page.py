@@ -13,7 +13,7 @@ from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, MEASURED
 from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.identification.correlation import correlation_section
-from rsea_ros.report.identification.parameters import clock_sentence, parameter_table, told
+from rsea_ros.report.identification.parameters import clock_sentence, how_determined, parameter_table
 from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.page.frame import Block, page
@@ -91,7 +91,7 @@ def _statics(identification: Identification) -> str:
 
 def _parameter_finding(identification: Identification) -> str:
     physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
-    settled = [p for p in physical if told(p) == "yes"]
+    settled = [p for p in physical if how_determined(p) == "yes"]
     if len(settled) == len(physical):
         return f"The data determine all {len(physical)} parameters"
     return f"The data determine {len(settled)} of {len(physical)} parameters, the others not or only in part"

@@ -1,4 +1,4 @@
-"""The table of parameters: value, interval, where it started, and how much of it the data told."""
+"""The table of parameters: value, interval, where it started, and how far the data determine it."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     return f"Sensors read later than stamped by: {'; '.join(parts)}."
 
 
-def told(p: ParameterEstimate) -> str:
-    """Return in words how much of a parameter the data told: against what was known, and against its size.
+def how_determined(p: ParameterEstimate) -> str:
+    """Return in words how far the data determine a parameter: against what was known, and against its size.
 
     None where the interval reaches as far as the value is large, or where the fit ended at a bound.
     """
@@ -80,7 +80,7 @@ def _row(p: ParameterEstimate) -> str:
         f"<tr><td>{escape(words.parameter(p.name))} {_symbol(p.name)}<small>{escape(p.name)}</small></td>"
         f"<td class='number'><b>{value}</b>{doubt}</td><td class='unit'>{escape(words.unit(p.unit))}</td>"
         f"<td>{_interval(p)}</td><td class='number'>{words.number(p.start, 4)}</td>"
-        f"<td class='number'>{change}</td><td>{told(p)}</td></tr>"
+        f"<td class='number'>{change}</td><td>{how_determined(p)}</td></tr>"
     )
 
 
