@@ -95,6 +95,15 @@ NAMING = (
 )
 """Layers of its folder naming: how the selected causes are named."""
 
+REPORT = {
+    "figures": set(),
+    "page": {"figures"},
+    "diagnosis": {"figures", "page", "identification"},
+    "fleet": {"figures", "page", "diagnosis"},
+    "paper": {"figures", "page", "design"},
+}
+"""Folders of rsea_ros/report that a folder imports; one that is not listed has figures and page alone."""
+
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
     "builtin_interfaces",
@@ -225,6 +234,19 @@ def used_by(package: str, name: str) -> set[str]:
     modules = (module for p in paths for module, _ in imports(p, p.read_text(encoding="utf-8")))
     inside = (m.removeprefix(package + ".") for m in modules if m.startswith(package + "."))
     return {m.split(".")[0] for m in inside}
+
+
+REPORT_FOLDER = ROOT / "rsea_ros" / "report"
+
+
+@pytest.mark.parametrize("folder", sorted(p.name for p in REPORT_FOLDER.iterdir() if list(p.glob("*.py"))))
+def test_a_folder_of_the_report_imports_only_what_it_may(folder):
+    folders = {p.name for p in REPORT_FOLDER.iterdir() if p.is_dir()}
+    used = set()
+    for path in (REPORT_FOLDER / folder).glob("*.py"):
+        modules = (module.split(".") for module, _ in imports(path, path.read_text(encoding="utf-8")))
+        used |= {parts[2] for parts in modules if parts[:2] == ["rsea_ros", "report"] and len(parts) > 2}
+    assert used & folders - {folder} <= REPORT.get(folder, {"figures", "page"})
 
 
 @pytest.mark.parametrize(
