@@ -99,6 +99,7 @@ REPORT = {
     "figures": set(),
     "page": {"figures"},
     "diagnosis": {"figures", "page", "identification"},
+    "campaign": {"figures", "page", "experiment"},
     "fleet": {"figures", "page", "diagnosis"},
     "paper": {"figures", "page", "design"},
 }

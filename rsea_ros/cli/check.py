@@ -81,7 +81,7 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 def _print(checks: list[Findings]) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.check.text import check_table, summary
+    from rsea_ros.report.check.terminal import check_table, summary
 
     console = Console()
     if not console.is_terminal:

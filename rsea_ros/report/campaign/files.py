@@ -8,8 +8,8 @@ from rsea_ros.experiment.campaign import Campaign, Outcome
 from rsea_ros.experiment.run_file import run_text
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles
-from rsea_ros.report.experiment.campaign_json import campaign_json
-from rsea_ros.report.experiment.campaign_page import campaign_page
+from rsea_ros.report.campaign.json import campaign_json
+from rsea_ros.report.campaign.page import campaign_page
 from rsea_ros.report.file_names import EXPERIMENT_JSON, MODEL, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rsea_ros.experiment.campaign import Campaign, Outcome
-from rsea_ros.report.experiment.campaign_words import end_sentence
+from rsea_ros.report.campaign.words import end_sentence
 from rsea_ros.report.experiment.json import SCHEMA, proof_json, proposal_json
 from rsea_ros.report.json_values import strict
 

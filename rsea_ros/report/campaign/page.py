@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.experiment.campaign import Outcome
 from rsea_ros.experiment.limits import Limits
-from rsea_ros.report.experiment.campaign_words import end_sentence, size
+from rsea_ros.report.campaign.words import end_sentence, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line, numbers
