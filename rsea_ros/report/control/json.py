@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from rsea_ros.control.large_signal import Reach
+from rsea_ros.control.margins import Margins
 from rsea_ros.control.study import AtRate, Study
-from rsea_ros.report.json_values import finite
+from rsea_ros.control.trials import Compensated, Trial
+from rsea_ros.report.json_values import finite, numbers
 
 
 def control_json(study: Study) -> dict[str, Any]:
@@ -44,44 +46,50 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
     return {
         "rate_hz": at.design.rate,
         "gains": asdict(at.design.gains),
-        "margins": {n: {k: finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
+        "margins": {name: _margins(m) for name, m in at.design.margins.items()},
         "friction_left": at.design.friction_left,
         "set": {
             "cases": at.swept.cases,
             "unstable": at.swept.unstable,
             "sensitivity": at.swept.sensitivity,
             "where": str(at.swept.where),
-            "margins": {k: finite(v) for k, v in asdict(at.swept.margins).items()},
+            "margins": _margins(at.swept.margins),
         },
-        "trials": [
-            {
-                "what": t.what,
-                "value": finite(t.value),
-                "unit": t.unit,
-                "asked": t.asked,
-                "worst": finite(t.worst),
-                "asked_worst": t.allowed,
-                "met": t.met,
-            }
-            for t in at.trials
-        ],
-        "compensation": [
-            {
-                "effect": c.effect.name,
-                "parameters": dict(c.effect.parameters),
-                "sine_hz": c.hz,
-                "error_without": c.without,
-                "error_with": c.with_model,
-                "gain": c.gain,
-            }
-            for c in at.compensations
-        ],
+        "trials": [_trial(t) for t in at.trials],
+        "compensation": [_compensation(c) for c in at.compensations],
         "output_impedance": {
             "hz": z.hz.tolist(),
             "controlled": np.abs(z.controlled).tolist(),
             "motor_off": np.abs(z.motor_off).tolist(),
             "spring": np.abs(z.spring).tolist(),
         },
+    }
+
+
+def _margins(margins: Margins) -> dict[str, float | None]:
+    return numbers(asdict(margins))
+
+
+def _trial(t: Trial) -> dict[str, Any]:
+    return {
+        "what": t.what,
+        "value": finite(t.value),
+        "unit": t.unit,
+        "asked": t.asked,
+        "worst": finite(t.worst),
+        "asked_worst": t.allowed,
+        "met": t.met,
+    }
+
+
+def _compensation(c: Compensated) -> dict[str, Any]:
+    return {
+        "effect": c.effect.name,
+        "parameters": dict(c.effect.parameters),
+        "sine_hz": c.hz,
+        "error_without": c.without,
+        "error_with": c.with_model,
+        "gain": c.gain,
     }
 
 
