@@ -29,7 +29,7 @@ class Measure:
 
     def __str__(self) -> str:
         mark = "ok  " if self.met else "LESS"
-        return f"{mark} {self.what:<56}{self.value:8.2f}   asked {self.asked:<10} ({self.cases} values)"
+        return f"{mark} {self.what:<66}{self.value:8.2f}   asked {self.asked:<10} ({self.cases} values)"
 
 
 def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
@@ -40,21 +40,25 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
     lines = [
         _at_least("first cause right, one effect, %", _right(groups.get("single", ())), 97.0),
         _at_least(
-            "the same, or a rival that it is confusable with, %", _lenient(groups.get("single", ())), 97.0
+            "first cause right or confusable with the right one, one effect, %",
+            _lenient(groups.get("single", ())),
+            97.0,
         ),
         _at_least("first cause right, one of the newer effects, %", _right(groups.get("newer", ())), 97.0),
         _at_least("both causes right, two effects, %", _right(groups.get("pair", ())), 90.0),
         _at_least("both causes right, two drawn at random, %", _right(groups.get("drawn_pair", ())), 90.0),
         _at_least("all causes right, three drawn at random, %", _right(groups.get("drawn_triple", ())), 90.0),
-        _at_least("nothing wrong said of a clean bench, %", _right(groups.get("clean", ())), 98.0),
+        _at_least("verdict nothing_wrong for a clean bench, %", _right(groups.get("clean", ())), 98.0),
         _at_least(
             "unexplained, effect outside the catalogue, %", _right(groups.get("off_catalogue", ())), 90.0
         ),
         _at_least(
-            "the same, or an effect that looks alike, %", _lenient(groups.get("off_catalogue", ())), 90.0
+            "unexplained or a look-alike, effect outside the catalogue, %",
+            _lenient(groups.get("off_catalogue", ())),
+            90.0,
         ),
         _at_least(
-            "unexplained, effect taken out of the catalogue, %", _right(groups.get("taken_out", ())), 90.0
+            "unexplained, effect removed from the catalogue, %", _right(groups.get("taken_out", ())), 90.0
         ),
         _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),

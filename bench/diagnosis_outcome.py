@@ -16,6 +16,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Record
 
 ERROR = "error"
@@ -73,6 +74,7 @@ class Outcome:
     times_noise: float = nan
     times_noise_fresh: float = nan
     seconds: float = nan
+    statuses: tuple[str, ...] = ()
     error: str = ""
     statements: tuple[str, ...] = field(default=())
 
@@ -120,6 +122,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
         truth=() if case.group in OUTSIDE else tuple(case.truth_causes),
         named=tuple(cause.name for cause in causes),
         verdict=diagnosis.verdict,
+        statuses=tuple(cause.status for cause in causes),
         confusable=tuple(causes[0].confusable_with) if causes else (),
         found=tuple(_found(case, diagnosis)),
         faults=case.faults,
@@ -130,7 +133,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
         times_noise=_worst(diagnosis.extended_residual_rms, diagnosis.noise_rms),
         times_noise_fresh=_worst(_errors(diagnosis.extended_rig, case.fresh_record), diagnosis.noise_rms),
         seconds=seconds,
-        statements=diagnosis.statements,
+        statements=remark_sentences(diagnosis.remarks),
     )
 
 

@@ -1,4 +1,4 @@
-"""The docs site. `.ci/docs` builds it and treats warnings as errors. Code generates some of its pages."""
+"""The docs site: `.ci/docs` builds it and treats warnings as errors. Generated pages are written here."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from rsea_ros import DOOR  # noqa: E402
+from rsea_ros.effects import scale  # noqa: E402
 from rsea_ros.effects._page import EffectPage  # noqa: E402
 from rsea_ros.effects.catalogue import catalogue  # noqa: E402
 
@@ -31,20 +32,30 @@ suppress_warnings = ["myst.xref_missing"]
 
 def effects_page() -> str:
     """Return the catalogue of effects: meaning, equation, parameters and source of each."""
-    first = "Every cause that a diagnosis can name. `rsea effects NAME` prints this text."
-    parts = ["# The effects", "", first, ""]
+    parts = [
+        "# The effects", "",
+        "Every cause that a diagnosis can name. `rsea effects NAME` prints this text.", "",
+        "Bounds and sizes are those for the paper's actuator in its high-impedance test: largest torque "
+        f"{scale.TORQUE:g} N m, spring {scale.STIFFNESS:g} N m/rad, reflected inertia {scale.INERTIA:g} "
+        f"kg m^2, largest speed {scale.SPEED:g} rad/s, {1.0 / scale.PERIOD:.0f} samples a second. On another "
+        "machine they are multiplied by powers of four, according to the column *grows with*: 2 N m of "
+        "friction are typical where the largest torque is 30 N m, 2 mN m where it is 30 mN m. Bounds in s "
+        "and Hz only widen.", "",
+    ]  # fmt: skip
     for name, effect in sorted(catalogue().items()):
         page = EffectPage(effect)
         rows = [
-            f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} |"
+            f"| `{p.name}` | {p.unit} | {p.typical:g} | {p.null:g} | {p.low:g} to {p.high:g} | "
+            f"{page.goes_with(p).removeprefix(', times ')} | {p.reason} |"
             for p in page.parameters.values()
         ]
         alike = ", ".join(f"[`{n}`](#{n.replace('_', '-')})" for n in effect.claims.confusable_with)
         parts += [
             f"## {name}", "", f"{effect.about[:1].upper()}{effect.about[1:]}.", "",
             "```text", effect.equation, "```", "",
-            "| parameter | unit | typical | vanishes at | fitted within |", "|---|---|---|---|---|",
-            *rows, "",
+            "| parameter | unit | typical | vanishes at | fitted within | grows with | why these bounds |",
+            "|---|---|---|---|---|---|---|", *rows, "",
+            *([f"Kind: {', '.join(effect.tags)}.", ""] if effect.tags else []),
             *([f"May be confused with {alike}.", ""] if alike else []),
             prose(page.description), "",
         ]  # fmt: skip

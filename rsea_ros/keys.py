@@ -1,16 +1,16 @@
-"""Keys of a YAML document: what each expects. Parsers take their names from them, the docs their tables."""
+"""Keys of a YAML document with the values that each expects. Parsers and the tables of the docs read them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-NEEDED = "needed"
+NEEDED = "required"
 
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a mapping: what it expects, what holds where it is left out, what it means."""
+    """A key of a mapping: the expected value, the default, and the meaning."""
 
     name: str
     expects: str
@@ -25,7 +25,7 @@ def names(keys: Collection[Key]) -> set[str]:
 
 def table(section: str, keys: Sequence[Key]) -> str:
     """Return a table of keys in Markdown."""
-    head = [f"`{section}`:", "", "| key | expects | without it | meaning |", "|---|---|---|---|"]
+    head = [f"`{section}`:", "", "| key | expected | default | meaning |", "|---|---|---|---|"]
     return "\n".join([*head, *map(_row, keys)]) + "\n"
 
 

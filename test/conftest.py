@@ -41,10 +41,10 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 DEAREST = (
     "diagnosis/test_hidden_effects", "cli/test_bad_", "model/test_pure_torque", "cli/test_demo",
-    "cli/test_ctrl_c", "diagnosis/test_puzzle", "nodes/test_driver_on_wire", "identification/test_identify",
-    "nodes/test_loop", "report/", "hardware/test_faults", "test_realdata", "nodes/test_controller",
-    "nodes/test_model", "nodes/test_identify_diagnosis", "nodes/test_parameters", "test_package",
-    "cli/test_diagnose",
+    "cli/test_ctrl_c", "diagnosis/test_puzzle", "nodes/test_driver_on_wire",
+    "identification/test_identify", "nodes/test_loop", "report/", "hardware/test_faults",
+    "test_realdata", "nodes/test_controller", "nodes/test_model", "nodes/test_identify_diagnosis",
+    "nodes/test_parameters", "test_package", "cli/test_diagnose",
 )  # fmt: skip
 """What takes longest, first, so that no worker is left with it at the end; what computes and what waits for
 nodes by turns, so that the cores are busy and the nodes are not late."""

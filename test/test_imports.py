@@ -75,7 +75,7 @@ OWN = {
 DIAGNOSIS = (
     {"settings", "screening", "residual_peaks"},
     {"result", "data_split", "coherence"},
-    {"score", "problem_variants", "residual_analysis", "initial_guess", "sentences"},
+    {"score", "problem_variants", "residual_analysis", "initial_guess"},
     {"candidate", "criteria", "next_experiment"},
     {"selection", "step_fits"},
     {"forward_step", "backward_elimination", "evaluation"},

@@ -9,11 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 
 import rsea_ros as rsea
-from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth, undamped_band
+from rsea_ros.model.bandwidth import inner_inertia, undamped_band
 
 rig = rsea.load_rig("paper_high_impedance")
 stiffness = np.linspace(200.0, 4000.0, 200)  # N m/rad
-printed = pure_torque_bandwidth(stiffness, rig["chassis.inertia"])  # Hz
+printed = undamped_band(stiffness, rig["chassis.inertia"])  # Hz, Eq. (7)
 exact = undamped_band(stiffness, inner_inertia(rig))  # Hz
 
 figure = go.Figure()

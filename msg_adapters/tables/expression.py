@@ -27,7 +27,7 @@ _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.UAdd, ast.USub)
 _NODES = (ast.Expression, ast.BinOp, ast.UnaryOp, ast.Call, ast.Name, ast.Load, ast.Constant, *_OPERATORS)
 
 PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
-    "abs": (np.abs, 1, "size"),
+    "abs": (np.abs, 1, "absolute value"),
     "sqrt": (np.sqrt, 1, "square root"),
     "sin": (np.sin, 1, "sine of rad"),
     "cos": (np.cos, 1, "cosine of rad"),
@@ -37,16 +37,16 @@ PLAIN: Mapping[str, tuple[Callable[..., Any], int, str]] = {
     "log": (np.log, 1, "natural logarithm"),
     "sign": (np.sign, 1, "-1, 0 or 1"),
     "minimum": (np.minimum, 2, "the smaller of two, sample by sample"),
-    "maximum": (np.maximum, 2, "the larger of two"),
+    "maximum": (np.maximum, 2, "the larger of two, sample by sample"),
     "clip": (np.clip, 3, "x within (x, low, high)"),
-    "unwrap": (np.unwrap, 1, "angle in rad without jumps of a turn"),
+    "unwrap": (np.unwrap, 1, "angle in rad without jumps of 2 pi"),
     "mean": (np.nanmean, 1, "mean over the record"),
     "first": (lambda x: x[0] if np.ndim(x) else x, 1, "first sample"),
 }
 """By name: function, how many arguments, meaning."""
 TIMED: Mapping[str, tuple[Callable[[Any, FloatArray], Any], int, str]] = {
-    "derivative": (lambda x, t: np.gradient(x, t), 1, "change a second, central differences"),
-    "integral": (lambda x, t: _integral(x, t), 1, "over the seconds since the first sample, trapezia"),
+    "derivative": (lambda x, t: np.gradient(x, t), 1, "rate of change, 1/s, central differences"),
+    "integral": (lambda x, t: _integral(x, t), 1, "integral over time since the first sample, trapezoids"),
 }
 FUNCTIONS = {**PLAIN, **TIMED}
 

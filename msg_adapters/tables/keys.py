@@ -1,4 +1,4 @@
-"""The keys of an import map: what each expects, and what holds without it. docs/import.md shows them."""
+"""The keys of an import map, expected values and defaults. docs/import.md shows them."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ RATES = (1e-3, 1e6)
 """Hz, of a file without stamps."""
 
 MAP = (
-    Key("about", "text", "empty", "one line that goes into the bag's notes"),
-    Key("time", "mapping", NEEDED, "where the stamps come from: a column with its unit, or a rate"),
-    Key("where", "mapping", "all rows", "which rows count"),
-    Key("runs", "mapping", "one run", "a file of several runs: each value of a column is one, a bag each"),
-    Key("header", "`true`, `false`", "as the line looks", "whether the first line of a text has names"),
+    Key("about", "text", "empty", "one line for the notes of the bag"),
+    Key("time", "mapping", NEEDED, "source of the stamps: a column with its unit, or a rate"),
+    Key("where", "mapping", "all rows", "condition on the rows that are used"),
+    Key("runs", "mapping", "one run", "splits a file into runs by the values of a column, one bag for each"),
+    Key("header", "`true`, `false`", "detected", "whether a text file begins with column names"),
     Key(
         "delimiter",
         "`,` `;` `|` `tab` `blanks`",
-        "seen from the first line",
-        "what parts the cells of a text; `blanks`: one or several blanks or tabs",
+        "detected from the first line",
+        "separator of the cells of a text file; `blanks`: one or more blanks or tabs",
     ),
-    Key("channels", "mapping", NEEDED, "a column, or a list of columns that are summed, for each channel"),
+    Key("channels", "mapping", NEEDED, "for each channel a column, or a list of columns to add"),
 )
 TIME = (
-    Key("column", "name or number of a column", "a rate", "the stamps, increasing, of each file"),
-    Key("expression", "expression", "a column", "of columns, instead of one"),
-    Key("unit", "unit of time", "needed but with a rate", "of the stamps"),
-    Key("rate", f"{RATES[0]:g} to {RATES[1]:g} Hz", "a column", "samples a second, of a file without stamps"),
+    Key("column", "name or number of a column", "a rate", "increasing stamps, in each file"),
+    Key("expression", "expression", "a column", "computed from columns, in place of one column"),
+    Key("unit", "unit of time", "required without `rate`", "unit of the stamps"),
+    Key("rate", f"{RATES[0]:g} to {RATES[1]:g} Hz", "a column", "sample rate of a file without stamps"),
 )
 RUNS = (
-    Key("column", "name or number of a column", NEEDED, "the column that counts the runs"),
+    Key("column", "name or number of a column", NEEDED, "the column that numbers the runs"),
 )
 WHERE = (
-    Key("column", "name or number of a column", NEEDED, "the column that chooses"),
-    Key("from", "number, as in the file", "no limit", "rows with this value or more"),
-    Key("below", "number, as in the file", "no limit", "rows with less than this value"),
-    Key("equals", "number, as in the file", "no limit", "rows with exactly this value"),
+    Key("column", "name or number of a column", NEEDED, "the column to compare"),
+    Key("from", "number, as in the file", "no limit", "keeps rows with this value or more"),
+    Key("below", "number, as in the file", "no limit", "keeps rows with less than this value"),
+    Key("equals", "number, as in the file", "no limit", "keeps rows with exactly this value"),
 )
 TERM = (
-    Key("column", "name or number of a column", "an expression", "measured values; `q[2]`: one of several"),
-    Key("expression", "expression", "a column", "of columns, instead of one"),
-    Key("file", "name of a file", "FILE itself", "that holds it, in the directory FILE"),
-    Key("unit", "unit", NEEDED, "of the column; another dimension than the channel's needs a scale"),
-    Key("sign", "1 or -1", "1", "-1 turns the axis"),
-    Key("scale", "number other than 0", "1", "SI unit of the channel for each SI unit of the column"),
+    Key("column", "name or number of a column", "an expression", "values; `q[2]`: one of several in a cell"),
+    Key("expression", "expression", "a column", "computed from columns, in place of one column"),
+    Key("file", "name of a file", "FILE itself", "the file that holds the column, in the directory FILE"),
+    Key("unit", "unit", NEEDED, "unit of the column; another dimension needs a scale"),
+    Key("sign", "1 or -1", "1", "-1 reverses the axis"),
+    Key("scale", "number other than 0", "1", "SI units of the channel per SI unit of the column"),
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
 )
 CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())

@@ -113,7 +113,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
         ]
     found = []
     whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
-    compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    both = checked.compared if checked.compared is not None else sides(record, rig)
+    compared = {n: s for n, s in both.items() if n in whole}
     late = lags(compared)
     if late:
         record = in_step(record, late)

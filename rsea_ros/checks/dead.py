@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from rsea_ros.checks.expected import Side, quotients, sides
+from rsea_ros.checks.expected import Side, quotients
 from rsea_ros.checks.lag import lag_of
 from rsea_ros.checks.motion import is_commanded
 from rsea_ros.model.inverse import is_inverse
@@ -19,16 +19,18 @@ _SHOWS = 0.3
 """Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
 
 
-def dead_channels(record: Record, rig: Rig, frozen: Collection[str] = ()) -> list[Fault]:
+def dead_channels(
+    record: Record, compared: Mapping[str, Side], rig: Rig, frozen: Collection[str] = ()
+) -> list[Fault]:
     """Return a fault for every sensor that does not measure. record: finite values, rising stamps.
 
+    compared: the record beside the rig's simulation.
     frozen: channels of which a part is held, which says why they have little to do with the command.
     The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
     called dead.
     """
     if not is_commanded(record):
         return []
-    compared = sides(record, rig)
     found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():

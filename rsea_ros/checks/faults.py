@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.dead import dead_channels
+from rsea_ros.checks.expected import Side, sides
 from rsea_ros.checks.motion import is_commanded, motion_beside
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
@@ -30,11 +31,15 @@ _COARSE = 5.0
 
 @dataclass(frozen=True)
 class Checked:
-    """A record with its faults: finite, rising stamps; and which samples must not count, by channel."""
+    """A record with its faults: finite, rising stamps; and which samples must not count, by channel.
+
+    compared: the record beside the rig's simulation, where nothing was masked or left out; None elsewhere.
+    """
 
     record: Record
     masked: Mapping[str, BoolArray]
     faults: tuple[Fault, ...]
+    compared: Mapping[str, Side] | None = None
 
 
 def check(record: Record, rig: Rig) -> Checked:
@@ -47,7 +52,9 @@ def check(record: Record, rig: Rig) -> Checked:
         masked[name], found[name] = _masked(repaired, name)
     frozen_ones = {n for n, own in found.items() if any(f.kind == "frozen_samples" for f in own)}
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
-    dead = dead_channels(_filled(repaired, finite), rig, frozen_ones)
+    filled = _filled(repaired, finite)
+    compared = sides(filled, rig) if is_commanded(filled) else {}
+    dead = dead_channels(filled, compared, rig, frozen_ones)
     repaired = _without(repaired, {f.channel for f in dead})
     known = {(f.kind, f.channel) for f in faults}
     faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
@@ -55,7 +62,8 @@ def check(record: Record, rig: Rig) -> Checked:
     masked = {n: bad for n, bad in masked.items() if n in repaired}
     faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
-    return Checked(_filled(alive, masked), masked, tuple(faults))
+    whole = not dead and not any(bad.any() for bad in masked.values())
+    return Checked(_filled(alive, masked), masked, tuple(faults), compared if whole else None)
 
 
 def _has_steps(record: Record, name: str) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from rsea_ros.checks.linear_rows import Rows, Setting, State, left_of, on_time, rows_of
 from rsea_ros.checks.linear_step import Brought, brought_by_value, gauss_newton_step
 from rsea_ros.checks.shape import Shape
-from rsea_ros.identification.problem import case_from
+from rsea_ros.identification.problem import case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
@@ -79,8 +79,8 @@ def _setting(
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
-    measured = case_from(record, rig, masked).measured
-    timed = tuple(n for n in SENSED if n in measured)  # a held motor torque shows no clock
+    told = channels_that_tell(record, rig)
+    timed = tuple(n for n in SENSED if n in told)  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
@@ -99,7 +99,7 @@ def _descended(setting: Setting, state: State) -> tuple[State, Rows, FloatArray,
         better = next((t for t in tried if t[1].loss < _WORSE * rows.left.loss), None)
         if better is None:
             break
-        state, rows = better[0], rows_of(setting, better[1])
+        state, rows = better[0], rows_of(setting, better[1], rows.slope)
         step, sd = gauss_newton_step(rows, setting, state)
         settled = _clocks_stand(setting, step, sd)
         if settled:

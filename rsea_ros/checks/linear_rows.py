@@ -23,6 +23,8 @@ from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 _LEAST_MISFIT = 0.5
 _BLOCKS = 40
 """At least: with fewer than unknowns a sandwich is too thin."""
+_NEAR = 0.02
+"""Of the scale of every value: a move so small leaves the derivatives as they are."""
 
 
 class State(NamedTuple):
@@ -80,14 +82,27 @@ class Left:
         return float(np.prod(self.misfit))
 
 
+class Slope(NamedTuple):
+    """Derivatives of the residual over the noise by values and clocks, shape (m, n), and where they hold."""
+
+    matrix: FloatArray
+    theta: FloatArray
+
+    def holds_at(self, theta: FloatArray, unknowns: Sequence[Unknown]) -> bool:
+        """Return whether another place is so near that the derivatives are the same."""
+        return bool(np.all(np.abs(theta - self.theta) < _NEAR * np.array([u.scale for u in unknowns])))
+
+
 @dataclass(frozen=True)
 class Rows:
     """Residual r (m,) and derivatives (m, n) in units of the misfit.
 
     Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
+    slope: what the derivatives are made of.
     """
 
     left: Left
+    slope: Slope
     residual: FloatArray
     matrix: FloatArray
     block: IntArray
@@ -126,14 +141,16 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     return np.array(found)
 
 
-def rows_of(setting: Setting, left: Left) -> Rows:
-    """Lay out the rows about a state: one simulation for each unknown."""
-    (case,), n = left.problem.cases, len(setting.values)
-    moved = jacobian(left.problem, left.theta, left.residual)
+def rows_of(setting: Setting, left: Left, known: Slope | None = None) -> Rows:
+    """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
+    (case,), n, at = left.problem.cases, len(setting.values), left.theta
+    if known is None or not known.holds_at(at, left.problem.unknowns):
+        known = Slope(jacobian(left.problem, at, left.residual), at)
+    moved = known.matrix
     t = _of_rows(case, case.t, setting.timed)
     of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
     own = [moved[:, n:] * (t - setting.start)[:, None]]
     own += [of_channel * column[:, None] for column in left.plain.T]
     weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
     block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
-    return Rows(left, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)
+    return Rows(left, known, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)

@@ -57,18 +57,19 @@ def smoothing_findings(related: Mapping[str, Quotient], period: float) -> list[F
 def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: float) -> int:
     """Return over how many samples a response was averaged, 1 for none."""
     weight = 1.0 / (sd**2 + 0.05**2)
-    turn = np.pi * f * period
-    tried = [_left(response, np.ones(len(f), complex), weight)]
-    for n in range(2, _MOST + 1):
-        h = np.sin(n * turn) / (n * np.sin(turn)) * np.exp(-1j * (n - 1) * turn)
-        tried.append(_left(response, h, weight))
-    lagged = min(_left(response, 1.0 / (1.0 + 2j * np.pi * f * tau), weight) for tau in _LAGS)
+    turn, number = np.pi * f * period, np.arange(2.0, _MOST + 1.0)[:, None]
+    size = np.sin(number * turn) / (number * np.sin(turn))
+    averages = np.asarray(size * np.exp(-1j * (number - 1.0) * turn), dtype=np.complex128)
+    tried = _left(response, np.vstack([np.ones(len(f), complex), averages]), weight)
+    lags = np.asarray(1.0 / (1.0 + 2j * np.pi * f * _LAGS[:, None]), dtype=np.complex128)
+    lagged = _left(response, lags, weight).min()
     best = int(np.argmin(tried))
     clear = tried[best] < _FALLS * min(tried[0], lagged) and tried[best] < _FITS**2
     return best + 1 if clear else 1
 
 
-def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> float:
-    """Return the share of a response's power that a filter leaves, whatever its gain."""
-    gain = float(np.sum(weight * (h.conj() * response).real) / np.sum(weight * np.abs(h) ** 2))
-    return float(np.sum(weight * np.abs(response - gain * h) ** 2) / np.sum(weight * np.abs(response) ** 2))
+def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
+    """Return the share of a response's power that each filter leaves, whatever its gain. h: shape (k, n)."""
+    gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
+    left: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
+    return left

@@ -1,4 +1,4 @@
-"""The checks before a fit: what is amber or red is said first and stays with the results."""
+"""The checks before a fit; amber and red findings are printed first and kept with the results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
     """Return the records, each with the faults that the checks found; a dead channel is left out.
 
     Prints a line for each warning unless quiet. masks: see with_faults.
-    Raises IdentificationError where nothing moves.
+    Raises IdentificationError if nothing moves.
     """
     for record in records:
         require_motion(record)
@@ -28,9 +28,9 @@ def checked(records: Sequence[Record], rig: Rig, axis: str, *, quiet: bool, mask
 
 
 def print_warnings(found: Sequence[Findings], rig: Rig) -> None:
-    """Print what is amber or red, each line once, headed by the rig."""
+    """Print the amber and red findings, each line once, below the name of the rig."""
     lines = dict.fromkeys(line for findings in found for line in warnings(findings))
     if lines:
-        print(f"held against rig {rig.name}:")
+        print(f"compared with rig {rig.name}:")
     for line in lines:
         print(line)

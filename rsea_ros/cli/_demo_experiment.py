@@ -1,4 +1,4 @@
-"""`rsea demo --experiment`: a bench with a hidden cause, a poor log, and runs designed one by one."""
+"""`rsea demo --experiment`: a bench with a hidden cause, a poor log, and runs designed one after another."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ HIDDEN = (
     ("nonlinear_spring", {"cubic": 350.0}),
     ("ft_sensor_lag", {"time_constant": 0.0035}),
 )
-"""Causes that slow work does not show."""
+"""Causes that slow work does not reveal."""
 LIMITS = "torque=25,velocity=2,deflection=0.04"
 SLOW = {"kind": "chirp", "amplitude": 0.6, "noise": 0.0, "low": 0.15, "high": 0.4, "duration": 10.0}
 SESSION = 150.0
-"""s that the session may take on a busy machine."""
+"""s, longest duration of the session on a busy machine."""
 
 
 def show(out: Path, domain: int, args: argparse.Namespace) -> int:
@@ -33,9 +33,7 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     name, parameters = HIDDEN[int(np.random.default_rng(args.seed).integers(len(HIDDEN)))]
     bench = demo.bench_of(rig, args.seed).with_effect(name, **parameters)
     save_rig(bench, out / "bench.yaml")
-    print(
-        f"{RIG}, its values up to {100.0 * demo.SPREAD:g} % off, with a cause that only the plant knows"
-    )
+    print(f"{RIG}, with values up to {100.0 * demo.SPREAD:g} % off and a cause known to the plant only")
     with Processes(out / "log", domain) as nodes:
         with demo.source(nodes, out, args) as first:
             log = _slow_work(nodes, out, first)
@@ -45,12 +43,12 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     for line in lines:
         if "[INFO]" in line:
             print(line.partition("]: ")[2])
-    print(f"hidden was: {hidden(bench)}")
+    print(f"hidden cause: {hidden(bench)}")
     return 0
 
 
 def _slow_work(nodes: Processes, out: Path, first: str) -> Path:
-    """Record what a bench does all day, which tells little; return the bag."""
+    """Record the slow daily work of a bench, which reveals little; return the bag."""
     bag = out / "bag"
     with demo.stage(f"{first}, excite, record: 10 s of slow work at {SLOW['amplitude']:g} N·m") as tell:
         nodes.start("record", {"out": bag})
@@ -61,7 +59,7 @@ def _slow_work(nodes: Processes, out: Path, first: str) -> Path:
 
 
 def _session(nodes: Processes, out: Path, bag: Path) -> None:
-    """Let the node go round; the demo consents to every run beforehand."""
+    """Run the experiment node; the demo consents to every run in advance."""
     with demo.stage(f"experiment: runs within {LIMITS}, without asking") as tell:
         values = {"bag": bag, "out": out, "limits": LIMITS, "ask": False, "rig": RIG}
         nodes.start("experiment", values)
@@ -69,7 +67,7 @@ def _session(nodes: Processes, out: Path, bag: Path) -> None:
 
 
 def hidden(bench: Rig) -> str:
-    """Return what was hidden, in words."""
+    """Return the hidden cause in words."""
     cause = bench.effects[-1]
     main = effect_named(cause.name).main
     size = f"{main.name.replace('_', ' ')} {cause.parameters[main.name]:g} {main.unit}"

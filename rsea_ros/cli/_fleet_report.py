@@ -16,7 +16,7 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the pages and say where they are."""
+    """Write the pages and print their path."""
     from rsea_ros.fleet import history, recordings
     from rsea_ros.report.fleet.files import INDEX, write_fleet_report
 

@@ -21,35 +21,35 @@ if TYPE_CHECKING:
 
 GIGA = 1e9
 MOST_SHOWN = 10
-"""Quarantined recordings that are printed; the store has all."""
+"""Largest number of quarantined recordings to print; the store has all."""
 
 
 def add_run(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `run`."""
     add_work(parser)
-    parser.add_argument("--out", required=True, metavar="STORE", help="folder of the store, made or added to")
+    parser.add_argument("--out", required=True, metavar="STORE", help="folder of the store, new or existing")
     add_fail_on(parser, ("refused", "quarantined"), " (of rows that this run writes)")
 
 
 def add_work(parser: argparse.ArgumentParser) -> None:
-    """Declare what says which recordings are worked through, how, and where."""
+    """Declare the options for sources, processing and workers."""
     add = parser.add_argument
     add("sources", nargs="+", metavar="SOURCE", help="folder, bag, pattern in quotes, URL, or @FILE: a list")
-    add("--map", required=True, metavar="joints.yaml", help="which joint has which rig and topics")
-    add("--diagnose", choices=get_args(Diagnose), help="which are diagnosed too (default: as the map says)")
-    add("--again", action="store_true", help="try quarantined recordings again")
-    where = parser.add_argument_group("where the work is done")
+    add("--map", required=True, metavar="joints.yaml", help="joint map: rig and topics of each joint")
+    add("--diagnose", choices=get_args(Diagnose), help="recordings to diagnose (default: as in the map)")
+    add("--again", action="store_true", help="retry quarantined recordings")
+    where = parser.add_argument_group("workers")
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine (default: cores)")
     where.add_argument("--memory", type=float, metavar="GB", help="of each worker (default: all, shared)")
-    where.add_argument("--serial", action="store_true", help="in this process, without Dask")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="on a Dask cluster that runs: tcp://HOST:PORT")
-    dashboard = "of Dask's dashboard (default %(default)s; port 0: any)"
+    where.add_argument("--serial", action="store_true", help="use this process only, without Dask")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="use a running Dask cluster: tcp://HOST:PORT")
+    dashboard = "address of the Dask dashboard (default %(default)s; port 0: any)"
     where.add_argument("--dashboard", default="127.0.0.1:0", metavar="HOST:PORT", help=dashboard)
-    where.add_argument("--no-wait", action="store_true", help="refuse where another run writes to the store")
+    where.add_argument("--no-wait", action="store_true", help="refuse if another run writes to the store")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Work through what is new, and say what came of it."""
+    """Process new recordings, and print the outcomes."""
     check_options(args)
     summary = worked(args, args.out, bags_in(args))
     print(summary.sentence())
@@ -74,7 +74,7 @@ def bags_in(args: argparse.Namespace) -> list[Held]:
 
 
 def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
-    """Write the rows of all new recordings, and return what came of it."""
+    """Write the rows of all new recordings, and return the outcomes."""
     from rsea_ros.fleet.engine import Engine, Limits
     from rsea_ros.fleet.plan import is_anything_new
     from rsea_ros.fleet.store import locked, open_store
@@ -93,7 +93,7 @@ def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
 
 @contextmanager
 def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]:
-    """Give where the tasks run. memory: bytes of each worker on this machine."""
+    """Return the executor of the tasks. memory: bytes of each worker on this machine."""
     if args.serial:
         with serial() as here:
             yield here
@@ -112,7 +112,7 @@ def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Refuse options that make no sense together, before any work."""
+    """Refuse contradictory options before any work."""
     if args.serial and args.scheduler:
         raise ParameterError("--serial and --scheduler: expected one of them")
     if args.workers is not None and args.workers < 1:
@@ -134,5 +134,5 @@ def _memory(args: argparse.Namespace) -> int:
 
 
 def _say_waiting(holder: str) -> None:
-    print(f"rsea fleet: {holder} is writing to the store: this run begins when that one has ended",
+    print(f"rsea fleet: {holder} is writing to the store: this run waits until it has ended",
           file=sys.stderr, flush=True)  # fmt: skip

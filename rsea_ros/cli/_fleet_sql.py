@@ -1,4 +1,4 @@
-"""`rsea fleet sql`: a question to a store, answered by DuckDB."""
+"""`rsea fleet sql`: query a store with DuckDB."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rsea_ros.cli._columns import columns
 from rsea_ros.report.json_values import strict
 
 _WIDEST = 60
-"""Characters of a cell on a terminal."""
+"""Largest width of a cell on a terminal, characters."""
 
 
 def add_sql(parser: argparse.ArgumentParser) -> None:
@@ -24,8 +24,8 @@ def add_sql(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--store", required=True, help="folder of the store")
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--json", action="store_true", help="a list of objects")
-    form.add_argument("--csv", action="store_true", help="a line for each row, after one of names")
+    form.add_argument("--json", action="store_true", help="print a list of JSON objects")
+    form.add_argument("--csv", action="store_true", help="print CSV: a line of names, then one line per row")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON can hold it."""
+    """Return a value in a form for JSON."""
     if isinstance(value, (datetime, date)):
         return value.isoformat()
     if isinstance(value, dict):
@@ -66,7 +66,7 @@ def _text(value: Any) -> str:
 
 
 def _cell(value: Any) -> str:
-    """Return a value as a table shows it."""
+    """Return a value as text for a table."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, datetime):

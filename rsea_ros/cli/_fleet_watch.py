@@ -1,4 +1,4 @@
-"""`rsea fleet watch`: new recordings are worked through as they come, and changes are told once each."""
+"""`rsea fleet watch`: process new recordings as they come, and report each change once."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 def add_watch(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `watch`."""
-    parser.add_argument("store", metavar="STORE", help="folder of the store, made or added to")
+    parser.add_argument("store", metavar="STORE", help="folder of the store, new or existing")
     add_work(parser)
-    every = "s between looks at the sources (default %(default)s)"
+    every = "interval between looks at the sources, s (default %(default)s)"
     parser.add_argument("--every", type=float, default=60.0, metavar="S", help=every)
-    once = f"look once, for a scheduler such as cron: exit status {FOUND} where there is a new alarm"
+    once = f"look once, for a scheduler such as cron: exit status {FOUND} if there is a new alarm"
     parser.add_argument("--once", action="store_true", help=once)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look, work, tell; with --once this once."""
+    """Look, process, report; with --once a single time."""
     check_options(args)
     if not args.every > 0.0:
         raise ParameterError(f"--every {args.every:g} s, expected more than 0")
@@ -41,9 +41,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
-    """Work through recordings, print what is new, and return the number of new alarms.
+    """Process recordings, print news, and return the number of new alarms.
 
-    held: recordings that were the same at the look before, so that none is still being recorded.
+    held: recordings unchanged since the previous look, so that none is still being recorded.
     """
     from rsea_ros.fleet.alarms import tell_alarms
     from rsea_ros.fleet.store import open_store

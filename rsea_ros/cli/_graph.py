@@ -15,7 +15,7 @@ from rsea_ros.wording import did_you_mean, listed
 
 @dataclass(frozen=True)
 class NodeCall:
-    """A node to start. parameters win over the parameter file."""
+    """A node to start. `parameters` override the parameter file."""
 
     name: str
     namespace: str
@@ -24,7 +24,7 @@ class NodeCall:
 
     @property
     def arguments(self) -> list[str]:
-        """The ROS arguments of the process."""
+        """Return the ROS arguments of the process."""
         given = [word for name, value in self.parameters.items() for word in ("-p", f"{name}:={value}")]
         namespace = f"__ns:=/{self.namespace.strip('/')}"
         return ["--ros-args", "-r", namespace, "--params-file", str(self.file), *given]
@@ -44,7 +44,7 @@ def arguments_of_graphs() -> Mapping[str, tuple[str, str]]:
 
 
 def node_calls(graph: str, assignments: Sequence[str]) -> list[NodeCall]:
-    """Return the nodes that a graph starts with some arguments, `name:=value` each.
+    """Return the nodes of a graph for arguments of the form `name:=value`.
 
     Raises ParameterError for a graph or an argument that does not exist.
     """
@@ -95,5 +95,5 @@ def _config() -> Path:
 
 
 def _share() -> Path:
-    """Return where config/ and launch/ lie: the clone, or the share of the installed package."""
+    """Return the folder of config/ and launch/: the clone, or the share of the installed package."""
     return next(folder.parents[1] for folder in rig_folders())

@@ -17,7 +17,7 @@ def map_names() -> list[str]:
 def map_path(name: str) -> Path:
     """Return the file of a map given by path, or by the bare name of one in config/imports.
 
-    Raises ParameterError for a name that is neither.
+    Raises ParameterError for any other name.
     """
     path = Path(name)
     if path.suffix or path.exists():

@@ -1,4 +1,4 @@
-"""A node as a process of its own."""
+"""A node as a separate process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from rsea_ros import processes
 
 POLL = 0.1
-"""s between looks at whether nodes still run."""
+"""s, interval between checks of the running nodes."""
 stop = processes.stop
 
 

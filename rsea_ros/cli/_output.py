@@ -1,4 +1,4 @@
-"""Options of every verb that writes: where to, whether files that exist may be replaced, and JSON instead."""
+"""Options of every verb that writes: destination, whether existing files may be replaced, JSON instead."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from rsea_ros.errors import OutputError
 from rsea_ros.new_files import Place, check_free
 
 FOUND = 1
-"""Exit status for a finding that --fail-on names."""
+"""Exit status for a finding listed in --fail-on."""
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Declare --force."""
-    parser.add_argument("--force", action="store_true", help="replace files that exist (never an input)")
+    parser.add_argument("--force", action="store_true", help="replace existing files (never an input)")
 
 
 def add_results(parser: argparse.ArgumentParser, files: str, default: str) -> None:
@@ -35,7 +35,7 @@ def print_file(path: Path) -> None:
 
 
 def add_fail_on(parser: argparse.ArgumentParser, findings: Sequence[str], note: str = "") -> None:
-    """Declare --fail-on. findings: what it may name; the verb returns FOUND for those."""
+    """Declare --fail-on. findings: its possible values; the verb returns FOUND for them."""
     parser.add_argument(
         "--fail-on",
         nargs="+",
@@ -53,9 +53,9 @@ def results_place(
     names: Sequence[str],
     inputs: Iterable[str | Path | None] = (),
 ) -> Place:
-    """Return where a verb's results go: --out, else a name that no other run has (NAME, NAME-2, …).
+    """Return the folder of the results: --out, else a free name (NAME, NAME-2, …).
 
-    Raises OutputError, before any work, where --out is a file, holds results, or is the place of an input.
+    Raises OutputError, before any work, if --out is a file, holds results, or is the folder of an input.
     """
     if args.out is None:
         return Place(Path(default), fresh=True)

@@ -1,4 +1,4 @@
-"""Nodes as processes of their own on a private ROS domain, each with its log."""
+"""Nodes as separate processes on a private ROS domain, each with its log."""
 
 from __future__ import annotations
 
@@ -45,15 +45,15 @@ class Processes:
             self.stop(*self._running)
 
     def log(self, node: str) -> Path:
-        """Return where the output of a node goes, of its last start."""
+        """Return the log file of the last start of a node."""
         return self._log_of.get(node, self._logs / f"{node}.log")
 
     def pid(self, node: str) -> int:
-        """Return the number of a node's process."""
+        """Return the process ID of a node."""
         return self._running[node].pid
 
     def start(self, node: str, parameters: Mapping[str, object]) -> None:
-        """Start a node; signals of the terminal reach only this process, which stops the node itself."""
+        """Start a node; signals of the terminal reach only this process, which then stops the node."""
         options = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_text(value)}")]
         names = (self._logs / (f"{node}-{k}.log" if k > 1 else f"{node}.log") for k in count(1))
         self._log_of[node] = next(name for name in names if not name.exists())
@@ -63,9 +63,9 @@ class Processes:
             )
 
     def wait(self, node: str, timeout: float, progress: Callable[[float], None] = lambda share: None) -> None:
-        """Wait until a node has ended, telling the share that it last logged as a percentage.
+        """Wait until a node has ended, and report the last percentage that it logged.
 
-        Raises RseaError when it fails, when another one ends before it, and after `timeout` seconds.
+        Raises RseaError if it fails, if another one ends before it, and after `timeout` seconds.
         """
         deadline = time.monotonic() + timeout
         while self._running[node].poll() is None:
@@ -82,7 +82,7 @@ class Processes:
         progress(1.0)
 
     def stop(self, *nodes: str) -> None:
-        """Ask nodes to end (SIGTERM) and wait for it; kill what does not."""
+        """Stop the nodes (SIGTERM), wait, and kill those that do not end."""
         stop([self._running.pop(node) for node in nodes])
 
     def _share(self, node: str) -> float:
@@ -90,14 +90,14 @@ class Processes:
         return int(found[-1]) / 100.0 if found else 0.0
 
     def _failure(self, node: str, what: str) -> RseaError:
-        """Return an error with the last words of a node."""
+        """Return an error with the last line of a node."""
         lines = self.log(node).read_text(errors="replace").splitlines()
         last = re.sub(r"^\[\w+\] \[[\d.]+\] \[[^]]*\]: ", "", lines[-1]) if lines else "no output"
         return RseaError(f"{node} {what}: {last} (log: {self.log(node)})")
 
 
 def _text(value: object) -> str:
-    """Return a parameter as ROS reads it on a command line."""
+    """Return a parameter in the syntax of a ROS command line."""
     if isinstance(value, bool):
         return str(value).lower()
     return json.dumps(str(value), ensure_ascii=False) if isinstance(value, (str, Path)) else str(value)

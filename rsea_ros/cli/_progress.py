@@ -11,7 +11,7 @@ from rsea_ros.wording import printable
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[str, float], None]]:
-    """Give a function (step, share done from 0 to 1) that draws a bar on stderr when that is a terminal."""
+    """Yield a function (step, share done from 0 to 1) that draws a bar on stderr if stderr is a terminal."""
     if not sys.stderr.isatty():
         yield lambda step, share: None
         return

@@ -1,4 +1,4 @@
-"""The provenance of what a verb writes."""
+"""The provenance of the files that a verb writes."""
 
 from __future__ import annotations
 

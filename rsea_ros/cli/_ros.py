@@ -1,4 +1,4 @@
-"""What nodes need and a wheel alone does not bring."""
+"""Requirements of nodes that the wheel does not install."""
 
 from __future__ import annotations
 
@@ -8,6 +8,6 @@ from rsea_ros.errors import RseaError
 
 
 def need_ros() -> None:
-    """Raise RseaError where there is no rclpy."""
+    """Raise RseaError if rclpy is missing."""
     if find_spec("rclpy") is None:
-        raise RseaError("no rclpy here: nodes run by ./rsea in a clone, or beside a sourced ROS 2")
+        raise RseaError("rclpy is missing, expected ./rsea in a clone, or a sourced ROS 2")

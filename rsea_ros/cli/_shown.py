@@ -1,4 +1,4 @@
-"""What verbs print, made fit for any terminal and any encoding."""
+"""Output of the verbs, safe for any terminal and any encoding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _ASCII = {
 
 
 class Shown:
-    """A text stream that shows control characters in what is written; on a terminal colours pass."""
+    """A text stream that shows control characters; colours pass on a terminal."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -35,13 +35,13 @@ class Shown:
 
 @contextmanager
 def shown() -> Iterator[None]:
-    """In this block stdout shows control characters, and no encoding makes stdout or stderr fail."""
+    """In this block stdout shows control characters, and stdout and stderr accept every character."""
     codecs.register_error("rsea", _instead)
     before = sys.stdout
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
-    if before is not None:  # closed by whoever started this process
+    if before is not None:  # closed by the parent process
         sys.stdout = Shown(before)
     try:
         yield
@@ -50,7 +50,7 @@ def shown() -> Iterator[None]:
 
 
 def _instead(error: UnicodeError) -> tuple[str, int]:
-    """Return what stands for characters that an encoding lacks."""
+    """Return the replacement for characters that an encoding lacks."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     part = error.object[error.start : error.end]

@@ -1,4 +1,4 @@
-"""Several nodes in the foreground: one word stops them all, and none stays behind."""
+"""Several nodes in the foreground; one signal stops them all."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rsea_ros.interrupts import undisturbed
 
 
 def together(nodes: Mapping[str, Sequence[str]]) -> int:
-    """Run nodes, by name with their arguments, until all have ended; return the first status that is not 0.
+    """Run nodes, by name with their arguments, until all have ended; return the first nonzero status.
 
-    A node that fails ends the others: a graph with a part missing is not what was asked for.
+    If a node fails, the others are stopped, because the graph is no longer complete.
     Raises Stopped, once all have ended, when a signal asks this process to stop.
     """
     running: dict[str, subprocess.Popen[bytes]] = {}

@@ -16,29 +16,31 @@ from rsea_ros.signals import Channel, Record
 def add_topic_options(parser: argparse.ArgumentParser) -> None:
     """Declare --namespace, --topic, --joint and --axis."""
     default = TopicMap()
-    group = parser.add_argument_group("bags of another machine")
-    group.add_argument("--namespace", default=default.namespace, help="of the topics (default %(default)s)")
+    group = parser.add_argument_group("topics of another machine")
+    group.add_argument(
+        "--namespace", default=default.namespace, help="namespace of the topics (default %(default)s)"
+    )
     group.add_argument(
         "--topic",
         action="append",
         default=[],
         metavar="ROLE=TOPIC",
-        help=f"another name; ROLE: {', '.join(ROLES)}",
+        help=f"another topic name; ROLE: {', '.join(ROLES)}",
     )
-    group.add_argument("--joint", help="which joint, where the messages hold several")
+    group.add_argument("--joint", help="name of the joint, if the messages hold several")
     axes = ", ".join(AXES)
     group.add_argument(
-        "--axis", default=default.axis, help=f"actuator axis of the wrench: {axes}; - in front turns it"
+        "--axis", default=default.axis, help=f"actuator axis of the wrench: {axes}; a leading - reverses it"
     )
 
 
 def topic_map(args: argparse.Namespace) -> TopicMap:
-    """Return the map that the options ask for. Raises ParameterError for one that makes no sense."""
+    """Return the topic map of the options. Raises ParameterError for an impossible one."""
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
 
 
 def each_once(bags: Sequence[str]) -> Sequence[str]:
-    """Return bags. Raises ParameterError for one that is given twice: its samples would count twice."""
+    """Return the bags. Raises ParameterError for a bag given twice, whose samples would count twice."""
     places = [os.path.realpath(bag) for bag in bags]
     for bag, place in zip(bags, places, strict=True):
         if places.count(place) > 1:
@@ -49,22 +51,22 @@ def each_once(bags: Sequence[str]) -> Sequence[str]:
 def add_window_options(parser: argparse.ArgumentParser) -> None:
     """Declare --from, --to, --window and --shift."""
     group = parser.add_argument_group("a part of the record, s since its first stamp")
-    group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out what comes before")
-    group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out what comes after")
+    group.add_argument("--from", dest="begin", type=float, metavar="S", help="leave out samples before S")
+    group.add_argument("--to", dest="end", type=float, metavar="S", help="leave out samples after S")
     group.add_argument("--window", metavar="A:B", help="the same as --from A --to B")
     group.add_argument(
         "--shift",
         action="append",
         default=[],
         metavar="CHANNEL=S",
-        help="add S (s) to the stamps of a channel, one that another clock has stamped",
+        help="add S seconds to the stamps of a channel that another clock has stamped",
     )
 
 
 def cut(record: Record, args: argparse.Namespace) -> Record:
-    """Return the part of a record that the options ask for; stamps keep their origin but for --shift.
+    """Return the part of a record selected by the options; stamps keep their origin except for --shift.
 
-    Raises ParameterError for a window that makes no sense or holds no sample, and for a shift of no channel.
+    Raises ParameterError for an invalid or empty window, and for a shift of an unknown channel.
     """
     record = _shifted(record, args.shift)
     begin, end = _window(args)
@@ -82,7 +84,7 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
 
 
 def _shifted(record: Record, shifts: Sequence[str]) -> Record:
-    """Return the record with the stamps of some channels moved. shifts: CHANNEL=S each."""
+    """Return the record with shifted stamps of some channels. shifts: CHANNEL=S each."""
     for shift in shifts:
         name, _, text = shift.partition("=")
         try:

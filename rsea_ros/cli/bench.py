@@ -1,4 +1,4 @@
-"""`rsea bench`: the paper's bench on a wire, for the driver to be tried without hardware."""
+"""`rsea bench`: the paper's bench on simulated wires, to try the driver without hardware."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free
 
-HELP = "a motor on a pseudo-terminal and an F/T sensor on UDP, with a simulated plant behind both"
+HELP = "simulate a bench behind real wires: a motor on a pseudo-terminal and an F/T sensor on UDP"
 EXAMPLE = "rsea bench --rig paper_high_impedance --port bench_tty"
 PLANT_RATE = 2000.0
 
@@ -33,24 +33,24 @@ PLANT_RATE = 2000.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--port", type=Path, default=Path("rsea-bench-tty"), help="link to the pseudo-terminal")
+    add("--port", type=Path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
     add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",
-        help="number of the motor; of several on one line, with the IDs 1, 2, …: the sensor is on the first")
-    add("--rig", default=RIG, help="the plant: a name in config/rigs, or a file")
-    add("--ft-rate", type=float, default=1000.0, help="records a second, Hz, 1 to 7000")
-    add("--torque-constant", type=float, default=0.0, help="N m at the gear output per A; 0: its model's")
-    add("--return-delay", type=int, default=0, help="pause before an answer, unit 2 µs, 0 to 254")
-    add("--seed", type=seed, default=0, help="of the sensors' noise and of the misbehaviour")
-    add("--requests", action="store_true", help="take requests to misbehave on stdin, a JSON object a line")
+        help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
+    add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")
+    add("--ft-rate", type=float, default=1000.0, help="record rate of the F/T sensor, Hz, 1 to 7000")
+    add("--torque-constant", type=float, default=0.0, help="N m at the output per A; 0: that of the model")
+    add("--return-delay", type=int, default=0, help="delay of each reply, unit 2 µs, 0 to 254")
+    add("--seed", type=seed, default=0, help="seed of the sensor noise and of the misbehaviour")
+    add("--requests", action="store_true", help="read requests to misbehave from stdin, JSON lines")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Say in one line of JSON where the bench is, and run it until stdin ends, or SIGINT or SIGTERM."""
+    """Print the ports of the bench in one line of JSON, and run it until stdin ends, or SIGINT or SIGTERM."""
     if not 1.0 <= args.ft_rate <= 7000.0:
         raise ParameterError(f"--ft-rate {args.ft_rate:g} Hz, expected 1 to 7000 Hz")
     if not 0 <= args.return_delay <= 254:
         raise ParameterError(f"--return-delay {args.return_delay}, expected 0 to 254 (unit 2 µs)")
-    if not args.port.is_symlink():  # a link is what a bench that was killed leaves
+    if not args.port.is_symlink():  # a killed bench leaves its link
         check_free([args.port])
     wrong = Misbehaviour(seed=args.seed)
     plants, motors = _motors(args)
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
     ports = {"ft_port": sensor.port, "page_port": sensor.page}
     gc.freeze()
-    gc.disable()  # a motor does not pause to tidy up
+    gc.disable()  # a real motor does not stop for garbage collection
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.default_int_handler)
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _motors(args: argparse.Namespace) -> tuple[list[SimulatedDevice], list[Motor]]:
-    """Return each motor's plant, which runs, and each motor, with the IDs 1, 2, …"""
+    """Return the running plant of each motor, and the motors, with the IDs 1, 2, …"""
     rig = load_rig(args.rig)
     plants, motors = [], []
     for place, model in enumerate(args.model):

@@ -1,4 +1,4 @@
-"""`rsea check`: a traffic light for every thing that a record must have before a fit is worth its time."""
+"""`rsea check`: a traffic light for each property that a fit needs of a record."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from rsea_ros.signals import Channel
 if TYPE_CHECKING:
     from rsea_ros.checks.finding import Findings
 
-HELP = "topics, rates, clocks, noise, sign, scale, rig: a traffic light a line, in seconds"
+HELP = "check topics, rates, clocks, noise, sign, scale and rig of a record in seconds"
 EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
 NARROWEST = 140
-"""Columns of the table where no terminal says how many it has."""
+"""Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--fail-on",
         choices=("red", "amber"),
-        help=f"exit status {FOUND} when a light is this one or worse",
+        help=f"exit status {FOUND} if a light is this one or worse",
     )
     add_topic_options(parser)
     add_window_options(parser)
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
     rig, topics = load_rig(args.rig), topic_map(args)
     records = [cut(read_record([bag], topics=topics, strict=False), args) for bag in args.bags]
-    from rsea_ros.checks.check import check_record  # after the bags: a bad one is refused at once
+    from rsea_ros.checks.check import check_record  # after the bags, so that a bad bag is refused at once
     from rsea_ros.checks.finding import LIGHTS, worst
 
     checks = [
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[str, Channel]:
-    """Return every axis of a bag's wrench by its name, for a check whose own axis is dead."""
+    """Return every axis of the wrench of a bag by name, for a check with a dead axis."""
     found = {}
     for axis in AXES:
         try:

@@ -1,4 +1,4 @@
-"""`rsea control`: gains for a rig by synthesis, their margins, and what the controlled actuator can do."""
+"""`rsea control`: gains of the torque controller for a rig, their margins, and the resulting performance."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--free",
         metavar="RIG",
-        help="rig whose ends are the lightest load (default: the rig, the paper's pendulum if it is clamped)",
+        help="rig whose ends are the lightest load (default: the rig; the paper's pendulum if it is clamped)",
     )
     parser.add_argument(
-        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="(default 280 1000)"
+        "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="Hz (default 280 1000)"
     )
     add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
     add_json(parser, CONTROL_JSON)
-    parser.add_argument("--fail-on", choices=["missed"], help="status 1 when a trial misses what is asked")
+    parser.add_argument("--fail-on", choices=["missed"], help="exit status 1 if a trial misses its limit")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Design, try, write the results."""
+    """Design the controller, run the trials, write the results."""
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def motors(rig: Rig) -> list[Motor]:
-    """Return the driver's limit, and those of the catalogue's unit that has the rig's gear ratio."""
+    """Return the limit of the driver, and those of the catalogue unit with the gear ratio of the rig."""
     from rsea_ros.control.controller import Limits
     from rsea_ros.control.study import Motor
     from rsea_ros.design.catalogue import catalogue

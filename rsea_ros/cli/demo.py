@@ -1,4 +1,4 @@
-"""`rsea demo`: the main job on a simulated bench, through real topics between real processes."""
+"""`rsea demo`: the whole loop on a simulated bench, through real topics between real processes."""
 
 from __future__ import annotations
 
@@ -28,40 +28,44 @@ from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.new_files import unused
 from rsea_ros.report.fault_words import fault_lines
 
-HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and leave a report"
+HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and write a report"
 EXAMPLE = "rsea demo --out first_demo"
 NAMES = (
     "bag", "bag-2", "bench.yaml", "log", "identification.json", "experiment.json", "model.yaml", "report.html"
 )  # fmt: skip
 DISTURBANCES = {"commands_left_out", "late_commands", "lost_messages", "watchdog_trips"}
-"""Faults of a bag whose bench or excitation was held up: its commands did not act as it says."""
+"""Faults of a bag after a delay of bench or excitation: commands did not act at their stamps."""
 SHORT, FULL = 20.0, 160.0
 SPREAD = 0.1
 PACE = 10.0
 PATIENT = {"latency": 0.02, "lost_cycles": 30, "ft_timeout": 0.5, "command_timeout": 0.5, "watchdog": 1.0}
-"""The bench on a wire is a process too, which a busy machine may hold up for longer than a motor would be."""
+"""The bench on a wire is a process, which a busy machine can delay for longer than a motor."""
 EXCITED = {"slew_limit": 25_000.0, "effort_limit": 0.0}
 """The paper's excitation changes by 23 000 N m/s."""
 START_UP = 60.0
-"""Seconds that a node may take beside its work: a cold start compiles the simulation."""
+"""s, allowed for a node in addition to its work: a cold start compiles the simulation."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("--full", action="store_true", help="the paper's 160 s of excitation instead of 20 s")
     parser.add_argument(
-        "--experiment", action="store_true", help="find a hidden cause by runs that are designed one by one"
+        "--full", action="store_true", help="use the paper's 160 s of excitation instead of 20 s"
     )
-    parser.add_argument("--wire", action="store_true", help="the plant behind real wires, and the driver")
+    parser.add_argument(
+        "--experiment", action="store_true", help="find a hidden cause by runs designed one after another"
+    )
+    parser.add_argument(
+        "--wire", action="store_true", help="put the plant behind real wires and use the driver"
+    )
     parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
-        "--seed", type=seed, default=1, help="of true values, excitation and noise (default 1)"
+        "--seed", type=seed, default=1, help="seed of true values, excitation and noise (default 1)"
     )
     parser.add_argument("--domain", type=int, help="ROS domain, 0 to 101 (default: a random one)")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Play the loop, then print identified beside true values and the path of the report."""
+    """Run the loop, then print identified and true values and the path of the report."""
     need_ros()
     out = directory(args.out)
     domain = random.randint(1, 101) if args.domain is None else args.domain
@@ -73,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         return show(out, domain, args)
     bench = bench_of(load_rig(RIG), args.seed)
     save_rig(bench, out / "bench.yaml")
-    print(f"{RIG}, its true values up to {100.0 * SPREAD:g} % off, which only the plant knows")
+    print(f"{RIG}, with true values up to {100.0 * SPREAD:g} % off, known to the plant only")
     with Processes(out / "log", domain) as nodes:
         bag = recorded(nodes, out, duration, args)
         evaluate(nodes, bag, out, duration)
@@ -84,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def directory(out: Path | None) -> Path:
-    """Return where everything goes. Raises ParameterError for a directory that holds some of it already."""
+    """Return the directory of all results. Raises ParameterError if it already holds some of them."""
     if out is None:
         return unused(Path("out") / time.strftime("demo-%Y%m%d-%H%M%S"))
     for name in NAMES:
@@ -94,10 +98,10 @@ def directory(out: Path | None) -> Path:
 
 
 def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namespace) -> Path:
-    """Record the bench, once more where the bag says that this machine was too busy; return the bag."""
+    """Record the bench, a second time if this machine was too busy; return the bag."""
     for bag, consequence in (
-        (out / "bag", "once more"),
-        (out / "bag-2", "again; what follows is of a run that was disturbed"),
+        (out / "bag", "recording once more"),
+        (out / "bag-2", "again; the results come from a disturbed run"),
     ):
         with source(nodes, out, args) as name:
             measure(nodes, bag, duration, args.seed, name)
@@ -109,14 +113,14 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
 
 
 def bench_of(rig: Rig, seed: int) -> Rig:
-    """Return a rig whose free values are off by up to SPREAD, at random."""
+    """Return a rig whose free values differ at random by up to SPREAD."""
     rng = np.random.default_rng(seed)
     return rig.with_values({n: rig[n] * (1.0 + SPREAD * rng.uniform(-1.0, 1.0)) for n in rig.free()})
 
 
 @contextmanager
 def stage(title: str) -> Iterator[Callable[[float], None]]:
-    """Say what begins; what it yields is told the share done, 0 to 1."""
+    """Print the step that begins; the yielded function takes the share done, 0 to 1."""
     print(title, flush=True)
     with progress(title.partition(":")[0]) as tell:
         yield lambda share: tell("", share)
@@ -124,7 +128,7 @@ def stage(title: str) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[str]:
-    """Start where the measurements come from: the plant, or the driver with a bench on its wires."""
+    """Start the source of the measurements: the plant, or the driver with a bench on its wires."""
     rig = out / "bench.yaml"
     if not args.wire:
         nodes.start("plant", {"rig": rig, "seed": args.seed})
@@ -139,7 +143,7 @@ def source(nodes: Processes, out: Path, args: argparse.Namespace) -> Iterator[st
 
 
 def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str) -> None:
-    """Play the paper's excitation to the bench and record it."""
+    """Play the paper's excitation on the bench and record it."""
     with stage(f"{first}, excite, record: chirp and noise for {duration:g} s") as tell:
         nodes.start("record", {"out": bag})
         nodes.start("excite", {"duration": duration, "seed": seed, "subscribers": 2})
@@ -148,8 +152,8 @@ def measure(nodes: Processes, bag: Path, duration: float, seed: int, first: str)
 
 
 def evaluate(nodes: Processes, bag: Path, out: Path, duration: float) -> None:
-    """Play the bag to the identification."""
-    with stage(f"replay, identify: the bag {PACE:g} times as fast") as tell:
+    """Replay the bag to the identification."""
+    with stage(f"replay, identify: the bag at {PACE:g} times the speed") as tell:
         nodes.start("identify", {"rig": RIG, "out": out, "reliable": True})
         nodes.start("replay", {"bag": bag, "rate": PACE})
         nodes.wait("replay", duration / PACE + START_UP, tell)
@@ -178,7 +182,7 @@ def table(start: Rig, true: Rig, found: Rig) -> str:
 
 
 def losses(bag: Path, identify_log: Path) -> str:
-    """Say how many of the bag's messages have reached the identification."""
+    """Print how many messages of the bag reached the identification."""
     wanted = ("torque_command", "joint_states", "ft")
     topics = read_contents(bag).topics
     sent = sum(len(topics[f"/rsea/{name}"].raw) for name in wanted)

@@ -13,18 +13,21 @@ from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
 from rsea_ros.report.file_names import DESIGN_JSON, REPORT
 
-HELP = "the paper's design method: torque, bandwidth and inertia to stiffness and spring rate"
+HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
 SIZES = {
-    "torque": "N m",
-    "bandwidth": "Hz",
-    "inertia": "of the spring chassis, kg m^2",
-    "mass": "of the chassis, kg",
-    "diameter": "of the chassis, m",
-    "separation": "between two springs, m",
-    "spring_radius": "r_s of Eq. (9), m",
+    "torque": "largest torque, N m",
+    "bandwidth": "bandwidth, Hz",
+    "inertia": "inertia of the spring chassis, kg m^2",
+    "mass": "mass of the chassis, kg",
+    "diameter": "diameter of the chassis, m",
+    "separation": "distance between two springs, m",
+    "spring_radius": "radius r_s of Eq. (9), m",
 }
-TOLERANCES = {"tolerance_db": "of |T_d/T_p|, dB", "tolerance_deg": "of its phase, deg; 90: any"}
+TOLERANCES = {
+    "tolerance_db": "tolerance of |T_d/T_p|, dB",
+    "tolerance_deg": "tolerance of its phase, deg; 90: none",
+}
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
 
 
@@ -37,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--deflection",
         type=float,
         default=math.degrees(default.deflection),
-        help="largest, deg (default %(default).3g)",
+        help="largest deflection, deg (default %(default).3g)",
     )
     for name in TOLERANCES:
         _add_demand(parser, default, name)
@@ -45,12 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stiffness",
         type=float,
         default=STIFFNESS,
-        help="to be judged, N m/rad (default %(default)s, the paper's)",
+        help="stiffness to test, N m/rad (default %(default)s, the paper's)",
     )
-    parser.add_argument("--unit", default=UNIT, help="motor and gear of the catalogue (default %(default)s)")
-    parser.add_argument(
-        "--train", choices=TRAINS, help="of the gear, where the unit's own is another (default: the unit's)"
-    )
+    parser.add_argument("--unit", default=UNIT, help="motor-gear unit of the catalogue (default %(default)s)")
+    parser.add_argument("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
     parser.add_argument(
         "--catalogue",
         type=Path,
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")
     add_json(parser, DESIGN_JSON)
-    parser.add_argument("--fail-on", choices=["unmet"], help="status 1 when the stiffness misses a demand")
+    parser.add_argument("--fail-on", choices=["unmet"], help="exit status 1 if the stiffness misses a demand")
 
 
 def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str) -> None:
@@ -72,7 +73,7 @@ def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str
 
 
 def run(args: argparse.Namespace) -> int:
-    """Judge the stiffness, find those that meet all demands, write the results."""
+    """Test the stiffness, find the stiffnesses that meet all demands, write the results."""
     from rsea_ros.design.catalogue import unit_named
     from rsea_ros.design.judge import judge, least_stiffness
     from rsea_ros.design.margins import robust_stiffness
@@ -117,7 +118,7 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
             f"{check.unit}"
         )
     print(
-        f"least stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
+        f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
         f"{least.rate:.0f} N/m"
     )
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):

@@ -1,4 +1,4 @@
-"""`rsea diagnose`: what the simulation gets wrong, why, and how much knowing it gains."""
+"""`rsea diagnose`: the causes of the simulation error, and the improvement from each."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
 from rsea_ros.report.file_names import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
 from rsea_ros.signals import Record
 
-HELP = "what the simulation gets wrong, the cause, the extended model and the gain"
+HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
 FAULTS = "faults"
 _MUCH = 0.2
-"""Of what is wrong: with more than that unexplained, the next step is a law for what has no name."""
+"""Share of the residual above the noise; if more stays unexplained, the next step is `rsea law`."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,10 +29,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add_runs(parser, "several runs of one bench")
     add_rig(parser)
-    add("--holdout", metavar="BAG", help="a run that only judges (default: every fourth second of the runs)")
+    add("--holdout", metavar="BAG", help="a run for testing only (default: every fourth second of the runs)")
     add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
-    add("--without", nargs="+", action="extend", default=[], metavar="EFFECT", help="effects not to try")
-    most = "causes at most (default %(default)s)"
+    add(
+        "--without",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="EFFECT",
+        help="effects to leave out of the search",
+    )
+    most = "largest number of causes (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
     add_json(parser, DIAGNOSIS_JSON)
     add_fail_on(parser, (*get_args(Verdict), FAULTS), " (of the data)")
@@ -56,7 +63,9 @@ def run(args: argparse.Namespace) -> int:
         raw, records = records[0], checked(records, rig, topics.axis, quiet=args.json, masks=True)
         holdout = records.pop() if args.holdout else None
         from rsea_ros.cli._provenance import provenance
-        from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
+        from rsea_ros.diagnosis.diagnose import (
+            diagnose,
+        )  # after the bags, so that a bad bag is refused at once
         from rsea_ros.effects.catalogue import effect_named
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
@@ -71,15 +80,15 @@ def run(args: argparse.Namespace) -> int:
         _print(result, report)
         if left_unexplained(result) > _MUCH:
             model = report.parent / MODEL
-            print(f"law         of what is left: rsea law {' '.join(args.bags)} --rig {model}")
+            print(f"law         of the remaining residual: rsea law {' '.join(args.bags)} --rig {model}")
     findings = {result.verdict, *([FAULTS] if result.faults else [])}
     return FOUND if findings.intersection(args.fail_on) else 0
 
 
 def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None) -> Record:
-    """Return a run with all its faults, which are findings. args: what to cut of it, if anything.
+    """Return a run with all its faults, which are findings. args: options that cut it, or None.
 
-    Raises BagError or IdentificationError for one that cannot be diagnosed at all.
+    Raises BagError or IdentificationError for a run that cannot be diagnosed.
     """
     from rsea_ros.checks.usable import check_diagnosable
     from rsea_ros.model.extent import bounded
@@ -91,7 +100,7 @@ def readable(bag: str, topics: TopicMap, args: argparse.Namespace | None = None)
 
 
 def left_unexplained(result: Diagnosis) -> float:
-    """Return which share of what the baseline leaves above the noise, as power, the causes leave still."""
+    """Return the power above the noise with the causes, relative to that of the baseline."""
     n = result.channel
     noise, before, after = (
         rms.get(n, 0.0) ** 2 for rms in (result.noise_rms, result.residual_rms, result.extended_residual_rms)

@@ -1,16 +1,18 @@
-"""`rsea effects`: the catalogue of what a simulation may lack."""
+"""`rsea effects`: the catalogue of effects."""
 
 from __future__ import annotations
 
 import argparse
 
-HELP = "the effects that a diagnosis can name: equation, parameters, units, typical sizes, source"
+HELP = "list the effects that a diagnosis can name: equation, parameters, units, typical sizes, source"
 EXAMPLE = "rsea effects backlash"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("name", nargs="?", help="one of them in full (default: a line for each)")
+    parser.add_argument(
+        "name", nargs="?", help="the effect to show in full (default: one line for each effect)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

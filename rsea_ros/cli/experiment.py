@@ -1,4 +1,4 @@
-"""`rsea experiment`: the run that tells apart the causes that are still possible."""
+"""`rsea experiment`: the run that separates the remaining causes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rsea_ros.experiment.hypothesis import Hypothesis
     from rsea_ros.identification.solver import Map
 
-HELP = "the run that tells apart the causes still possible, within a bench's limits"
+HELP = "design the run that separates the remaining causes, within the limits of a bench"
 EXAMPLE = "rsea experiment friction/model.yaml play/model.yaml --limits torque=20,velocity=1"
 NO_RUN = "no_run"
 
@@ -36,16 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     what = "model.yaml of each cause (its last effect), a diagnosis.json beside its model.yaml, or a rig"
     add("models", nargs="+", metavar="MODEL", help=what)
-    add("--limits", required=True, metavar="NAME=VALUE,…", help=f"largest sizes either way: {units}")
-    add("--bag", nargs="+", action="extend", default=[], help="runs so far, by which the causes are weighed")
-    add("--rate", type=positive, default=280.0, help="commands a second, Hz (default %(default)g)")
-    add("--longest", type=positive, default=10.0, help="s of the run (default %(default)g)")
+    add("--limits", required=True, metavar="NAME=VALUE,…", help=f"limits in both directions: {units}")
+    add("--bag", nargs="+", action="extend", default=[], help="earlier runs, which weigh the causes")
+    add("--rate", type=positive, default=280.0, help="rate of the commands, Hz (default %(default)g)")
+    add("--longest", type=positive, default=10.0, help="longest duration of the run, s (default %(default)g)")
     add(
         "--refine",
         type=int,
         default=24,
         metavar="N",
-        help="shapes judged beside the first (default %(default)s)",
+        help="number of shapes to compare (default %(default)s)",
     )
     add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
     add_json(parser, EXPERIMENT_JSON)
@@ -96,9 +96,9 @@ def models_in(path: str) -> list[Model]:
 def _possible(
     models: Sequence[Model], args: argparse.Namespace, run: Map
 ) -> tuple[list[Hypothesis], dict[str, float], dict[str, float]]:
-    """Return the hypotheses; as bags show it, the noise by channel, and the causes that they exclude.
+    """Return the hypotheses; from bags, the noise by channel and the excluded causes.
 
-    With bags, that there is no cause at all is a hypothesis too.
+    With bags, one more hypothesis is that there is no cause.
     """
     from rsea_ros.experiment.files import hypotheses_from
 

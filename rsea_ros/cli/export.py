@@ -1,4 +1,4 @@
-"""`rsea export`: a rig for other programs, with what they cannot say of it."""
+"""`rsea export`: a rig as a model of another program, and the parts that it cannot express."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from rsea_ros.exports.difference import Difference
     from rsea_ros.model.rig import Rig
 
-HELP = "a rig as a model for MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and what that cannot say"
+HELP = "convert a rig to MuJoCo, FMI, URDF, SDF, Isaac Lab or BAM, and list the parts left out"
 EXAMPLE = "rsea export --mjcf paper_high_impedance --out bench.xml"
 TARGETS = {
     "mjcf": "MJCF for MuJoCo 4",
-    "urdf": "URDF, with a block of our own",
-    "sdf": "SDF 1.11, with a block of our own",
+    "urdf": "URDF, with a block of all values",
+    "sdf": "SDF 1.11, with a block of all values",
     "fmu": "FMU for co-simulation, FMI 3",
     "isaac": "actuator of Isaac Lab, a Python file",
     "bam": "parameters of BAM (M1 to M6), JSON",
@@ -42,18 +42,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_force(parser)
     effect = "switch an effect on, SI units"
     add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)
-    add("--actuator", default="", metavar="NAME", help="of --bam: BAM's name of the servo, such as mx106")
-    add("--no-play", action="store_true", help="write the file without playing it")
-    played = "what --mjcf and --fmu play and simulate: a chirp of so many s"
+    add("--actuator", default="", metavar="NAME", help="for --bam: name of the servo in BAM, such as mx106")
+    add("--no-play", action="store_true", help="write the file without verifying it")
+    played = "duration of the chirp that verifies --mjcf and --fmu, s"
     add("--duration", type=positive, default=DURATION, help=f"{played} (default %(default)s)")
-    add("--amplitude", type=positive, help="of that chirp, N m, of a joint rad (default 10 N m, 0.4 rad)")
-    limit = "exit status 1 where a channel differs by more than this many times its sensor's noise"
+    size = "amplitude of the chirp, N m, or rad for a position loop (default 10 N m, 0.4 rad)"
+    add("--amplitude", type=positive, help=size)
+    limit = "exit status 1 if a channel differs by more than TIMES times its noise"
     add("--limit", type=positive, metavar="TIMES", help=limit)
-    add("--json", action="store_true", help="print what is said, left out and different as JSON")
+    add("--json", action="store_true", help="print content, omissions and differences as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Export, play, write, and say what the target says."""
+    """Export, verify, write, and report."""
     from rsea_ros.cli.simulate import parse_effect
     from rsea_ros.model.effect_settings import check_effects
     from rsea_ros.model.rig_file import load_rig
@@ -95,9 +96,9 @@ def _exporters(args: argparse.Namespace) -> Mapping[str, Callable[[Rig], Export]
 
 
 def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Difference, ...], str]:
-    """Return the differences to our simulation, and why there are none.
+    """Return the differences to our simulation, and the reason if there are none.
 
-    Raises ParameterError where --limit asks for them and they cannot be had.
+    Raises ParameterError if --limit needs them and they are not available.
     """
     from rsea_ros.errors import ParameterError
     from rsea_ros.exports.difference import RATE, differences, ours
@@ -113,7 +114,7 @@ def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Dif
         try:
             theirs = players[made.target](made.content, rig, command)
             found = differences(rig, ours(rig, command, RATE), theirs)
-            why = "" if found else "the rig states no sensor's noise, expected sensors.ft.noise or another"
+            why = "" if found else "the rig states no sensor noise, expected sensors.ft.noise or another"
         except ParameterError as error:
             found, why = (), str(error)
         if found:
@@ -124,7 +125,7 @@ def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Dif
 
 
 def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
-    """Return the chirp that both play, N m or rad."""
+    """Return the chirp that verifies the export, N m or rad."""
     from dataclasses import replace
 
     from rsea_ros.identification.excitation import JOINT, Settings, excitation
@@ -140,7 +141,7 @@ def _excitation(rig: Rig, args: argparse.Namespace, rate: float) -> Any:
 def _lines(
     made: Export, rig: Rig, out: Path, found: tuple[Difference, ...], not_played: str
 ) -> list[str]:
-    """Return for people what was written, said, left out and played."""
+    """Return the report as text: file, content, omissions, differences."""
     from rsea_ros.exports.coverage import coverage_lines
 
     lines = [f"{out}: {TARGETS[made.target]}, of {rig.name}"]

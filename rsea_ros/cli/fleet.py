@@ -9,12 +9,12 @@ from typing import NamedTuple
 from rsea_ros.cli import _fleet_report, _fleet_run, _fleet_sql, _fleet_watch
 from rsea_ros.fleet.extra import need_extra
 
-HELP = "many bags of many joints become one store (run), a report on trends (report), answers (sql)"
+HELP = "process bags of many joints: store (run), reports (report), alarms (watch), queries (sql)"
 EXAMPLE = "rsea fleet run recordings --map joints.yaml --out store && rsea fleet report store --out report"
 
 
 class Action(NamedTuple):
-    """What stands behind a word after `fleet`."""
+    """The interface of an action of `fleet`."""
 
     help: str
     add: Callable[[argparse.ArgumentParser], None]
@@ -22,10 +22,12 @@ class Action(NamedTuple):
 
 
 ACTIONS: Mapping[str, Action] = {
-    "run": Action("work through new recordings, on Dask", _fleet_run.add_run, _fleet_run.run),
-    "report": Action("pages of the fleet and of each joint", _fleet_report.add_report, _fleet_report.run),
-    "watch": Action("run again and again, and tell of changes", _fleet_watch.add_watch, _fleet_watch.run),
-    "sql": Action("ask the store a question", _fleet_sql.add_sql, _fleet_sql.run),
+    "run": Action("process new recordings, with Dask", _fleet_run.add_run, _fleet_run.run),
+    "report": Action(
+        "write pages of the fleet and of each joint", _fleet_report.add_report, _fleet_report.run
+    ),
+    "watch": Action("run at intervals and report changes", _fleet_watch.add_watch, _fleet_watch.run),
+    "sql": Action("query the store", _fleet_sql.add_sql, _fleet_sql.run),
 }
 
 
@@ -37,6 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the action."""
     need_extra()
     return ACTIONS[args.action].run(args)

@@ -18,10 +18,10 @@ from rsea_ros.report.file_names import IDENTIFICATION, IDENTIFICATION_JSON
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
-HELP = "frequency response and parameters with confidence from recorded runs"
+HELP = "identify frequency response and parameters with intervals from recorded runs"
 EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
 NARROWEST = 100
-"""Columns of the table where no terminal says how many it has."""
+"""Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +49,9 @@ def run(args: argparse.Namespace) -> int:
 
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.cli._provenance import provenance
-        from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
+        from rsea_ros.identification.identify import (
+            identify,
+        )  # takes 0.7 s, which a refused bag need not wait for
         from rsea_ros.report.identification.files import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
@@ -62,13 +64,14 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print(result: Identification, report: Path) -> None:
-    """Print the verdict, the table, and a line for each thing to know beside it."""
+    """Print the verdict, the table, and a line for each remark."""
     from rich.console import Console
 
     from rsea_ros.report.fault_words import fault_lines
     from rsea_ros.report.identification.statics import statics_sentences
     from rsea_ros.report.identification.terminal import terminal_table
     from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
+    from rsea_ros.report.remark_words import remark_sentences
 
     console = Console()
     if not console.is_terminal:
@@ -79,6 +82,7 @@ def _print(result: Identification, report: Path) -> None:
         print(f"data: {line}")
     console.print(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    for sentence in (*found, *doubt_sentences(result), *result.statements, *result.clocks):
+    remarks = remark_sentences([*result.remarks, *result.clocks])
+    for sentence in (*found, *doubt_sentences(result), *remarks):
         print(sentence)
     print(f"report: {report}")

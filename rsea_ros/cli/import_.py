@@ -1,4 +1,4 @@
-"""`rsea import`: a measurement of a real machine becomes a bag."""
+"""`rsea import`: convert a measurement of a real machine to a bag."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import OutputError
 from rsea_ros.new_files import NewFiles, Place, check_free
 
-HELP = "turn a measurement of a real machine (CSV, MAT, Parquet, NPZ, JSON) into a bag, by a map of columns"
+HELP = "convert a measurement (CSV, MAT, Parquet, NPZ, JSON) to a bag by a map of its columns"
 EXAMPLE = "rsea import run.csv --map map.yaml --out run"
 
 
@@ -27,9 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ".npy, .json, .jsonl; a directory for some maps",
     )  # fmt: skip
     parser.add_argument("--map", required=True, help="map file (YAML), or the name of one in config/imports")
-    out = "bag to be made: a directory, or a file .mcap or .db3; the folder of several files, joints or runs"
+    out = (
+        "bag to write: a directory, a file .mcap or .db3; for several files, joints or runs a folder of bags"
+    )
     parser.add_argument("--out", required=True, help=out)
-    which = "which joints, from 0, of columns that hold several (name[#] in a map): 2, or 0,1,2, or 0-5"
+    which = (
+        "numbers of the joints, from 0, in columns that hold several (name[#] in a map): 2, or 0,1,2, or 0-5"
+    )
     parser.add_argument("--index", type=whole_numbers, default=(None,), metavar="N", help=which)
     add_force(parser)
     parser.add_argument("--storage", default="mcap", choices=("mcap", "sqlite3"), help="of a directory")
@@ -37,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bags and say what is in them."""
+    """Write the bags and print their contents."""
     path = map_path(args.map)
     check_free([Path(args.out)], force=args.force, inputs=[*args.files, path])
     mapping = load_map(path)
@@ -52,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
-    """Write a bag for each file, joint and run, all of them or none, and return what is in them."""
+    """Write a bag for each file, joint and run, all or none, and return their contents."""
     folder, names = Path(args.out), set[str]()
     lines: list[str] = []
     if folder.suffix in (".mcap", ".db3"):
@@ -70,7 +74,7 @@ def _write_several(args: argparse.Namespace, mapping: ImportMap) -> list[str]:
 
 
 def _said(imported: Imported, out: str | Path) -> Iterator[str]:
-    """Yield lines on what is in a bag."""
+    """Yield lines on the contents of a bag."""
     record = imported.record
     yield from summary(record, imported.mapping)
     rate = next(iter(record.channels.values())).rate

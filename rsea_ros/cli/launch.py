@@ -1,10 +1,10 @@
-"""`rsea launch`: a graph of nodes, for those who have no `ros2 launch`."""
+"""`rsea launch`: start a graph of nodes without `ros2 launch`."""
 
 from __future__ import annotations
 
 import argparse
 
-HELP = "start a graph of nodes: simulation, hardware or replay; Ctrl-C ends them all"
+HELP = "start a graph of nodes: simulation, hardware or replay; Ctrl-C stops them all"
 EXAMPLE = "rsea launch simulation rig:=paper_moving_output excite:=true record:=true"
 
 

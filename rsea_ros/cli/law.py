@@ -1,4 +1,4 @@
-"""`rsea law`: a law for what a model leaves unexplained, as an effect file."""
+"""`rsea law`: fit a law to the unexplained residual and write it as an effect file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rsea_ros.cli._runs import add_rig, add_runs
 from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
 from rsea_ros.report.file_names import LAW, LAW_JSON
 
-HELP = "what is left when every known cause is named: the law of it, as an effect file"
+HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
 EXAMPLE = "rsea law run.mcap --rig results/model.yaml --out law"
 FINDINGS = ("law", "no_law", "at_noise_floor")
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look for a law and write it."""
+    """Search for a law and write it."""
     from rsea_ros.model.rig_file import load_rig
 
     place = results_place(args, Path("out") / f"law-{Path(args.bags[0]).stem}", LAW, [*args.bags, args.rig])

@@ -19,11 +19,11 @@ from rsea_ros.interrupts import Stopped, Stops
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
-FAULT = "this is a fault of rsea, please report it"
+FAULT = "this is a bug in rsea, please report it"
 
 
 class Verb(Protocol):
-    """What a module in this directory has."""
+    """The interface of a verb: a module in this directory."""
 
     HELP: str
     EXAMPLE: str
@@ -32,11 +32,11 @@ class Verb(Protocol):
         """Declare the verb's arguments, with units."""
 
     def run(self, args: argparse.Namespace) -> int:
-        """Do it and return the exit status."""
+        """Run the verb and return the exit status."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `rsea VERB …` and return its exit status: 0, 1 a finding asked for by status, 2 bad input."""
+    """Run `rsea VERB …` and return its exit status: 0, 1 for a finding of --fail-on, 2 for bad input."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
     prefix = f"rsea {name}" if name in verbs() else "rsea"
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt as error:
             return _stopped(prefix, error)
         except Exception as error:
-            if stops.last is not None:  # a library that was being imported has made another error of it
+            if stops.last is not None:  # the import of a library has turned the interrupt into another error
                 return _stopped(prefix, stops.last)
             return _fail(prefix, _fault(error))
 
@@ -67,9 +67,9 @@ def verbs() -> dict[str, Path]:
 
 
 def overview() -> str:
-    """Return the help text with one line a verb, without importing any of them."""
+    """Return the help text with one line for each verb, without importing the verbs."""
     rows = [f"  {name:<10} {summary(path)}" for name, path in verbs().items()]
-    closing = "rsea VERB --help shows a verb's arguments with units, and an example; rsea --version."
+    closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
     return "\n".join(["usage: rsea VERB …", "", *rows, "", closing])
 
 
@@ -105,8 +105,8 @@ def _call(name: str, arguments: Sequence[str]) -> int:
 def _run(name: str, arguments: Sequence[str]) -> int:
     """Import the verb, parse its arguments and run it.
 
-    A verb that hands arguments on to another program sets the default `pass_on`: it gets the unknown
-    ones there.
+    A verb that passes arguments to another program sets the default `pass_on`, which receives the unknown
+    arguments.
     """
     verb = cast(Verb, importlib.import_module(f"rsea_ros.cli.{verbs()[name].stem}"))
     parser = _Parser(
@@ -125,7 +125,7 @@ def _run(name: str, arguments: Sequence[str]) -> int:
 
 
 def attached(arguments: Sequence[str]) -> list[str]:
-    """Return arguments with an axis that is turned around, `--axis -torque.z`, as one word.
+    """Return the arguments with a reversed axis, `--axis -torque.z`, joined to one word.
 
     argparse would take the value for an option.
     """
@@ -139,11 +139,11 @@ def attached(arguments: Sequence[str]) -> list[str]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose errors are one line, as all others."""
+    """A parser that reports an error in one line."""
 
     @property
     def options(self) -> list[str]:
-        """All options that it takes, `--out` and the like."""
+        """All options of the parser, such as `--out`."""
         return [option for action in self._actions for option in action.option_strings]
 
     def error(self, message: str) -> NoReturn:
@@ -152,13 +152,13 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _describe(error: OSError) -> str:
-    """Return one line that names the file, where the error knows it."""
+    """Return one line that names the file, if the error has it."""
     reason = error.strerror or str(error)
     return f"{os.fsdecode(error.filename)}: {reason}" if error.filename else reason
 
 
 def _fault(error: Exception) -> str:
-    """Return one line about an error that nobody expected; RSEA_TRACEBACK=1 shows where it came from."""
+    """Return one line about an unexpected error; RSEA_TRACEBACK=1 shows the traceback."""
     if os.environ.get("RSEA_TRACEBACK"):
         traceback.print_exception(error)
     place = traceback.extract_tb(error.__traceback__)[-1]
@@ -167,7 +167,7 @@ def _fault(error: Exception) -> str:
 
 
 def _stopped(prefix: str, error: KeyboardInterrupt) -> int:
-    """Say that a signal has ended the work, and return its status."""
+    """Report that a signal stopped the work, and return its status."""
     if isinstance(error, Stopped) and error.status != INTERRUPTED:
         return _fail(prefix, f"stopped by {error}", error.status)
     return _fail(prefix, "interrupted", INTERRUPTED)
@@ -185,5 +185,5 @@ def _fail(prefix: str, message: str, status: int = BAD_INPUT) -> int:
 
 
 def _silence_stdout() -> None:
-    """Point stdout at nothing, so that the interpreter's last flush says nothing about the closed pipe."""
+    """Redirect stdout to the null device, so that the last flush does not fail on the closed pipe."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-HELP = "the import maps that come with the package: name and what each measurement is"
+HELP = "list the import maps of the package, with a description of each measurement"
 EXAMPLE = "rsea maps"
 
 

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from rsea_ros.report.paper.page import PaperTests
     from rsea_ros.signals import Record
 
-HELP = "every equation, table and figure of the paper recomputed beside the printed value"
+HELP = "recompute every equation, table and figure of the paper beside the printed value"
 EXAMPLE = "rsea paper --out paper"
 MOVING = {
     "paper_moving_output": ("ft",),
     "two_moving_outputs": ("ft", "position"),
     "separate_stiffnesses": ("ft", "position"),
 }
-"""Rigs of the moving-output tests, the paper's first, and what the fit sees."""
+"""Rigs of the moving-output tests, the paper's first, and the channels of the fit."""
 CLAMPED = "paper_high_impedance"
 BAGS = (CLAMPED, *(f"{rig}_{end}_end" for rig in MOVING for end in ("spring", "housing")))
 FILES = (PAPER_JSON, REPORT, *(f"{name}.mcap" for name in BAGS))
@@ -36,16 +36,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add_results(parser, f"{PAPER_JSON}, {REPORT} and the simulated bags", "out/paper")
     parser.add_argument(
-        "--duration", type=float, default=160.0, help="s, of each simulated test (default %(default)s)"
+        "--duration",
+        type=float,
+        default=160.0,
+        help="duration of each simulated test, s (default %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=seed, default=5, help="of benches, commands and noise (default %(default)s)"
+        "--seed", type=seed, default=5, help="seed of benches, commands and noise (default %(default)s)"
     )
     parser.add_argument(
         "--figures",
         type=Path,
         metavar="DIR",
-        help="write the figures of docs/derivation.md there and nothing else",
+        help="only write the figures of docs/derivation.md into this directory",
     )
     add_json(parser, PAPER_JSON)
 
@@ -73,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     recomputed = [c for c in results["claims"] if c["status"] == "found"]
     agree = sum(c["agrees"] for c in recomputed)
-    made = f"{len(recomputed)} printed numbers that others of the paper make"
-    print(f"{agree} of the {made} come out to the last digit")
+    made = f"{len(recomputed)} printed numbers that follow from others in the paper"
+    print(f"{agree} of the {made} agree to the last digit")
     for name, models in results["moving_output"].items():
         for model, sensors in models.items():
             shares = ", ".join(f"{_share(j['explained'])} at the {j['sensor']}" for j in sensors)

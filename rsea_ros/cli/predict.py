@@ -1,4 +1,4 @@
-"""`rsea predict`: a model on the commands of a bag that it has never seen."""
+"""`rsea predict`: simulate a model on the commands of a new bag."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rsea_ros.new_files import check_free, write_text
 from rsea_ros.report.json_values import fault_json, numbers
 from rsea_ros.stamps import repair_stamps
 
-HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"
+HELP = "simulate a model on the commands of a bag and print its errors as JSON"
 EXAMPLE = "rsea predict results/model.yaml other_run.mcap"
 
 
@@ -27,10 +27,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", help="model.yaml, or any rig")
     parser.add_argument("bag", help="rosbag2 directory, .mcap or .db3")
     parser.add_argument(
-        "--out", metavar="CSV", help="predicted channels: t in s, then a column a channel in SI units"
+        "--out",
+        metavar="CSV",
+        help="file for the predicted channels: t in s, then one column per channel in SI units",
     )
     add_force(parser)
-    parser.add_argument("--json", action="store_true", help="JSON is what this verb prints anyway")
+    parser.add_argument("--json", action="store_true", help="no effect: this verb always prints JSON")
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -54,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _table(comparisons: Mapping[str, Comparison]) -> str:
-    """Return CSV, one row a stamp of the first channel; other channels are interpolated to it."""
+    """Return CSV with one row per stamp of the first channel; other channels are interpolated to it."""
     t = next(iter(comparisons.values())).t
     columns = [np.interp(t, c.t, c.predicted).tolist() for c in comparisons.values()]
     rows = (",".join(map(repr, row)) for row in zip(t.tolist(), *columns, strict=True))

@@ -1,4 +1,4 @@
-"""`rsea rig`: begin a rig of one's own, and see whether it is right."""
+"""`rsea rig`: start a new rig, and check a rig file."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from rsea_ros.errors import ParameterError
 if TYPE_CHECKING:
     from rsea_ros.model.rig import Rig
 
-HELP = "begin a rig of your own (new), or show what a rig says and what it lacks (check)"
+HELP = "start a rig for your bench (new), or check a rig and show its values (check)"
 EXAMPLE = "rsea rig new my_bench && rsea rig check my_bench.yaml"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare `new` and `check`."""
     actions = parser.add_subparsers(dest="action", required=True, metavar="new|check")
-    new = actions.add_parser("new", help="write a rig with every common key explained, to be filled in")
-    new.add_argument("name", help="of the rig; the file is NAME.yaml unless --out says otherwise")
-    new.add_argument("--out", type=Path, help="file to be written")
+    new = actions.add_parser("new", help="write a rig to fill in, with every common key explained")
+    new.add_argument("name", help="name of the rig; the file is NAME.yaml unless --out states another")
+    new.add_argument("--out", type=Path, help="file to write")
     add_force(new)
-    check = actions.add_parser("check", help="read a rig and show its values with units, and what is free")
+    check = actions.add_parser("check", help="read a rig and show its values with units, and the free values")
     check.add_argument("rig", help="a file, or the name of a rig that comes with the package")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Do what is asked for."""
+    """Run the action."""
     return _new(args) if args.action == "new" else _check(args)
 
 
@@ -61,13 +61,13 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _row(rig: Rig, name: str) -> tuple[str, ...]:
-    """Return a value's name, number, unit, how well it is known, and where it comes from."""
+    """Return name, number, unit, spread and source of a value."""
     doubt = f"+-{100.0 * rig.spread(name):g} %" if name in rig.free() else "fixed"
     return name, f"{rig[name]:.6g}", rig.unit(name), doubt, rig.quantities[name].source
 
 
 def remarks(rig: Rig) -> list[str]:
-    """Return what a reader of the rig should know: what moves, what is fitted, which sensors it has."""
+    """Return a summary of the rig: moving ends, fitted values, sensors."""
     from rsea_ros.model.rig_fields import END_NAMES
     from rsea_ros.wording import listed
 
@@ -79,5 +79,5 @@ def remarks(rig: Rig) -> list[str]:
         f"noise stated for: {listed(noisy) if noisy else 'no channel; it is estimated from each record'}",
     ]
     if not rig.free():
-        lines.append("give values a spread (0.3: known to 30 %) where identify shall find them")
+        lines.append("give a value a spread (0.3: known to 30 %) if identify should estimate it")
     return lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-HELP = "the rigs that come with the package: name and what each bench is"
+HELP = "list the rigs of the package, with a description of each bench"
 EXAMPLE = "rsea rigs"
 
 
@@ -18,5 +18,5 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig, rig_names
 
     print(columns([(name, load_rig(name).about) for name in rig_names()]))
-    print("\nrsea rig check NAME shows a rig's values; rsea rig new NAME begins one of your own.")
+    print("\nrsea rig check NAME shows the values of a rig; rsea rig new NAME starts a new one.")
     return 0

@@ -1,4 +1,4 @@
-"""`rsea run`: one node, for those who have no `ros2 run`."""
+"""`rsea run`: start a node without `ros2 run`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from rsea_ros.cli._ros import need_ros
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import did_you_mean
 
-HELP = "start one node, as `ros2 run rsea_ros NODE` does, or a program of your own that uses rclpy"
+HELP = "start a node, as `ros2 run rsea_ros NODE` does, or your own program"
 EXAMPLE = "rsea run plant rig:=pendulum rate:=500.0"
 _NODES = Path(__file__).resolve().parents[1] / "nodes"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the verb's arguments; what it does not know goes on to the node."""
-    parser.add_argument("node", metavar="NODE", help=f"{', '.join(node_names())}, or a file .py of your own")
+    """Declare the verb's arguments; unknown ones go to the node."""
+    parser.add_argument("node", metavar="NODE", help=f"{', '.join(node_names())}, or your own .py file")
     parser.add_argument(
         "parameters",
         nargs="*",
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="parameters of the node (rsea run NODE --params lists them)",
     )
     parser.add_argument(
-        "--params", action="store_true", help="show the node's parameters with unit and range"
+        "--params", action="store_true", help="show the parameters of the node with unit and range"
     )
     parser.set_defaults(pass_on=[])
 
@@ -47,13 +47,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _become(words: Sequence[str]) -> NoReturn:
-    """Replace this process by Python with some arguments: signals reach the node itself."""
+    """Replace this process by Python with these arguments, so that signals reach the node itself."""
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, *words])
 
 
 def _script(name: str) -> str:
-    """Return a file that there is. Raises ParameterError for one that there is not."""
+    """Return the path of an existing file. Raises ParameterError if it does not exist."""
     if not Path(name).is_file():
         raise ParameterError(f"{name}: no such file, expected a Python program or a node")
     return name
@@ -65,7 +65,7 @@ def node_names() -> list[str]:
 
 
 def ros_arguments(parameters: list[str]) -> list[str]:
-    """Return parameters as ROS arguments. Raises ParameterError for a word that is no assignment."""
+    """Return parameters as ROS arguments. Raises ParameterError for a word that is not an assignment."""
     for word in parameters:
         if ":=" not in word:
             raise ParameterError(f"parameter {word!r}, expected NAME:=VALUE")

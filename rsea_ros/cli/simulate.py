@@ -24,7 +24,7 @@ from rsea_ros.new_files import check_free
 from rsea_ros.signals import Channel
 from rsea_ros.wording import shown
 
-HELP = "a synthetic bag from a rig, with any effect of the catalogue switched on"
+HELP = "simulate a rig and write a bag, with any effect of the catalogue switched on"
 EXAMPLE = "rsea simulate paper_high_impedance --effect backlash:gap=0.004 --out worn"
 
 
@@ -33,13 +33,13 @@ _MOST_TORQUE, _MOST_TURNED = 100.0, 3.2
 
 
 def _default(name: str) -> str:
-    return f"(default {getattr(Settings(), name):g}, of a joint {getattr(JOINT, name):g})"
+    return f"(default {getattr(Settings(), name):g}, for a position loop {getattr(JOINT, name):g})"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument("rig", help="rig or model.yaml, or the name of one in config/rigs")
-    parser.add_argument("--out", required=True, help="bag to be made: a directory, or a file .mcap or .db3")
+    parser.add_argument("--out", required=True, help="bag to write: a directory, or a file .mcap or .db3")
     add_force(parser)
     parser.add_argument(
         "--effect",
@@ -56,25 +56,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=sorted(KINDS),
         help="kind of the command (default %(default)s)",
     )
-    parser.add_argument("--duration", type=float, default=60.0, help="s (default %(default)s)")
-    parser.add_argument("--rate", type=float, help=f"Hz {_default('rate')}")
-    parser.add_argument("--amplitude", type=float, help=f"N m, of a joint rad {_default('amplitude')}")
+    parser.add_argument("--duration", type=float, default=60.0, help="duration, s (default %(default)s)")
+    parser.add_argument("--rate", type=float, help=f"rate of the commands, Hz {_default('rate')}")
+    parser.add_argument(
+        "--amplitude", type=float, help=f"amplitude, N m, for a position loop rad {_default('amplitude')}"
+    )
     parser.add_argument(
         "--deviation",
         type=float,
-        help=f"N m, of a joint rad: standard deviation of noise on a chirp {_default('noise')}",
+        help=f"standard deviation of noise on a chirp, N m, for a position loop rad {_default('noise')}",
     )
-    parser.add_argument("--low", type=float, help=f"Hz, lowest frequency {_default('low')}")
-    parser.add_argument("--high", type=float, help=f"Hz, highest frequency {_default('high')}")
+    parser.add_argument("--low", type=float, help=f"lowest frequency, Hz {_default('low')}")
+    parser.add_argument("--high", type=float, help=f"highest frequency, Hz {_default('high')}")
     parser.add_argument(
-        "--period", type=float, default=default.period, help="s, of multisine and steps (default %(default)s)"
+        "--period",
+        type=float,
+        default=default.period,
+        help="period of multisine and steps, s (default %(default)s)",
     )
     add = parser.add_argument
-    add("--limit", type=float, help="refused above (default 100 N m, of a joint 3.2 rad)")
+    add("--limit", type=float, help="largest command allowed (default 100 N m, for a position loop 3.2 rad)")
     parser.add_argument(
-        "--seed", type=seed, default=0, help="of command and sensor noise (default %(default)s)"
+        "--seed", type=seed, default=0, help="seed of command and sensor noise (default %(default)s)"
     )
-    parser.add_argument("--no-noise", action="store_true", help="perfect sensors")
+    parser.add_argument("--no-noise", action="store_true", help="simulate perfect sensors")
     add_topic_options(parser)
 
 
@@ -99,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _settings(args: argparse.Namespace, default: Settings) -> Settings:
-    """Return the excitation asked for, the default of this kind of rig where nothing is said."""
+    """Return the excitation of the options, with the defaults of this kind of rig."""
     asked = {
         "rate": args.rate,
         "amplitude": args.amplitude,
@@ -112,7 +117,7 @@ def _settings(args: argparse.Namespace, default: Settings) -> Settings:
 
 
 def parse_effect(text: str) -> EffectSetting:
-    """Return the setting of `NAME:param=value,…`. Raises ParameterError for what is not of that form."""
+    """Return the setting of `NAME:param=value,…`. Raises ParameterError for any other form."""
     name, _, rest = text.partition(":")
     effect = effect_named(name)
     values: dict[str, float] = {}

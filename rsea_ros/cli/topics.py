@@ -1,4 +1,4 @@
-"""`rsea topics`: what is published now, for those who have no `ros2 topic`."""
+"""`rsea topics`: show the published topics without `ros2 topic`."""
 
 from __future__ import annotations
 
@@ -11,25 +11,27 @@ from rsea_ros.cli._ros import need_ros
 if TYPE_CHECKING:
     from rsea_ros.nodes._listener import Listener
 
-HELP = "what is published now: list, rate of a topic, its messages (echo)"
+HELP = "show the published topics: list, rate of a topic, its messages (echo)"
 EXAMPLE = "rsea topics rate /rsea/ft"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare list, rate and echo."""
     actions = parser.add_subparsers(dest="action", metavar="list|rate|echo")
-    listing = actions.add_parser("list", help="every topic with type and publishers (the default)")
-    rate = actions.add_parser("rate", help="messages a second, and the longest time between two")
-    echo = actions.add_parser("echo", help="messages as text")
+    listing = actions.add_parser("list", help="list every topic with type and publishers (the default)")
+    rate = actions.add_parser("rate", help="print the rate of a topic, and the longest gap")
+    echo = actions.add_parser("echo", help="print messages as text")
     for action in (rate, echo):
-        action.add_argument("topic", help="name, /rsea/ft or ft")
+        action.add_argument("topic", help="name of the topic, /rsea/ft or ft")
     for action, usual in ((parser, 1.0), (listing, 1.0), (rate, 3.0)):
         action.add_argument(
-            "--seconds", type=positive, default=usual, help="s to listen (default %(default)s)"
+            "--seconds", type=positive, default=usual, help="time to listen, s (default %(default)s)"
         )
-    echo.add_argument("--count", type=seed, default=1, help="messages to show (default %(default)s)")
     echo.add_argument(
-        "--seconds", type=positive, default=10.0, help="s to wait at most (default %(default)s)"
+        "--count", type=seed, default=1, help="number of messages to show (default %(default)s)"
+    )
+    echo.add_argument(
+        "--seconds", type=positive, default=10.0, help="longest time to wait, s (default %(default)s)"
     )
 
 

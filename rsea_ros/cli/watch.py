@@ -11,23 +11,23 @@ from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._ros import need_ros
 from rsea_ros.cli._runs import RIG
 
-HELP = "the live view: torques, deflection, flag and health in a browser; records, identifies, diagnoses"
+HELP = "show torques, deflection, flag and health live in a browser; record, identify and diagnose there"
 EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--rig", default=RIG, help="the bench: a name in config/rigs, or a file")
-    add("--host", default="localhost", help="where the page is served; 0.0.0.0: to the network too (a phone)")
-    add("--port", type=int, default=8270, help="of the page; 0: any (default %(default)s)")
-    add("--command", action="store_true", help="let a page command torque, within the driver's limits")
+    add("--rig", default=RIG, help="rig of the bench: a name in config/rigs, or a file")
+    add("--host", default="localhost", help="address of the server; 0.0.0.0: also for the network (a phone)")
+    add("--port", type=int, default=8270, help="port of the page; 0: any free port (default %(default)s)")
+    add("--command", action="store_true", help="allow a page to command torque within the driver's limits")
     add("--limit", type=positive, default=10.0,
-        help="largest torque of a page, N m (default %(default)s); the driver's counts where it is less")
+        help="largest torque of a page, N m (default %(default)s); a smaller limit of the driver prevails")
     add("--rate", type=positive, default=280.0,
-        help="of a page's commands, Hz, as the bench runs (default %(default)s)")
+        help="rate of the commands of a page, Hz, that of the bench (default %(default)s)")
     add("--out", type=Path, default=Path("runs"), help="folder of the recordings (default %(default)s)")
-    add("--namespace", default="rsea", help="of the topics (default %(default)s)")
+    add("--namespace", default="rsea", help="namespace of the topics (default %(default)s)")
     add("--joint", default="joint", help="name of the joint (default %(default)s)")
     add("--axis", default="torque.z", help="actuator axis of the wrench on ft (default %(default)s)")
 
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _text(value: object) -> str:
-    """Return a value as ROS reads it."""
+    """Return a value in the syntax of ROS parameters."""
     if isinstance(value, bool):
         return str(value).lower()
     return f"'{value}'" if isinstance(value, str | Path) else str(value)

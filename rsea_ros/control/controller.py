@@ -17,12 +17,12 @@ samples is compared with the model at its own instant.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.control.compensation import COMPENSATED, Compensation, compensation
+from rsea_ros.control.compensation import Compensation, compensation
 from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
 from rsea_ros.control.learning import Learning
 from rsea_ros.control.loads import lightest, load_range, locked
@@ -77,10 +77,11 @@ class TorqueController:
     """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
 
     def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
-                 compensate: Iterable[str] = COMPENSATED, preview: bool = False, learn: bool = True,
+                 compensate: Collection[str] | None = None, preview: bool = False, learn: bool = True,
                  corner: float = CORNER) -> None:  # fmt: skip
         """rate: Hz. gains: by default those of `synthesis.design`, which takes some seconds.
 
+        compensate: names of the rig's effects that are compensated, by default all that have a law for it.
         preview: desired torques are those of two samples later, known ahead: no prediction. corner: of the
         prediction, Hz. learn: whether load and drive are learned; not inside an outer loop whose desired
         torque follows the motion (virtual.py), where what is learned would change its impedance.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks, with_common_clock_in_delay, with_doubled_step
 from rsea_ros.diagnosis.score import Score, score_on
@@ -144,16 +142,16 @@ def effect_size(name: str) -> int:
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:
-    """Return what a fit paid for leaving the values that were known beforehand."""
-    known = ((t, u) for t, u in zip(theta, problem.unknowns, strict=True) if np.isfinite(u.doubt))
-    return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in known))
+    """Return what a model pays for leaving the values that were known beforehand: their sigmas, squared."""
+    return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
 
 
 def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
     """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
-    main = effect_named(name).main
-    value, span = solution.values[f"{name}.{main.name}"], main.high - main.low
-    return not main.low + near * span < value < main.high - near * span
+    main = f"{name}.{effect_named(name).main.name}"
+    unknown = next(u for u in solution.problem.unknowns if u.name == main)
+    span = unknown.high - unknown.low
+    return not unknown.low + near * span < solution.values[main] < unknown.high - near * span
 
 
 def _distance(weights: Score | None, farthest: float) -> float:

@@ -17,7 +17,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from rsea_ros.diagnosis.result import Reason, Status, Verdict
-from rsea_ros.diagnosis.score import Score, bootstrap_means
+from rsea_ros.diagnosis.score import Score, bootstrap_means, likelier_by
 from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.signals import Fault
@@ -99,6 +99,8 @@ def refusal(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAUL
     )
     if not over_present.better:
         return "too_small" if over_present.sure else "not_sure"
+    if likelier_by(model, present, settings.floor.far) < 0.0:
+        return "leaves_priors"
     if worst_ratio(model) < settings.floor.only_noise:
         return None
     is_one_more = len(model.causes) == len(present.causes) + 1
@@ -115,19 +117,21 @@ def break_tie(
 ) -> tuple[M | None, tuple[M, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
-    Of all that are not surely and materially worse than the best the simplest; of equals, the one that needs
-    the least of what is known beforehand.
+    The best is the likeliest, what it pays for leaving known values included. Of all that are not surely and
+    materially worse the simplest; of equals, the one that needs the least of what is known beforehand.
     """
     if not models:
         return None, ()
-    best = min(models, key=lambda m: float(m.validation.loss(present).sum()))
+    far = settings.floor.far
+    least = min(models, key=lambda m: float(m.validation.loss(present).sum()))
+    best = max(models, key=lambda m: likelier_by(m, least, far))
 
     def contends(m: M) -> bool:
         over = preference(best.validation, m.validation, rule=settings.acceptance)
         return not over.better or is_nearly_as_good(m, best, settings)
 
     contenders = [m for m in models if m is best or contends(m)]
-    chosen = min(contenders, key=lambda m: (m.size, m.prior_cost + loss_excess(m, best)))
+    chosen = min(contenders, key=lambda m: (m.size, -likelier_by(m, best, far)))
     return chosen, tuple(m for m in contenders if m is not chosen and m.size <= chosen.size)
 
 

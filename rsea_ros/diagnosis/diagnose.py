@@ -7,25 +7,26 @@ the test blocks (naming/weighing.py), and named with gain and probability where 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
-from rsea_ros.diagnosis.naming.causes import play_not_told
-from rsea_ros.diagnosis.naming.conclusion import diagnosis_of
-from rsea_ros.diagnosis.naming.weighing import weigh
+from rsea_ros.diagnosis.naming.conclusion import Examined, conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.steady import steadied
 from rsea_ros.identification.workers import Pools, worker_pools
 from rsea_ros.model.extent import bounded
@@ -58,17 +59,15 @@ def diagnose(
     holdout = bounded(commanded(holdout, rig)) if holdout is not None else None
     for record in [*records, *([holdout] if holdout is not None else [])]:
         check_diagnosable(record)
-    checked, sentences = _steady([check(r, rig) for r in records], rig)
+    checked, remarks = _steady([check(r, rig) for r in records], rig)
     nominal = nominal_problem(checked, rig)
     tested = _steady([check(holdout, rig)], rig)[0][0] if holdout is not None else None
+    examined = Examined(records, checked, tested, rig)
     with worker_pools() as pools:
         selection, stages = search(nominal, checked[0].record, tested, pools, tell, settings)
         tell("weighing the causes", 0.97)
-        weighing = weigh(selection, stages, tested, pools, settings)
-        every = [*checked, *([tested] if tested else [])]
-        result = diagnosis_of(weighing, every, records, rig, pools, settings)
-    told = (*sentences, *torque_scale(nominal), *play_not_told(selection, result))
-    return replace(result, statements=(*told, *result.statements))
+        result = conclude(selection, stages, examined, pools, settings)
+    return replace(result, remarks=(*remarks, *torque_scale(nominal), *result.remarks))
 
 
 def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
@@ -91,7 +90,7 @@ def search(
     record: the first one, from which a joint in its loop gets its start.
     """
     rig = nominal.rig
-    effects = [e for name, e in catalogue().items() if e.is_searched and name not in settings.without]
+    effects = searched_effects(nominal, settings.without)
     start = joint_start(record, rig) if rig.loop is not None else None
     selection = select_stepwise(nominal, effects, pools, tell, settings, start)
     tell("looking for a simpler model", 0.9)
@@ -100,8 +99,15 @@ def search(
     return selection, [evaluate(selection, m, holdout, pools, settings) for m in selection.models]
 
 
-def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[str, ...]]:
-    """Return records on the even clocks that their values agree with, and what was done, in words."""
+def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:
+    """Return the effects that are tried beside a nominal model, with bounds that suit its machine."""
+    scale = scale_of(nominal.cases, nominal.rig)
+    searched = (e for e in catalogue().values() if e.is_searched and e.name not in without)
+    return [e.at(scale) for e in searched]
+
+
+def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
+    """Return records on the even clocks that their values agree with, and what was done."""
     steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
     records = zip(checked, steady.records, strict=True)
-    return [replace(c, record=record) for c, record in records], steady.sentences
+    return [replace(c, record=record) for c, record in records], steady.remarks

@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.score import Score, score, score_on
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.confidence import Confidence, confidence_of
-from rsea_ros.identification.problem import case_from, simulated
+from rsea_ros.identification.problem import Case, Problem, case_from, simulated
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
@@ -45,6 +45,41 @@ class Evaluated:
         return confidence_of(self.solution)
 
 
+@dataclass(frozen=True)
+class HeldOut:
+    """What models are tested on: the test blocks of the cases, or a record that takes their place.
+
+    nominal: the rig without causes, by which the record is made ready.
+    """
+
+    cases: tuple[Case, ...]
+    nominal: Rig
+    record: Checked | None
+
+    @property
+    def _case(self) -> Case:
+        assert self.record is not None
+        case = case_from(self.record.record, self.nominal, self.record.masked)
+        return replace(case, noise=self.cases[0].noise)
+
+    def score(
+        self, problem: Problem, theta: FloatArray, outputs: list[dict[str, FloatArray]] | None = None
+    ) -> Score:
+        """Return the score of a model. outputs: its channels on the cases, where simulated already."""
+        if self.record is None:
+            everything = replace(problem, cases=self.cases)
+            return score_on(everything, self.cases, TEST, outputs or everything.outputs(theta))
+        case = self._case
+        rig, offsets = apply(problem.rig, problem.unknowns, theta)
+        phased = in_phase(rig, self.record.record)
+        return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride))
+
+
+def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
+    """Return what the models of a selection are tested on. record: takes the place of the test blocks."""
+    return HeldOut(selection.cases, selection.models[0].problem.rig, record)
+
+
 def evaluate(
     selection: Selection,
     chosen: Candidate,
@@ -62,17 +97,5 @@ def evaluate(
     )
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
     train = score_on(model.problem, cases, blocks, model.outputs)
-    if holdout is None:
-        test = score_on(model.problem, cases, TEST, model.outputs)
-    else:
-        test = _score(model, holdout, selection.models[0].problem.rig)
+    test = held_out_of(selection, holdout).score(model.problem, model.solution.theta, model.outputs)
     return Evaluated(model.solution, model.outputs, train, test)
-
-
-def _score(model: Candidate, holdout: Checked, nominal: Rig) -> Score:
-    """Return the score of a model on all of a held-out record."""
-    problem = model.problem
-    case = replace(case_from(holdout.record, nominal, holdout.masked), noise=model.cases[0].noise)
-    rig, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
-    outputs = simulated((case,), in_phase(rig, holdout.record), offsets, ride=problem.ride)
-    return score(problem, (case,), outputs)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from rsea_ros.diagnosis.candidate import Candidate
 from rsea_ros.diagnosis.criteria import break_tie, is_acceptable, is_far_from_floor, loss_excess, refusal
+from rsea_ros.diagnosis.result import Reason
 from rsea_ros.diagnosis.screening import ScreenedEffect
 from rsea_ros.diagnosis.selection import Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -115,13 +116,15 @@ class ForwardStep:
 
     def _refused(self, model: Candidate, chosen: Candidate | None) -> Trial:
         """Return the trial of a model that was not accepted, with the reason."""
-        reason = refusal(model, self.present, self.settings)
-        if reason is not None or chosen is None:
-            return trial_of(model, model.newest, self.present, reason or "not_sure")
+        refused = refusal(model, self.present, self.settings)
+        if refused is not None or chosen is None:
+            return trial_of(model, model.newest, self.present, refused or "not_sure")
         loss = float(chosen.validation.loss(chosen.validation).sum())
         is_alike = loss_excess(model, chosen) < self.settings.forward.alike * loss
         is_larger = model.parameters > chosen.parameters and is_alike
-        reason = "no_better_than_simpler" if is_larger else "explains_less"
+        reason: Reason = "no_better_than_simpler" if is_larger else "explains_less"
+        if loss_excess(model, chosen) < 0.0 and model.prior_cost > chosen.prior_cost:
+            reason = "no_better_than_likelier"
         return trial_of(model, model.newest, self.present, reason, chosen.newest)
 
     def _say(self, what: str, within: float) -> None:

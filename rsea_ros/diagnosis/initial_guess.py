@@ -22,6 +22,8 @@ from rsea_ros.diagnosis.residual_peaks import (
 )
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
+from rsea_ros.effects.signal_table import ROTOR_ANGLE
+from rsea_ros.identification.machine_scale import torque_size
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
@@ -37,6 +39,10 @@ _SHARP_APART = 0.5
 """Hz between two lines that count as two."""
 _LOWEST, _HIGHEST = 1.0, 0.49
 """Hz and share of the rate between which peaks are looked for."""
+_SHARES = (0.03, 0.1, 0.3)
+"""Of a joint's largest torque: what friction, ripple and their like may have."""
+_LIMITS = (1.0, 0.9, 0.7)
+"""Of a joint's largest torque: where a limit begins."""
 _OUTLIERS = 0.999
 """Quantile that counts as the largest value: a few samples may be outliers."""
 _SHARES = (0.03, 0.1, 0.3)
@@ -47,11 +53,23 @@ _LIMITS = (1.0, 0.9, 0.7)
 
 def initial_guesses(effect: Effect, view: RecordView) -> list[Guess]:
     """Return the guesses from which fits of an effect begin; none where it has nothing to act on."""
-    is_torque = effect.main.unit == "N m" and "cycles_per_revolution" not in effect.null
+    is_torque = effect.main.unit == "N m" and ROTOR_ANGLE not in effect.reads
     if view.is_joint and is_torque:
-        return joint_starts(effect, torque_scale(view.case, view.rig))
+        return joint_guesses(effect, torque_size(view.case, view.rig))
     defaults = effect.default_guesses
     return defaults if effect.guesses is None else effect.guesses(defaults, view)
+
+
+def joint_guesses(effect: Effect, largest: float) -> list[Guess]:
+    """Return guesses of an effect whose main parameter is a torque, by the largest torque of a joint, N m."""
+    main = effect.main
+    shares = _LIMITS if "limit" in effect.tags else _SHARES
+    sizes = {min(max(share * largest, main.low), main.high) for share in shares}
+    torques = [p.name for p in effect.parameters if p.unit == "N m"]
+    return [
+        {**effect.typical, **{name: size * effect.typical[name] / main.typical for name in torques}}
+        for size in sorted(sizes)
+    ]
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import UNITS, FloatArray
-from rsea_ros.wording import listed
 
 _DURATION, _SERIES = 12.0, 60.0
 """s of a run that tells rivals apart, and of one of an amplitude series."""
@@ -67,12 +66,11 @@ EXCITATIONS = tuple(
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
     """Return the cheapest allowed run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
-    names = listed([r.problem.added[-1] for r in rivals])
-    cause = accepted.problem.added[-1]
+    undecided = Experiment(
+        "other_amplitude", accepted.problem.added[-1], tuple(r.problem.added[-1] for r in rivals)
+    )
     if not isinstance(case.drive, Drive):
-        return Experiment(
-            f"{cause} and {names} do as well on these data; a run at another amplitude would show more", {}
-        )
+        return undecided
     present = float(np.max(np.abs(case.drive.command)))
     rig, most = _model(accepted), 0.0
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
@@ -81,16 +79,10 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
             continue
         separation = min(_separation(rival, run.case) for rival in rivals)
         if separation > _ENOUGH:
-            why = f"this run makes them differ by {separation:.1f} times the noise"
             settings = _as_excited(run, rig) | {"separation_times_noise": round(separation, 3)}
-            return Experiment(f"{cause} and {names} do as well on these data; {why}", settings)
+            return replace(undecided, reason="separates", separation=separation, excitation=settings)
         most = max(most, separation)
-    return Experiment(
-        f"{cause} and {names} make the same motion under every excitation tried within the limits of rig and "
-        f"driver (at most {most:.2f} times the noise apart): "
-        "only a separate measurement distinguishes them, such as the spring stiffness by a known weight",
-        {},
-    )
+    return replace(undecided, reason="inseparable", separation=most)
 
 
 def unit_of_commands(rig: Rig) -> str:
@@ -153,23 +145,16 @@ def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experi
     """
     case, rig = model.problem.cases[0], _model(model)
     if not isinstance(case.drive, Drive):  # it drifts: no simulation says how far another run would carry it
-        return Experiment(_SERIES_WHY.format("half", ""), {})
+        return Experiment("amplitude_series", amplitude=0.5)
     present = float(np.max(np.abs(case.drive.command)))
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
-    for factor, words in ((0.5, "half"), (2.0, "twice")):
+    for factor in (0.5, 2.0):
         if math.hypot(1.0, factor * excess) < _VISIBLE:
             continue
         run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate)), factor * present)
         if run is not None and run.peak >= _NEARLY * factor * present:
-            return Experiment(_SERIES_WHY.format(words, _WITH_MULTISINE), _as_excited(run, rig))
+            return Experiment("amplitude_series", amplitude=factor, excitation=_as_excited(run, rig))
     return None
-
-
-_WITH_MULTISINE = " with an odd multisine, whose empty lines show distortion apart from noise"
-_SERIES_WHY = (
-    "nothing in the catalogue explains what is left: repeat at {} the amplitude{}; "
-    "what scales with the command is linear, what does not is friction-like"
-)
 
 
 def _series(rig: Rig, rate: float) -> Settings:

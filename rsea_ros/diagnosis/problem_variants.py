@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import part
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive, coarser
 from rsea_ros.signals import FloatArray
-
-DELAY = "command_delay.delay"
 
 
 def on_blocks(
@@ -73,10 +72,12 @@ def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
     """
     names = [u.name for u in solution.problem.unknowns]
     clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
-    if DELAY not in names or not clocks:
+    acting = [e for e in map(effect_named, solution.problem.acting) if "delay" in e.tags]
+    delay = next((d for d in (f"{e.name}.{e.main.name}" for e in acting) if d in names), None)
+    if delay is None or not clocks:
         return None
     theta = solution.theta.copy()
     common = float(np.mean(theta[clocks]))
     theta[clocks] -= common
-    theta[names.index(DELAY)] -= common
+    theta[names.index(delay)] -= common
     return np.asarray(theta)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Fault, FloatArray
@@ -20,6 +21,7 @@ Reason = Literal[
     "at_bound",
     "not_sure",
     "too_small",
+    "leaves_priors",
     "explains_less",
     "no_better_than_simpler",
     "no_better_than_likelier",
@@ -31,7 +33,8 @@ Reason = Literal[
 """Why an effect is no cause.
 
 far_behind: of the best, on the data of the fit. at_bound: its main parameter ran to its bound. not_sure,
-too_small: the gain on the validation blocks. explains_less, no_better_than_…: than the accepted rival.
+too_small: the gain on the validation blocks. leaves_priors: needs values of the rig so far outside their
+stated doubt that the gain does not pay for it. explains_less, no_better_than_…: than the accepted rival.
 redundant: beside the other causes. replaced: it was accepted, and gave way later. improbable: it was
 accepted, but its law does not fit what it takes away. leaves_too_much: it was, but does not surely help.
 """
@@ -72,6 +75,7 @@ class Estimate:
 class Cause:
     """An accepted cause. gain_…: 1 - RMS(residual with it) / RMS(residual without it), of `channel`.
 
+    times_noise: held-out residual of the channel over its noise, without and with it.
     probability: that it is part of the truth under this name, 0 to 1, calibrated (bench/calibration.py).
     """
 
@@ -80,7 +84,7 @@ class Cause:
     gain_train: float
     gain_holdout: float
     gain_holdout_ci95: tuple[float, float]
-    evidence: str
+    times_noise: tuple[float, float]
     equation: str = ""
     channel: str = "ft"
     confusable_with: tuple[str, ...] = ()
@@ -117,12 +121,29 @@ class Rejected:
     probability: float | None = None
 
 
+ExperimentReason = Literal["separates", "inseparable", "other_amplitude", "amplitude_series"]
+"""Why a run is recommended, or none.
+
+separates: it distinguishes a cause from its rivals. inseparable: no run within the limits does.
+other_amplitude: a run at another amplitude would show more of them; none can be simulated. amplitude_series:
+at a multiple of the amplitude it shows whether what is left is linear.
+"""
+
+
 @dataclass(frozen=True)
 class Experiment:
-    """The run that would decide what these data cannot."""
+    """The run that would decide what these data cannot; `excitation` is empty where none can be said.
 
-    why: str
-    excitation: Mapping[str, float | str]
+    cause, rivals: which these data do not distinguish. separation: what the rivals cannot follow, over the
+    noise; where nothing separates them, at most. amplitude: of the run, relative to the present one.
+    """
+
+    reason: ExperimentReason
+    cause: str = ""
+    rivals: tuple[str, ...] = ()
+    separation: float = 0.0
+    amplitude: float = 1.0
+    excitation: Mapping[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -142,12 +163,12 @@ class Diagnosis:
 
     channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
+    remarks: what the data cannot determine, and what a reader must know beside the numbers.
     before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
     """
 
     verdict: Verdict
     channel: str
-    sentence: str
     rig_name: str
     sources: tuple[str, ...]
     duration: float
@@ -171,6 +192,6 @@ class Diagnosis:
     before: tuple[Overlay, ...] = ()
     after: tuple[Overlay, ...] = ()
     spectra: tuple[Spectrum, ...] = ()
-    statements: tuple[str, ...] = field(default=())
+    remarks: tuple[Remark, ...] = ()
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT

@@ -51,7 +51,7 @@ def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]
     for guess in guesses:
         parameters = {name: value for name, value in guess.items() if "." not in name}
         base = with_values(present, {name: value for name, value in guess.items() if "." in name})
-        needs_derivatives = is_mode(effect) or base is not present
+        needs_derivatives = "mode" in effect.tags or base is not present
         try_guess = _with_new_derivatives if needs_derivatives else _with_present_derivatives
         try:
             tried = try_guess(base, effect, parameters)
@@ -69,11 +69,6 @@ def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
         if unknown.name in values:
             theta[i] = unknown.inner(values[unknown.name])
     return present if (theta == present.theta).all() else replace(present, theta=theta)
-
-
-def is_mode(effect: Effect) -> bool:
-    """Tell whether an effect adds a mode: a mode has a damping ratio."""
-    return any(p.name == "damping_ratio" for p in effect.parameters)
 
 
 def _with_new_derivatives(present: Solution, effect: Effect, guess: dict[str, float]) -> ScreenedEffect:

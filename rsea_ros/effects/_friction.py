@@ -10,13 +10,17 @@ sticking is no stiff problem.
 """
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from rsea_ros.compiler import njit
+from rsea_ros.effects.compensable import AgainstMotion, Parameters
 from rsea_ros.effects.effect import Parameter
 from rsea_ros.effects.signal_table import CREEP, GEAR_VELOCITY, GEAR_VELOCITY_SPAN, MOBILITY
 
 PRESLIDING = Parameter(
-    "creep_velocity", "rad/s", null=2e-3, low=3e-4, high=2e-2, typical=2e-3, logarithmic=True, optional=True
+    "creep_velocity", "rad/s", null=2e-3, low=3e-4, high=2e-2, typical=2e-3, logarithmic=True, optional=True,
+    reason="from 1/2000 of the largest speed, which no sample shows, to 1/30, which is viscous",
 )
 """Below it a gear with friction creeps instead of standing still; every friction effect has it."""
 
@@ -83,3 +87,18 @@ def mean_tanh(a, b, fade):  # type: ignore[no-untyped-def]
     mean = (abs(b) - abs(a) + math.log((1.0 + fade_b) / (1.0 + fade))) / path
     at_b = math.copysign((1.0 - fade_b) / (1.0 + fade_b), b)
     return mean, (at_b - mean) / path
+
+
+def against(level: Any, creep: int) -> AgainstMotion:
+    """Return what compensates friction of a law. level: its compiled `f(p, w)`; creep: place of w_c in p.
+
+    The mean over a hold in which the speed goes straight from start to end, as the step has it.
+    """
+    size: Callable[[Parameters, float], float] = level.py_func
+
+    def mean(p: Parameters, start: float, end: float) -> float:
+        a, b = start / p[creep], end / p[creep]
+        mean_sign: float = mean_tanh.py_func(a, b, math.exp(-2.0 * abs(a)))[0]
+        return size(p, 0.5 * (start + end)) * mean_sign
+
+    return AgainstMotion(mean)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 
 from rsea_ros.effects.effect import Effect, Parameter
+from rsea_ros.effects.scale import powers_of
 
 
 @dataclass(frozen=True)
@@ -45,16 +46,25 @@ class EffectPage:
         """Return name, meaning, equation and parameters as text."""
         rows = [
             f"  {p.name} ({p.unit}): typical {p.typical:g}, vanishes at {p.null:g}, "
-            f"fitted within {p.low:g} to {p.high:g}"
+            f"fitted within {p.low:g} to {p.high:g}{self.goes_with(p)}: {p.reason}"
             for p in self.effect.parameters
         ]
         return "\n".join([f"{self.name}: {self.effect.about}", f"  {self.equation}", *rows])
 
+    @staticmethod
+    def goes_with(parameter: Parameter) -> str:
+        """Return with which numbers of the machine bounds and sizes grow, after a comma; empty for none."""
+        powers = () if parameter.is_fixed else powers_of(parameter.unit)
+        shown = " ".join(name if power == 1 else f"{name}^{power}" for name, power in powers)
+        return f", times {shown}" if shown else ""
+
     def _repr_html_(self) -> str:
-        head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th></tr>"
+        head = "<tr><th>parameter</th><th>unit</th><th>typical</th><th>vanishes at</th><th>bounds</th>"
+        head += "<th>grows with</th><th>why</th></tr>"
         rows = "".join(
             f"<tr><td>{escape(p.name)}</td><td>{escape(p.unit)}</td><td>{p.typical:g}</td><td>{p.null:g}</td>"
-            f"<td>{p.low:g} to {p.high:g}</td></tr>"
+            f"<td>{p.low:g} to {p.high:g}</td><td>{self.goes_with(p).removeprefix(', times ')}</td>"
+            f"<td>{escape(p.reason)}</td></tr>"
             for p in self.effect.parameters
         )
         description = escape(self.description)

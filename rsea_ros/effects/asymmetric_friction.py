@@ -5,7 +5,7 @@
 offset (N m) is the one-sided part: what the drive takes more forward than backward. viscous_difference
 (N m s/rad) is how much the viscous coefficient forward exceeds the one backward; their mean is b_m, and it
 counts up to 2 b_m, where one of them is zero. Source: Janot, Gautier, Brunot, Data set and reference models
-of EMPS, 2019 (offset); realdata README (two viscous coefficients).
+of EMPS, 2019 (offset).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -23,12 +23,19 @@ EFFECT = Effect(
     name="asymmetric_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter("offset", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),
-        Parameter("viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0),
+        Parameter(
+            "offset", "N m", null=0.0, low=-50.0, high=50.0, typical=0.5,
+            reason="with more than the largest torque it would not move",
+        ),
+        Parameter(
+            "viscous_difference", "N m s/rad", null=0.0, low=-100.0, high=100.0, typical=5.0,
+            reason="it counts up to 2 b_m: four times the paper's 23 N m s/rad",
+        ),
     ),
     claims=Claims("position", "even", amplitude_exponent=None),
     function=apply,
     reads=(GEAR_VELOCITY,),
+    tags=("friction",),
     about="friction that differs between forward and backward",
     equation="T = -offset - ½ viscous_difference · |ω|",
 )

@@ -12,6 +12,7 @@ Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft w
 from collections.abc import Sequence
 
 from rsea_ros.effects._chassis import over_step, path
+from rsea_ros.effects.compensable import Gap
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import STIFFNESS, Guess, ResidualView
 from rsea_ros.effects.signal_table import (
@@ -90,12 +91,20 @@ def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
 EFFECT = Effect(
     name="backlash",
     port=Port.SPRING,
-    parameters=(Parameter("gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012)),),
+    parameters=(
+        Parameter(
+            "gap", "rad", null=0.0, low=0.0, high=0.1, typical=4e-3, starts=(1e-3, 0.012), is_fixed=True,
+            reason="an angle of gears, not of machines: 3 to 6 arcmin in a good one, 0.03 rad in a toy "
+            "servo's",
+        ),
+    ),
     claims=Claims("position", "odd", amplitude_exponent=None, passive=True, confusable_with=("hard_stop",)),
     function=apply,
     states=8,
     reads=(DEFLECTION, DEFLECTION_RATE),
     guesses=guesses,
+    tags=("play",),
+    compensation=Gap(lambda p: p[0]),
     about="play between the gear output and the spring",
     equation="T_s = K_s · y + b_s · ẏ, J_sc · ÿ + b_s · ẏ + K_s · y = C, |d - y| ≤ gap / 2",
 )

@@ -16,7 +16,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.plugins import plugin_constant, plugin_files
 from rsea_ros.wording import did_you_mean, shown
 
-_NOT_EFFECTS = {"effect", "catalogue", "guess", "signal_table"}
+_NOT_EFFECTS = {"catalogue", "compensable", "effect", "guess", "parameter", "scale", "signal_table"}
 EXTRA_PATH = "RSEA_EFFECTS"
 """Environment variable: effect files or folders of them beside the package's own, separated like PATH."""
 

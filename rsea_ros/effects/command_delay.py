@@ -3,8 +3,11 @@
     T_m(t) = T_command(t - delay),   of a position loop r(t) = target(t - delay)
 
 Commands are kept on the grid of the step; a delay that is no whole number of steps mixes two of them, which
-is the exact mean over the step of the held command.
+is the exact mean over the step of the held command. Source: Astrom, Wittenmark, Computer-Controlled Systems,
+1997, ch. 2 (systems with a time delay).
 """
+
+import numpy as np
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, REFERENCE, STEP, TARGETED, Port
@@ -43,13 +46,20 @@ EFFECT = Effect(
     name="command_delay",
     port=Port.COMMAND,
     parameters=(
-        Parameter("delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03)),
+        Parameter(
+            "delay", "s", null=0.0, low=0.0, high=0.06, typical=5e-3, starts=(1e-3, 0.015, 0.03),
+            is_fixed=True,
+            reason="buses and drivers: a cycle at 1 kHz to three at 50 Hz; short steps keep no more commands",
+        ),
     ),
     claims=Claims(
         "velocity", "odd", amplitude_exponent=1.0, confusable_with=("current_loop_lag", "gear_compliance")
     ),
     function=apply,
     states=2 + LENGTH,
+    tags=("delay",),
+    response=lambda p, s: np.exp(-p[0] * s),
+    part="command",
     about="the command takes effect later than its stamp says",
     equation="T_motor(t) = T_command(t - delay)",
 )

@@ -6,22 +6,35 @@ The sign is smoothed below creep_velocity (presliding), see _friction.py. Source
 of Machines with Friction, 1991, ch. 2.
 """
 
-from rsea_ros.effects._friction import PRESLIDING, mean_friction
+from rsea_ros.compiler import njit
+from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+
+
+@njit(inline="always")
+def level(p, w):  # type: ignore[no-untyped-def]
+    """Return the friction torque at a speed, N m."""
+    return p[0]
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
-    x[0] = mean_friction(s, p[0], x[0], p[1])
+    x[0] = mean_friction(s, level(p, s[GEAR_VELOCITY]), x[0], p[1])
     s[GEAR_TORQUE] -= x[0]
 
 
 EFFECT = Effect(
     name="coulomb_friction",
     port=Port.GEAR,
-    parameters=(Parameter("torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0), PRESLIDING),
+    parameters=(
+        Parameter(
+            "torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
+            reason="with more than the largest torque it would not move",
+        ),
+        PRESLIDING,
+    ),
     claims=Claims(
         "velocity",
         "odd",
@@ -32,6 +45,8 @@ EFFECT = Effect(
     function=apply,
     states=1,
     reads=(GEAR_VELOCITY,),
+    tags=("friction",),
+    compensation=against(level, creep=1),
     about="friction torque of fixed size against the motion",
     equation="T = -torque · sign(ω), smooth below creep_velocity",
 )

@@ -2,7 +2,8 @@
 
     time_constant * T_m' + T_m = T_command
 
-The torque of a step is the exact mean of T_m over it for a command that is held.
+The torque of a step is the exact mean of T_m over it for a command that is held. Source: Leonhard, Control of
+Electrical Drives, 2001 (the closed current loop as a lag).
 """
 
 import math
@@ -28,14 +29,9 @@ EFFECT = Effect(
     order=20,
     parameters=(
         Parameter(
-            "time_constant",
-            "s",
-            null=0.0,
-            low=1e-5,
-            high=0.1,
-            typical=4e-3,
-            starts=(1e-3, 0.015),
+            "time_constant", "s", null=0.0, low=1e-5, high=0.1, typical=4e-3, starts=(1e-3, 0.015),
             logarithmic=True,
+            reason="corners of 1.6 Hz to 16 kHz: slower is no current loop, faster shows nowhere",
         ),
     ),
     claims=Claims(
@@ -43,6 +39,7 @@ EFFECT = Effect(
     ),
     function=apply,
     states=1,
+    response=lambda p, s: 1.0 / (p[0] * s + 1.0),
     about="first-order lag of the motor's current",
     equation="time_constant · Ṫ_motor + T_motor = T_command",
 )

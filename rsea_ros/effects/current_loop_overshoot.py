@@ -9,6 +9,8 @@ section 3.4.
 """
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import COMMAND, CURRENT, STEP, Port
@@ -32,6 +34,13 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
     s[CURRENT] = x[0]
 
 
+def response(p: Sequence[float], s: Any) -> Any:
+    """Return current over command, shape (n,)."""
+    log = math.log(p[1])
+    zeta = -log / math.hypot(math.pi, log)
+    return 1.0 / ((p[0] * s) ** 2 + 2.0 * zeta * p[0] * s + 1.0)
+
+
 EFFECT = Effect(
     name="current_loop_overshoot",
     port=Port.COMMAND,
@@ -40,14 +49,19 @@ EFFECT = Effect(
         Parameter(
             "time_constant", "s", null=0.0, low=1e-4, high=0.05, typical=4e-3, starts=(1.5e-3, 0.01),
             logarithmic=True,
+            reason="natural frequencies of 3 Hz to 1.6 kHz, as of the lag",
         ),
-        Parameter("overshoot", "1", null=0.3, low=0.01, high=0.9, typical=0.3, logarithmic=True),
+        Parameter(
+            "overshoot", "1", null=0.3, low=0.01, high=0.9, typical=0.3, logarithmic=True,
+            reason="less is a lag of first order, more rings without an end",
+        ),
     ),
     claims=Claims(
         "velocity", "odd", amplitude_exponent=1.0, confusable_with=("command_delay", "current_loop_lag")
     ),
     function=apply,
     states=2,
+    response=response,
     about="second-order lag of the motor's current, with overshoot",
     equation="time_constant² · T̈ + 2ζ · time_constant · Ṫ + T = T_command, "
     "overshoot = exp(-πζ / √(1 - ζ²))",

@@ -2,7 +2,9 @@
 
     T = -b_m (1 + relative_change * t / duration) w
 
-b_m is the damping of rotor and gear at the gear output, w its speed against the housing.
+b_m is the damping of rotor and gear at the gear output, w its speed against the housing. Source: Bittencourt,
+Gunnarsson, Static friction in a robot joint, J. Dyn. Syst. Meas. Control 134, 2012 (viscous friction falls as
+it warms).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -18,7 +20,12 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="damping_drift",
     port=Port.GEAR,
-    parameters=(Parameter("relative_change", "1", null=0.0, low=-0.95, high=5.0, typical=0.3),),
+    parameters=(
+        Parameter(
+            "relative_change", "1", null=0.0, low=-0.95, high=5.0, typical=0.3,
+            reason="grease is some times as thick when cold (Bittencourt); damping never ends below zero",
+        ),
+    ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),
     function=apply,
     reads=(GEAR_VELOCITY,),

@@ -47,8 +47,14 @@ EFFECT = Effect(
     port=Port.COMMAND,
     order=5,
     parameters=(
-        Parameter("width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),
-        Parameter("jump", "1", null=0.0, low=0.0, high=1.0, typical=0.0, starts=(1.0,), optional=True),
+        Parameter(
+            "width", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
+            reason="a command below it makes nothing: with the largest torque nothing would move",
+        ),
+        Parameter(
+            "jump", "1", null=0.0, low=0.0, high=1.0, typical=0.0, starts=(1.0,), optional=True,
+            reason="a share",
+        ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=0.0),
     function=apply,

@@ -30,9 +30,18 @@ EFFECT = Effect(
     name="directional_load_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter("motor_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.15),
-        Parameter("load_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.05),
-        Parameter("quadratic", "1/(N m)", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True),
+        Parameter(
+            "motor_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.15,
+            reason="with 1 the gear locks itself",
+        ),
+        Parameter(
+            "load_coefficient", "1", null=0.0, low=0.0, high=0.9, typical=0.05,
+            reason="with 1 the gear locks itself",
+        ),
+        Parameter(
+            "quadratic", "1/(N m)", null=0.0, low=0.0, high=0.1, typical=0.0, optional=True,
+            reason="at the largest torque three times that torque",
+        ),
         PRESLIDING,
     ),
     claims=Claims(
@@ -45,6 +54,7 @@ EFFECT = Effect(
     function=apply,
     states=1,
     reads=(GEAR_VELOCITY, LOAD),
+    tags=("friction",),
     about="friction that grows unequally with the motor's torque and the load",
     equation="T = -(|motor_coefficient · T_m + load_coefficient · T_s| + quadratic · min(|T_m|, |T_s|)²) "
     "· sign(ω), smooth below creep_velocity",

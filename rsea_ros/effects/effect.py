@@ -7,14 +7,17 @@ called through its address, so the step is compiled once for all and a run pays 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 from numba import types
 
 from rsea_ros.compiler import cfunc
+from rsea_ros.effects.compensable import Compensable
 from rsea_ros.effects.guess import Guess, Guesses
+from rsea_ros.effects.parameter import Parameter as Parameter  # files of effects import it from here
+from rsea_ros.effects.scale import Scale
 from rsea_ros.effects.signal_table import Port
 from rsea_ros.errors import ParameterError
 from rsea_ros.wording import shown
@@ -24,10 +27,16 @@ _SIGNATURE = types.void(_POINTER, _POINTER, _POINTER)
 
 _ROUNDING = 1e-9
 """Of the wider bound: what a fitted value may lie beyond it through logarithms and decimal digits."""
-_SIZED = {"N m", "N m/rad", "N m s/rad", "rad/s"}
-_OTHER_MACHINES = 1e3
-"""How many times larger or smaller a machine may be than those that the bounds of the fits suit."""
 Parity = Literal["odd", "even", "neither"]
+Tag = Literal["delay", "play", "mode", "friction", "limit"]
+"""What others have to know of an effect's kind.
+
+delay: shifts the command by its main parameter, s, and does nothing else. play: its main parameter is a gap,
+rad. mode: adds a resonance, near which derivatives do not reach far. friction: a torque of the gear train
+that depends on how it moves. limit: its main parameter is the largest torque, N m.
+"""
+Response = Callable[[Sequence[float], Any], Any]
+"""Parameters in order and s = 2 pi i f, shape (n,), to the factor on the effect's signal, shape (n,)."""
 
 
 class RigLike(Protocol):
@@ -35,47 +44,6 @@ class RigLike(Protocol):
 
     def __getitem__(self, name: str) -> float: ...
     def with_values(self, values: Mapping[str, float]) -> Any: ...
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of an effect, SI.
-
-    null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
-    may well have. starts: where fits begin besides `typical`, for problems with several minima.
-    optional: may be left out; then it is `null`.
-    shapes: counts in the size of the law although it may be left out: it makes another law of it.
-    per_record: another in every record, such as the phase that the mains had when it began.
-    """
-
-    name: str
-    unit: str
-    null: float
-    low: float
-    high: float
-    typical: float
-    starts: tuple[float, ...] = ()
-    logarithmic: bool = False
-    optional: bool = False
-    shapes: bool = False
-    per_record: bool = False
-
-    @property
-    def is_counted(self) -> bool:
-        """Whether a law with this parameter is larger than one without."""
-        return self.shapes or not self.optional
-
-    @property
-    def possible(self) -> tuple[float, float]:
-        """Return what a person may state: the bounds of a fit, wider where they go with a machine's size."""
-        width = _OTHER_MACHINES if self.unit in _SIZED else 1.0
-        return self.low * width if self.low < 0.0 else self.low / width, self.high * width
-
-    @property
-    def bounds(self) -> str:
-        """Return the possible values for people."""
-        low, high = self.possible
-        return f"{low:g} to {high:g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -104,6 +72,9 @@ class Effect:
     is_searched: a diagnosis tries it unasked; one that is not acts only where a rig states it.
     reads: the signals among FIRST_READ … LAST_READ that the function looks at.
     guesses: where fits begin by what a residual shows; without it, at `default_guesses`.
+    tags: of which kind it is. compensation: what a torque controller may add against it, by the same law.
+    response: how it acts on its signal (at a sensor, on ft) where it is linear: for a controller's margins.
+    part: of the bench, where it sits in another than its port says.
     """
 
     name: str
@@ -119,6 +90,10 @@ class Effect:
     about: str = ""
     equation: str = ""
     guesses: Guesses | None = None
+    tags: tuple[Tag, ...] = ()
+    compensation: Compensable | None = None
+    response: Response | None = None
+    part: str = ""
 
     @property
     def main(self) -> Parameter:
@@ -134,6 +109,15 @@ class Effect:
     def typical(self) -> dict[str, float]:
         """Return parameters of a size that a bench may well have."""
         return {p.name: p.typical for p in self.parameters}
+
+    def at(self, scale: Scale) -> Effect:
+        """Return the effect with bounds, sizes and starts that suit a machine."""
+        return replace(self, parameters=tuple(p.at(scale) for p in self.parameters))
+
+    def reaching(self, parameters: Mapping[str, float]) -> Effect:
+        """Return the effect with bounds that hold the parameters which a rig states."""
+        values = self.complete(parameters)
+        return replace(self, parameters=tuple(p.reaching(values[p.name]) for p in self.parameters))
 
     @property
     def default_guesses(self) -> list[Guess]:

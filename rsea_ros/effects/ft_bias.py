@@ -1,6 +1,8 @@
 """F/T sensor whose zero is off.
 
 T_ft = T + bias
+
+Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -17,7 +19,12 @@ EFFECT = Effect(
     name="ft_bias",
     port=Port.SENSOR,
     order=30,
-    parameters=(Parameter("bias", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5),),
+    parameters=(
+        Parameter(
+            "bias", "N m", null=0.0, low=-60.0, high=60.0, typical=0.5,
+            reason="twice the largest torque: the sensor's largest reading holds its bias",
+        ),
+    ),
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_drift",)),
     function=apply,
     about="zero of the F/T sensor that is off",

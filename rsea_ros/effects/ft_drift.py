@@ -2,7 +2,7 @@
 
     T_ft = T + drift * s(t) / s(duration),   s(t) = 1 - exp(-t / time_constant), or t without one
 
-Source: the sensor's manual (warm-up); test of the second bench, ft_thermal.
+Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (interfering input: the temperature).
 """
 
 from rsea_ros.effects._drift import SETTLING, progress
@@ -20,7 +20,13 @@ EFFECT = Effect(
     name="ft_drift",
     port=Port.SENSOR,
     order=30,
-    parameters=(Parameter("drift", "N m", null=0.0, low=-20.0, high=20.0, typical=0.5), SETTLING),
+    parameters=(
+        Parameter(
+            "drift", "N m", null=0.0, low=-60.0, high=60.0, typical=0.5,
+            reason="twice the largest torque: the sensor's largest reading holds its drift",
+        ),
+        SETTLING,
+    ),
     claims=Claims("ft", "even", amplitude_exponent=0.0, confusable_with=("ft_bias",)),
     function=apply,
     about="zero of the F/T sensor that walks during the record",

@@ -1,6 +1,8 @@
 """F/T sensor whose calibration is off.
 
 T_ft = gain * T
+
+Source: Bentley, Principles of Measurement Systems, 2005, section 2.1 (modifying input).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -17,9 +19,15 @@ EFFECT = Effect(
     name="ft_gain_error",
     port=Port.SENSOR,
     order=20,
-    parameters=(Parameter("gain", "1", null=1.0, low=0.2, high=3.0, typical=0.95),),
+    parameters=(
+        Parameter(
+            "gain", "1", null=1.0, low=0.2, high=3.0, typical=0.95,
+            reason="a calibration so far off is another sensor or unit, which the checks of the data find",
+        ),
+    ),
     claims=Claims("ft", "odd", amplitude_exponent=1.0, confusable_with=("torque_constant_error",)),
     function=apply,
+    response=lambda p, s: p[0] + 0.0 * s,
     about="calibration of the F/T sensor that is off",
     equation="T_ft = gain · T",
 )

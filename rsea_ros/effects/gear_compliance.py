@@ -2,7 +2,8 @@
 
     T = stiffness * (q_gear - q_chassis)
 
-The chassis then moves on its own, with its own inertia.
+The chassis then moves on its own, with its own inertia. Source: Spong, Modeling and control of elastic joint
+robots, J. Dyn. Syst. Meas. Control 109, 1987.
 """
 
 import math
@@ -24,14 +25,9 @@ EFFECT = Effect(
     port=Port.STRUCTURE,
     parameters=(
         Parameter(
-            "stiffness",
-            "N m/rad",
-            null=math.inf,
-            low=500.0,
-            high=1e7,
-            typical=1e4,
-            starts=(3e3, 5e4),
+            "stiffness", "N m/rad", null=math.inf, low=500.0, high=1e7, typical=1e4, starts=(3e3, 5e4),
             logarithmic=True,
+            reason="a third of the spring's to thousands of times it, where it does not show",
         ),
     ),
     claims=Claims(

@@ -30,7 +30,12 @@ def change(rig: Any, parameters: Mapping[str, float]) -> Any:
 EFFECT = Effect(
     name="gravity_error",
     port=Port.STRUCTURE,
-    parameters=(Parameter("torque", "N m", null=0.0, low=-50.0, high=50.0, typical=2.0),),
+    parameters=(
+        Parameter(
+            "torque", "N m", null=0.0, low=-50.0, high=50.0, typical=2.0,
+            reason="with more than the largest torque the machine could not hold it",
+        ),
+    ),
     claims=Claims("position", "odd", amplitude_exponent=None),
     structure=change,
     about="weight on the output that the rig does not know of",

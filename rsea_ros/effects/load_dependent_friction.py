@@ -22,7 +22,13 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="load_dependent_friction",
     port=Port.GEAR,
-    parameters=(Parameter("coefficient", "1", null=0.0, low=0.0, high=1.0, typical=0.15), PRESLIDING),
+    parameters=(
+        Parameter(
+            "coefficient", "1", null=0.0, low=0.0, high=1.0, typical=0.15,
+            reason="with 1 the gear locks itself",
+        ),
+        PRESLIDING,
+    ),
     claims=Claims(
         "velocity",
         "odd",
@@ -32,6 +38,7 @@ EFFECT = Effect(
     function=apply,
     states=1,
     reads=(GEAR_VELOCITY, LOAD),
+    tags=("friction",),
     about="friction that grows with the torque in the spring",
     equation="T = -coefficient · |T_s| · sign(ω), smooth below creep_velocity",
 )

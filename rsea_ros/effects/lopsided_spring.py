@@ -27,7 +27,12 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="lopsided_spring",
     port=Port.SPRING,
-    parameters=(Parameter("quadratic", "1/rad", null=0.0, low=-50.0, high=50.0, typical=3.0),),
+    parameters=(
+        Parameter(
+            "quadratic", "1/rad", null=0.0, low=-50.0, high=50.0, typical=3.0,
+            reason="where the largest torque deflects it, the whole stiffness more or less",
+        ),
+    ),
     claims=Claims("position", "even", amplitude_exponent=2.0),
     function=apply,
     is_searched=False,

@@ -1,6 +1,8 @@
 """Mains that the F/T sensor's cable picks up.
 
 T_ft = T + amplitude * sin(2 pi frequency t + phase)
+
+Source: Ott, Electromagnetic Compatibility Engineering, 2009, ch. 2 (cabling).
 """
 
 import math
@@ -21,18 +23,18 @@ EFFECT = Effect(
     port=Port.SENSOR,
     order=40,
     parameters=(
-        Parameter("amplitude", "N m", null=0.0, low=0.0, high=10.0, typical=0.3),
-        Parameter("frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,)),
         Parameter(
-            "phase",
-            "rad",
-            null=0.0,
-            low=-2.0 * math.pi,
-            high=2.0 * math.pi,
-            typical=0.0,
-            starts=(-1.6, 1.6, 3.1),
-            optional=True,
-            per_record=True,
+            "amplitude", "N m", null=0.0, low=0.0, high=60.0, typical=0.3,
+            reason="twice the largest torque: the sensor's largest reading holds the hum",
+        ),
+        Parameter(
+            "frequency", "Hz", null=50.0, low=45.0, high=65.0, typical=50.0, starts=(60.0,), is_fixed=True,
+            reason="50 or 60 Hz on every machine, which a grid keeps to 1 %",
+        ),
+        Parameter(
+            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.0, starts=(-1.6, 1.6,
+            3.1), optional=True, per_record=True, is_fixed=True,
+            reason="a turn either way: a fit may pass the end of one",
         ),
     ),
     claims=Claims("ft", "even", amplitude_exponent=0.0),

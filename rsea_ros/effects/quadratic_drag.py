@@ -25,7 +25,12 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="quadratic_drag",
     port=Port.GEAR,
-    parameters=(Parameter("coefficient", "N m s^2/rad^2", null=0.0, low=0.0, high=500.0, typical=12.0),),
+    parameters=(
+        Parameter(
+            "coefficient", "N m s^2/rad^2", null=0.0, low=0.0, high=500.0, typical=12.0,
+            reason="at the largest speed six times the largest torque",
+        ),
+    ),
     claims=Claims("velocity", "odd", amplitude_exponent=2.0, passive=True),
     function=apply,
     states=1,

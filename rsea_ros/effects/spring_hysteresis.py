@@ -76,9 +76,18 @@ EFFECT = Effect(
     name="spring_hysteresis",
     port=Port.SPRING,
     parameters=(
-        Parameter("torque", "N m", null=0.0, low=0.0, high=20.0, typical=1.0),
-        Parameter("angle", "rad", null=2e-3, low=1e-4, high=0.05, typical=2e-3, logarithmic=True),
-        Parameter("gamma", "1", null=0.0, low=-3.0, high=0.95, typical=0.0, optional=True),
+        Parameter(
+            "torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
+            reason="with more than the largest torque it would not move",
+        ),
+        Parameter(
+            "angle", "rad", null=2e-3, low=1e-4, high=0.05, typical=2e-3, logarithmic=True,
+            reason="a two-hundredth of the deflection that the largest torque makes, to beyond it",
+        ),
+        Parameter(
+            "gamma", "1", null=0.0, low=-3.0, high=0.95, typical=0.0, optional=True,
+            reason="Dahl's 0, Bouc's 1/2, and springs that harden (Ismail), up to where z never ends",
+        ),
     ),
     claims=Claims(
         "velocity",

@@ -1,6 +1,8 @@
 """Spring whose stiffness changes during the record, as by warming.
 
 T_s = K_s (1 + relative_change * t / duration) d
+
+Source: Lakes, Viscoelastic Materials, 2009 (stiffness over time and temperature).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
@@ -16,7 +18,12 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 EFFECT = Effect(
     name="stiffness_drift",
     port=Port.SPRING,
-    parameters=(Parameter("relative_change", "1", null=0.0, low=-0.8, high=3.0, typical=0.1),),
+    parameters=(
+        Parameter(
+            "relative_change", "1", null=0.0, low=-0.8, high=3.0, typical=0.1,
+            reason="a spring does not lose all of its stiffness or gain three times it in a run",
+        ),
+    ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),
     function=apply,
     reads=(DEFLECTION,),

@@ -8,16 +8,23 @@ see _friction.py. Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica
 
 import math
 
-from rsea_ros.effects._friction import PRESLIDING, mean_friction
+from rsea_ros.compiler import njit
+from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+
+
+@njit(inline="always")
+def level(p, w):  # type: ignore[no-untyped-def]
+    """Return the friction torque at a speed, N m."""
+    ratio = w / p[2]
+    return p[0] + p[1] * math.exp(-ratio * ratio)
 
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Subtract the friction torque from the torque on the gear output."""
-    ratio = s[GEAR_VELOCITY] / p[2]
-    x[0] = mean_friction(s, p[0] + p[1] * math.exp(-ratio * ratio), x[0], p[3])
+    x[0] = mean_friction(s, level(p, s[GEAR_VELOCITY]), x[0], p[3])
     s[GEAR_TORQUE] -= x[0]
 
 
@@ -25,10 +32,17 @@ EFFECT = Effect(
     name="stribeck_friction",
     port=Port.GEAR,
     parameters=(
-        Parameter("coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.5),
-        Parameter("stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0),
         Parameter(
-            "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, logarithmic=True
+            "coulomb_torque", "N m", null=0.0, low=0.0, high=50.0, typical=1.5,
+            reason="with more than the largest torque it would not move",
+        ),
+        Parameter(
+            "stribeck_torque", "N m", null=0.0, low=0.0, high=50.0, typical=2.0,
+            reason="with more than the largest torque it would not move",
+        ),
+        Parameter(
+            "stribeck_velocity", "rad/s", null=0.05, low=0.005, high=1.0, typical=0.05, logarithmic=True,
+            reason="from a hundredth of the largest speed to beyond it",
         ),
         PRESLIDING,
     ),
@@ -42,6 +56,8 @@ EFFECT = Effect(
     function=apply,
     states=1,
     reads=(GEAR_VELOCITY,),
+    tags=("friction",),
+    compensation=against(level, creep=3),
     about="friction that is larger near rest than at speed",
     equation="T = -(coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)) · sign(ω), "
     "smooth below creep_velocity",

@@ -21,7 +21,10 @@ EFFECT = Effect(
     name="torque_constant_drift",
     port=Port.MOTOR,
     parameters=(
-        Parameter("relative_change", "1", null=0.0, low=-0.8, high=2.0, typical=-0.15),
+        Parameter(
+            "relative_change", "1", null=0.0, low=-0.8, high=2.0, typical=-0.15,
+            reason="magnets lose 0.2 % a kelvin, but a derating drive may take all",
+        ),
         SETTLING,
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0),

@@ -2,8 +2,9 @@
 
     T_m = gain * T_command
 
-The measured current is turned into torque with the same wrong constant, so it does not show this.
-For one motor the maker's framework states 6.826 N m/A and its data sheet 4.81 N m/A.
+The measured current is turned into torque with the same wrong constant, so it does not show this. For one
+motor the maker's framework states 6.826 N m/A and its data sheet 4.81 N m/A. Source: Hughes, Drury, Electric
+Motors and Drives, 2013, ch. 3 (torque and current).
 """
 
 from collections.abc import Sequence
@@ -38,10 +39,16 @@ def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
 EFFECT = Effect(
     name="torque_constant_error",
     port=Port.MOTOR,
-    parameters=(Parameter("gain", "1", null=1.0, low=_LOW, high=_HIGH, typical=0.9, logarithmic=True),),
+    parameters=(
+        Parameter(
+            "gain", "1", null=1.0, low=_LOW, high=_HIGH, typical=0.9, logarithmic=True,
+            reason="no torque constant is farther from its data sheet",
+        ),
+    ),
     claims=Claims("velocity", "odd", amplitude_exponent=1.0, confusable_with=("ft_gain_error",)),
     function=apply,
     guesses=guesses,
+    response=lambda p, s: p[0] + 0.0 * s,
     about="the motor makes more or less torque than its current says",
     equation="T_motor = gain · T_command",
 )

@@ -2,13 +2,16 @@
 
     T = amplitude * sin(cycles_per_revolution * rotor_angle + phase)
 
-rotor_angle is that of the rotor against the housing, the gear's ratio times that of the output. The torque
-of a step is the mean over it, so ripple faster than the step averages out instead of aliasing.
+rotor_angle is that of the rotor against the housing, the gear's ratio times that of the output. The torque of
+a step is the mean over it, so ripple faster than the step averages out instead of aliasing. Source: Jahns,
+Soong, Pulsating torque minimization techniques for PM AC motor drives, IEEE Trans. Ind. Electron. 43, 1996.
 """
 
 import math
 from collections.abc import Sequence
 
+from rsea_ros.compiler import njit
+from rsea_ros.effects.compensable import OfRotorAngle
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
 from rsea_ros.effects.guess import Guess, ResidualView
 from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
@@ -16,14 +19,21 @@ from rsea_ros.effects.signal_table import GEAR_TORQUE, ROTOR_ANGLE, Port
 LAST, STARTED = range(2)
 
 
+@njit(inline="always")
+def mean_ripple(p, middle, way):  # type: ignore[no-untyped-def]
+    """Return the mean torque over a way of the rotor around an angle: the ripple there times a sinc, N m."""
+    half = 0.5 * p[1] * way
+    share = math.sin(half) / half if half != 0.0 else 1.0
+    return p[0] * share * math.sin(p[1] * middle + p[2])
+
+
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the ripple at the middle of the step, times the sinc of the half angle that the step covers."""
+    """Add the mean ripple over the angle that the step covers."""
     angle = s[ROTOR_ANGLE]
-    half = 0.5 * p[1] * (angle - x[LAST]) if x[STARTED] == 1.0 else 0.0
+    way = angle - x[LAST] if x[STARTED] == 1.0 else 0.0
     x[LAST], x[STARTED] = angle, 1.0
-    share = math.sin(half) / half if half != 0.0 else 1.0
-    s[GEAR_TORQUE] += p[0] * share * math.sin(p[1] * angle + p[2])
+    s[GEAR_TORQUE] += mean_ripple(p, angle, way)
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
@@ -35,25 +45,19 @@ EFFECT = Effect(
     name="torque_ripple",
     port=Port.GEAR,
     parameters=(
-        Parameter("amplitude", "N m", null=0.0, low=0.0, high=20.0, typical=1.0),
         Parameter(
-            "cycles_per_revolution",
-            "1",
-            null=4.0,
-            low=0.2,
-            high=60.0,
-            typical=4.0,
-            starts=(1.0, 2.0, 6.0, 8.0, 12.0),
-            logarithmic=True,
+            "amplitude", "N m", null=0.0, low=0.0, high=50.0, typical=1.0,
+            reason="with more than the largest torque the rotor would stay in a detent",
         ),
         Parameter(
-            "phase",
-            "rad",
-            null=0.0,
-            low=-2.0 * math.pi,
-            high=2.0 * math.pi,
-            typical=0.7,
-            starts=(-2.4, -0.9, 2.3),
+            "cycles_per_revolution", "1", null=4.0, low=0.2, high=60.0, typical=4.0, starts=(1.0, 2.0, 6.0,
+            8.0, 12.0), logarithmic=True,
+            reason="of a slow gear stage to cogging of many poles",
+        ),
+        Parameter(
+            "phase", "rad", null=0.0, low=-2.0 * math.pi, high=2.0 * math.pi, typical=0.7, starts=(-2.4, -0.9,
+            2.3), is_fixed=True,
+            reason="a turn either way: a fit may pass the end of one",
         ),
     ),
     claims=Claims("position", "neither", amplitude_exponent=None),
@@ -61,6 +65,9 @@ EFFECT = Effect(
     states=2,
     reads=(ROTOR_ANGLE,),
     guesses=guesses,
+    compensation=OfRotorAngle(
+        lambda p, start, end: float(mean_ripple.py_func(p, 0.5 * (start + end), end - start))
+    ),
     about="torque that repeats with the rotor's angle",
     equation="T = amplitude · sin(cycles_per_revolution · θ_rotor + phase)",
 )

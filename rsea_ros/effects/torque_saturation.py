@@ -1,6 +1,8 @@
 """Motor torque that stops growing at a limit (of current, voltage or drive).
 
 T_m = min(max(T_command, -limit), limit)
+
+Source: Khalil, Nonlinear Systems, 2002, section 1.2.7.
 """
 
 import math
@@ -23,19 +25,15 @@ EFFECT = Effect(
     order=10,
     parameters=(
         Parameter(
-            "limit",
-            "N m",
-            null=math.inf,
-            low=0.5,
-            high=200.0,
-            typical=15.0,
-            starts=(20.0, 10.0, 6.0),
+            "limit", "N m", null=math.inf, low=0.5, high=200.0, typical=15.0, starts=(20.0, 10.0, 6.0),
             logarithmic=True,
+            reason="a sixtieth of the largest torque to beyond it, where it does not act",
         ),
     ),
     claims=Claims("velocity", "odd", amplitude_exponent=None),
     function=apply,
     guesses=at_limits,
+    tags=("limit",),
     about="motor torque that stops growing at a limit",
     equation="T_motor = min(max(T_command, -limit), limit)",
 )

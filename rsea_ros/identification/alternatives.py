@@ -18,6 +18,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.confidence import Confidence, confidence_of, interval
+from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import misfit_ratios, reweighted
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, solve
@@ -67,8 +68,8 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[A
     problem = solution.problem
     if is_inverse(problem.rig):
         return ()
-    acting = {e.name for e in problem.rig.effects}
-    tried = [(n, _fitted(solution, effect_named(n), run)) for n in LAWS if n not in acting]
+    acting, scale = {e.name for e in problem.rig.effects}, scale_of(problem.cases, problem.rig)
+    tried = [(n, _fitted(solution, effect_named(n).at(scale), run)) for n in LAWS if n not in acting]
     fitted = [(n, s) for n, s in tried if s is not None and s.cost < (1.0 - FALL) * solution.cost]
     best = min((s.cost for _, s in fitted), default=0.0)
     credible = sorted(((n, s) for n, s in fitted if s.cost <= NEAR * best), key=lambda item: item[1].cost)

@@ -18,10 +18,10 @@ import numpy as np
 
 from rsea_ros.identification.confidence import BLOCK, sample_blocks
 from rsea_ros.identification.problem import Problem
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Map, Solution, clock_columns, serial
 from rsea_ros.identification.unknowns import Unknown, clock_rates, clocks
 from rsea_ros.model.inverse import is_inverse
-from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.signals import FloatArray, IntArray
 
 ASKED = 3.5
@@ -43,15 +43,10 @@ class Asked:
     cost: Mapping[str, float] | None = None
 
     @property
-    def sentences(self) -> tuple[str, ...]:
+    def remarks(self) -> tuple[Remark, ...]:
         """What taking the other clocks as right saves; none where it saves little."""
         name, times = max((self.cost or {"": 0.0}).items(), key=lambda item: item[1])
-        if times < WORTH:
-            return ()
-        return (
-            "The sensors' clocks are taken as right where the data ask for no correction: each unknown by "
-            f"{1e6 * CLOCK_DOUBT:.0f} µs, they would make the interval of {name} {times:.1f} times as wide.",
-        )
+        return (Remark("clocks_taken_as_right", (name,), (times,)),) if times >= WORTH else ()
 
 
 def asked_of(solution: Solution, run: Map = serial) -> Asked:

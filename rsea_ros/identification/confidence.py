@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution, central_jacobian
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.signals import FloatArray, IntArray
-from rsea_ros.wording import listed
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
@@ -35,21 +35,6 @@ _INVOLVED = 0.2
 """A parameter moves along with an untold direction when it moves at least so much of the largest."""
 _ALIKE = 0.8
 """Values share a factor when the one that moves least moves so much of the one that moves most."""
-_FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
-_FIXES_LOOP = "A measured motor torque, a gain known from the firmware, or a known inertia would fix it."
-_MEASURE = "Measure it apart, or excite it more."
-_TORQUE_SCALE = (
-    "Without the F/T sensor every torque is known only through the motor constant: "
-    "a constant g times as large scales inertia, damping and stiffness by g."
-)
-_GAIN_SCALE = (
-    "Without the F/T sensor every torque is known only through the loop's gains, and through the motor "
-    "constant where a current was measured: gains g times as large scale inertia, damping and friction by g."
-)
-_REMEDY = {
-    "spring.damping": "Excitation above the resonance, or F/T sensor with encoder, would determine it.",
-    "housing_end.damping": "A free swing of the housing would determine it.",
-}
 
 
 @dataclass(frozen=True)
@@ -146,19 +131,19 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
     return unknown.outer(coordinate - _Z95 * sd), unknown.outer(coordinate + _Z95 * sd)
 
 
-def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[str, ...]:
-    """Return plain sentences on what the data cannot tell, and what would make it so.
+def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
+    """Return what the data cannot determine.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
-    prior's: a common factor of several values cannot be told, only their ratios, or a single value not.
+    prior's: of several values only ratios are determined, or only all together, or a single value is not.
     """
     theta = confidence.theta
     asked = [i for i, u in enumerate(unknowns) if not u.is_clock]
     stuck = [i for i in asked if unknowns[i].at_bound(float(theta[i]))]
     index = [i for i in asked if i not in stuck]
-    sentences = [_bound_sentence(unknowns[i], float(theta[i])) for i in stuck]
+    remarks = [_at_bound(unknowns[i], float(theta[i])) for i in stuck]
     if not index:
-        return tuple(sentences)
+        return tuple(remarks)
     reach = np.array([unknowns[i].reach for i in index])
     size = np.array([_size(unknowns[i], float(theta[i])) for i in index])
     scaled = _without_the_rest(confidence.information, index) * np.outer(reach, reach)
@@ -166,19 +151,19 @@ def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tup
     for vector in vectors[:, values < 1.0].T:
         moved = np.abs(vector * reach / size)
         involved = [unknowns[index[k]] for k in np.flatnonzero(moved > _INVOLVED * moved.max())]
-        sentences.append(_sentence(involved, moved[moved > _INVOLVED * moved.max()]))
-    return tuple(sentences)
+        remarks.append(_remark(involved, moved[moved > _INVOLVED * moved.max()]))
+    return tuple(remarks)
 
 
-def torque_scale(problem: Problem) -> tuple[str, ...]:
-    """Return that every torque rests on the motor constant, where no F/T sensor measures one and no fit asks.
+def torque_scale(problem: Problem) -> tuple[Remark, ...]:
+    """Return on what every torque rests where no F/T sensor measures one and no fit asks for that.
 
-    The motor's torque is its current times that constant: it says nothing of it.
+    The motor's torque is its current times a constant: it says nothing of the constant.
     """
     fitted = any(u.name.startswith("torque_constant_error.") for u in problem.unknowns)
     if fitted or any("ft" in case.measured for case in problem.cases):
         return ()
-    return (_TORQUE_SCALE if problem.rig.loop is None else _GAIN_SCALE,)
+    return (Remark("torque_by_motor_constant" if problem.rig.loop is None else "torque_by_loop_gains"),)
 
 
 def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArray:
@@ -198,25 +183,14 @@ def _size(unknown: Unknown, coordinate: float) -> float:
     return 1.0 if unknown.logarithmic else max(abs(coordinate), 0.1 * unknown.scale)
 
 
-def _bound_sentence(unknown: Unknown, coordinate: float) -> str:
-    return (
-        f"{unknown.name} ran to its bound, {unknown.outer(coordinate):.3g} {unknown.unit}: "
-        "these data show nothing of it, or something that the rig lacks stands in for it."
-    )
+def _at_bound(unknown: Unknown, coordinate: float) -> Remark:
+    return Remark("at_bound", (unknown.name,), (unknown.outer(coordinate),), unknown.unit)
 
 
-def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
+def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:
     """Return what cannot be told of unknowns that move together. moved: how far each, relatively."""
-    names = [u.name for u in unknowns]
+    names = tuple(u.name for u in unknowns)
     if len(names) == 1:
-        prior = np.isfinite(unknowns[0].doubt)
-        source = "what is known of it is the rig's prior" if prior else "they do not show it"
-        remedy = _REMEDY.get(names[0], _MEASURE)
-        return f"{names[0]} is not identifiable from these data: {source}. {remedy}"
-    in_loop = any(name.startswith("controller.") for name in names)
-    if all(u.name in FIELDS for u in unknowns) and moved.min() > _ALIKE * moved.max():
-        return (
-            f"Only ratios of {listed(names)} are identifiable from these data: a common factor is taken from "
-            f"the rig. {_FIXES_LOOP if in_loop else _FIXES}"
-        )
-    return f"{listed(names)} are identifiable from these data only together, not each. {_MEASURE}"
+        return Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)
+    share_a_factor = all(name in FIELDS for name in names) and moved.min() > _ALIKE * moved.max()
+    return Remark("only_ratios" if share_a_factor else "only_together", names)

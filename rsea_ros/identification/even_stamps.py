@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.identification.problem import case_from
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, FloatArray, Record
-from rsea_ros.wording import listed
 
 SCATTER = 0.005
 """Of a period, RMS: what scatters less is taken as stamped right."""
@@ -41,15 +41,10 @@ class Evened:
     scatter: Mapping[str, float]
 
     @property
-    def sentences(self) -> tuple[str, ...]:
-        """Return what was done, in words."""
-        if not self.scatter:
-            return ()
-        sizes = listed([f"{n} by {1e3 * s:.2g} ms RMS" for n, s in sorted(self.scatter.items())])
-        return (
-            f"Stamps scatter about an even clock: {sizes}. The values agree with the even clock, "
-            "so the fit uses it.",
-        )
+    def remarks(self) -> tuple[Remark, ...]:
+        """Return what was done; nothing where no stamps scatter."""
+        names = tuple(sorted(self.scatter))
+        return (Remark("even_clocks", names, tuple(self.scatter[n] for n in names)),) if names else ()
 
 
 def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
+from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.misfit import ratios_of, reweighted
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
@@ -91,7 +92,9 @@ def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
     """Return all that a fit of these cases may move."""
     channels = sorted({n for case in cases for n in case.measured})
-    effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
+    scale = scale_of(cases, rig)
+    stated = ((effect_named(e.name).at(scale).reaching(e.parameters), e.parameters) for e in rig.effects)
+    effects = [unknowns_of_effect(effect, parameters, rig.known) for effect, parameters in stated]
     return (
         *unknowns_of_rig(rig),
         *(u for group in effects for u in group),

@@ -12,7 +12,7 @@ from rsea_ros.identification.alternatives import Alternative, alternatives, span
 from rsea_ros.identification.confidence import (
     confidence_of,
     torque_scale,
-    what_is_not_told,
+    undetermined,
 )
 from rsea_ros.identification.estimates import (
     errors_by_channel,
@@ -77,8 +77,8 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
     report("done", 1.0)
     return replace(
         result,
-        statements=(*steady.sentences, *result.statements),
-        clocks=asked.sentences,
+        remarks=(*steady.remarks, *result.remarks),
+        clocks=asked.remarks,
     )
 
 
@@ -127,7 +127,7 @@ def _result(
         models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        statements=(*torque_scale(problem), *what_is_not_told(problem.unknowns, confidence)),
+        remarks=(*torque_scale(problem), *undetermined(problem.unknowns, confidence)),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )

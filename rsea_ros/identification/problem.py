@@ -68,7 +68,7 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     if is_inverse(rig):
         return _inverse_case(record, rig)
     record = commanded(record, rig)
-    channels = _channels_that_tell(record, rig)
+    channels = channels_that_tell(record, rig)
     beside = [n for n in record.channels if n not in OUTPUTS]
     record = replace(record, channels={n: record[n] for n in (*beside, *channels)})
     floating = frozenset(n for n in channels if rig.zero_unknown(n))
@@ -89,7 +89,7 @@ def case_from(record: Record, rig: Rig, masked: Mapping[str, BoolArray] | None =
     )
 
 
-def _channels_that_tell(record: Record, rig: Rig) -> list[str]:
+def channels_that_tell(record: Record, rig: Rig) -> list[str]:
     """Return the channels to be simulated: those of the rig that have samples enough and are not still.
 
     A sensor that holds one value throughout is dead or unplugged: it has no noise to weigh it by.

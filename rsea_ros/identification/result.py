@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
@@ -82,11 +83,11 @@ class Identification:
 
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
-    frequencies of each of `responses`. statements: plain sentences, one each on what is not identifiable
-    and what would make it so. statics: of slow ramps against a locked output. alternatives: laws that would
-    explain a part of the misfit; the intervals span what each makes of the values. coloured: channels whose
-    residual was taken for coloured noise of the sensor. rig_option: the rig as the user named it.
-    clocks: what unknown clocks of the sensors would cost.
+    frequencies of each of `responses`. remarks: what is not identifiable, and what was done to the stamps.
+    statics: of slow ramps against a locked output. alternatives: laws that would explain a part of the
+    misfit; the intervals span what each makes of the values. coloured: channels whose residual was taken for
+    coloured noise of the sensor. rig_option: the rig as the user named it. clocks: what unknown clocks of
+    the sensors would cost.
     """
 
     rig: Rig
@@ -102,12 +103,12 @@ class Identification:
     models: tuple[ComplexArray, ...] = ()
     overlays: tuple[Overlay, ...] = ()
     statics: Statics | None = None
-    statements: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     notes: tuple[str, ...] = field(default=())
     faults: tuple[Fault, ...] = field(default=())
     alternatives: tuple[str, ...] = ()
     coloured: tuple[str, ...] = ()
-    clocks: tuple[str, ...] = ()
+    clocks: tuple[Remark, ...] = ()
     rig_option: str = ""
 
     @property

@@ -76,6 +76,17 @@ class Unknown:
         """Whether it is the rate of a sensor's clock."""
         return self.name.startswith(CLOCK_RATE + ".")
 
+    def sigmas(self, coordinate: float) -> float:
+        """Return how many sigmas of its prior a value lies from its start.
+
+        A wide doubt is one of the order of magnitude: with 100 % twice the start is one sigma above it, four
+        times two. Below the start, where the value may be next to nothing, sigmas are even.
+        """
+        off = (coordinate - self.inner(self.start)) / self.doubt
+        if off <= 0.0 or self.logarithmic or self.start <= 0.0 or not math.isfinite(self.doubt):
+            return abs(off)
+        return math.log(self.outer(coordinate) / self.start) / math.log1p(self.doubt / self.start)
+
     @property
     def reach(self) -> float:
         """Return how far from its start it may lie when the data say nothing: doubt, else the bounds."""

@@ -47,9 +47,10 @@ class Fit:
         from rsea_ros.report.fault_words import fault_lines
         from rsea_ros.report.identification.terminal import terminal_table
         from rsea_ros.report.identification.words import doubt_sentences, verdict_sentence
+        from rsea_ros.report.remark_words import remark_sentences
 
         damage = [f"data: {line}" for line in fault_lines(self.result.faults)]
-        beside = [*doubt_sentences(self.result), *self.result.statements]
+        beside = [*doubt_sentences(self.result), *remark_sentences(self.result.remarks)]
         table = plain(terminal_table(self.result))
         return "\n".join([verdict_sentence(self.result), *damage, table, *beside])
 

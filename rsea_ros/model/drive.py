@@ -10,7 +10,6 @@ from functools import partial
 from types import MappingProxyType
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from rsea_ros.compiler import njit
 from rsea_ros.errors import IdentificationError
@@ -203,9 +202,17 @@ def _angle(record: Record, ends: FloatArray) -> FloatArray:
         return np.empty(0)
     t, q = _ty(record["position"])
     if "velocity" in record and np.array_equal(record["velocity"].t, t):
-        spline = CubicHermiteSpline(t, q, record["velocity"].y)
-        return np.asarray(spline(np.clip(ends, t[0], t[-1])))
+        return _cubics(t, q, record["velocity"].y, np.clip(ends, t[0], t[-1]))
     return np.interp(ends, t, q)
+
+
+def _cubics(t: FloatArray, y: FloatArray, slope: FloatArray, at: FloatArray) -> FloatArray:
+    """Return at some times within t the cubics through y that have its slope there (Hermite)."""
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    width = t[k + 1] - t[k]
+    u = (at - t[k]) / width
+    left, right = u * (1.0 - u) ** 2 * width * slope[k], u**2 * (u - 1.0) * width * slope[k + 1]
+    return np.asarray(y[k] + (y[k + 1] - y[k]) * u**2 * (3.0 - 2.0 * u) + left + right)
 
 
 def _mean_of_line(knots: FloatArray, y: FloatArray, count: int) -> FloatArray:

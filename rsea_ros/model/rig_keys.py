@@ -1,4 +1,4 @@
-"""The keys of a rig: what each expects. docs/rig.md shows them."""
+"""The keys of a rig with the values that each expects. docs/rig.md shows them."""
 
 from __future__ import annotations
 
@@ -12,106 +12,106 @@ from rsea_ros.model.train import TRAINS
 from rsea_ros.signals import UNITS
 
 _END = {
-    "inertia": "inertia of its load",
-    "damping": "its viscous damping",
-    "stiffness": "its stiffness to ground",
-    "gravity": "m g l of a pendulum: its largest torque",
-    "gravity_angle": "how far from hanging the pendulum is at angle zero",
+    "inertia": "inertia of the load",
+    "damping": "viscous damping of the load",
+    "stiffness": "stiffness to ground",
+    "gravity": "m g l of a pendulum: the largest gravity torque",
+    "gravity_angle": "angle of the pendulum from hanging, at position zero",
 }
 _MEANINGS = {
-    "rotor.reflected_inertia": "rotor inertia, seen at the gear output",
-    "rotor.reflected_damping": "viscous damping of motor and gear, seen there",
-    "gear.ratio": "turns of the motor for one of the output",
-    "gear.stiffness": "of the gear itself",
-    "chassis.inertia": "of what turns with the gear's housing",
-    "spring.stiffness": "of the spring; needed unless it is rigid",
-    "spring.damping": "of the spring",
-    "housing.inertia": "of the housing, where a proximal spring holds it",
-    "proximal_spring.stiffness": "between the housing and its end",
-    "proximal_spring.damping": "of that spring",
+    "rotor.reflected_inertia": "rotor inertia, reflected to the gear output",
+    "rotor.reflected_damping": "viscous damping of motor and gear, reflected to the gear output",
+    "gear.ratio": "turns of the motor for one turn of the output",
+    "gear.stiffness": "stiffness of the gear train",
+    "chassis.inertia": "inertia of the spring chassis, which turns with the gear output",
+    "spring.stiffness": "stiffness of the spring; required unless it is rigid",
+    "spring.damping": "damping of the spring",
+    "housing.inertia": "inertia of the housing, if a proximal spring holds it",
+    "proximal_spring.stiffness": "stiffness between the housing and its end",
+    "proximal_spring.damping": "damping of that spring",
     **{
         f"{end}.{key}": meaning
         for end in END_NAMES
         for key, meaning in _END.items()
     },
-    "spring_end.above_sensor": "share of its inertia between spring and F/T sensor",
+    "spring_end.above_sensor": "share of its inertia between the spring and the F/T sensor",
 }  # fmt: skip
 _TRAINS = ", ".join(f"`{train}`" for train in TRAINS)
 GROUPS = sorted({name.split(".")[0] for name in FIELDS} - {"controller"})
 SWITCHES: Mapping[str, Sequence[Key]] = {
     "gear": (
-        Key("train", _TRAINS, "planetary", "kind of gear train, and what of it is held"),
-        Key("or", "list of trains", "none", "others that it may be, where that is not known"),
+        Key("train", _TRAINS, "planetary", "kind of gear train, and the part that is held"),
+        Key("or", "list of trains", "none", "other possible kinds"),
     ),
     "spring": (Key("rigid", "true or false", "false", "there is no spring"),),
     **{end: (Key("clamped", "true or false", "false", "this end cannot move"),) for end in END_NAMES},
 }  # fmt: skip
 TOP = (
-    Key("name", "text", "name of the file", "of the rig"),
-    Key("about", "text", "empty", "what the bench is"),
-    Key("source", "text", "empty", "where its values come from"),
-    Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "which end the paper calls proximal"),
-    Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "what the encoder reads"),
-    Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "where the F/T sensor sits"),
-    Key("linear", "true or false", "false", "it moves along a line: m, N, kg stand for rad, N m, kg m^2"),
-    Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may move"),
-    Key("sensors", "mapping, a key for each channel", "perfect sensors", "what the sensors add"),
-    Key("controller", "mapping", "none", "position loop that ran during the record, see below"),
+    Key("name", "text", "name of the file", "name of the rig"),
+    Key("about", "text", "empty", "description of the bench"),
+    Key("source", "text", "empty", "source of its values"),
+    Key("proximal", "`housing_end` or `spring_end`", "`housing_end`", "the paper's proximal end"),
+    Key("encoder_end", "`gear_output` or `spring_end`", "`gear_output`", "the part that the encoder reads"),
+    Key("ft_end", "`housing_end` or `spring_end`", "`spring_end`", "the end that carries the F/T sensor"),
+    Key("linear", "true or false", "false", "m, N, kg replace rad, N m, kg m^2"),
+    Key("known", "list of names such as `gear.ratio`", "none", "values that no fit may change"),
+    Key("sensors", "mapping, a key for each channel", "perfect sensors", "noise, steps, clocks"),
+    Key("controller", "mapping", "none", "position loop that was active during the record, see below"),
     Key(
         "hold",
         "`zero`, `first` or `band`",
         "`zero`",
-        "between commands: the last, a line, a band-limited curve",
+        "between commands: the last one, a line, a band-limited curve",
     ),
-    Key("effects", "list", "none", "effects of the catalogue that act"),
+    Key("effects", "list", "none", "active effects of the catalogue"),
     *(Key(group, "mapping", NEEDED if group == "rotor" else "defaults", "see below") for group in GROUPS),
 )
 QUANTITY = (
     Key("value", "number", NEEDED),
     Key("unit", "the unit of the field", NEEDED),
-    Key("spread", "0 to 10, relative, one sigma", "0", "how well the value is known; 0: no fit moves it"),
-    Key("source", "text", "empty", "where the value comes from"),
-    Key("ci95", "[low, high]", "none", "95 % interval that a fit has written"),
+    Key("spread", "0 to 10, relative, one sigma", "0", "uncertainty of the value; 0: no fit changes it"),
+    Key("source", "text", "empty", "source of the value"),
+    Key("ci95", "[low, high]", "none", "95 % interval, written by a fit"),
 )
 SENSOR = (
     Key("noise", "number >= 0", "0", "standard deviation of a sample"),
     Key("quantum", "number >= 0", "0", "smallest step"),
     Key("unit", "unit of the channel", NEEDED),
-    Key("source", "text", "empty", "where the values come from"),
-    Key("zero_unknown", "true or false", "false", "the zero is another one in every record"),
-    Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "how much later than its stamps it reads"),
-    Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "by how much later still with time"),
+    Key("source", "text", "empty", "source of the values"),
+    Key("zero_unknown", "true or false", "false", "the zero differs from record to record"),
+    Key("clock", "{value: …, unit: s}, below 0.01 s", "0 s", "delay of the reading after its stamp"),
+    Key("clock_rate", "{value: …, unit: ppm}, below 1000 ppm", "0 ppm", "growth of that delay with time"),
 )
 CLOCK = (
     Key("value", "number", NEEDED),
     Key("unit", "s", NEEDED),
-    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma: a fit looks for the rest"),
+    Key("doubt", "s, > 0, below 0.01 s", f"{CLOCK_DOUBT:g} s", "one sigma of `value`"),
 )
 CLOCK_RATE = (Key("value", "number", NEEDED), Key("unit", "ppm", NEEDED))
-LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "its targets command the bench")
+LOOP_KIND = Key("kind", ", ".join(f"`{k}`" for k in LOOP_FIELDS), NEEDED, "kind of the position loop")
 _LOOP_MEANINGS = {
-    "k_p": "torque for an error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",
-    "k_i": "for its integral",
-    "k_d": "against the speed",
-    "k_f": "for the speed of the target",
-    "k_pos": "speed asked for an error: u = k_v e_v + k_vi int e_v dt, e_v = k_pos e - dq/dt",
-    "k_v": "torque for an error of the speed",
-    "k_vi": "for its integral",
+    "k_p": "torque per error: u = k_p e + k_i int e dt - k_d dq/dt + k_f dr/dt",
+    "k_i": "torque per integral of the error",
+    "k_d": "damping torque per speed",
+    "k_f": "feed-forward torque per speed of the target",
+    "k_pos": "desired speed per error: u = k_v e_v + k_vi int e_v dt, e_v = k_pos e - dq/dt",
+    "k_v": "torque per error of the speed",
+    "k_vi": "torque per integral of the speed error",
     "torque_limit": "largest torque",
-    "velocity_limit": "largest speed of the target (pd), or that is asked (cascade)",
-    "sample_time": "period of the firmware; 0: continuous",
+    "velocity_limit": "largest speed of the target (pd), largest desired speed (cascade)",
+    "sample_time": "sample period of the firmware; 0: continuous",
 }
 CONTROLLER = (
     Key("k_p", "1/s, >= 0", NEEDED, "command = k_v (k_p (reference - q) - dq/dt)"),
     Key("k_v", "N m s/rad, >= 0", NEEDED),
     Key("limit", "N m, > 0", "no limit", "largest command"),
-    Key("source", "text", "empty", "where the values come from"),
+    Key("source", "text", "empty", "source of the values"),
 )
 EFFECT = (
     Key("name", "name of an effect, each once", NEEDED),
     Key("parameters", "mapping of numbers in SI, within their bounds", NEEDED),
-    Key("guess", "true or false", "false", "identify begins with it, diagnose has to find it by itself"),
-    Key("ci95", "mapping", "none", "95 % intervals that a diagnosis has written"),
+    Key("guess", "true or false", "false", "identify starts with it; diagnose has to find it"),
+    Key("ci95", "mapping", "none", "95 % intervals, written by a diagnosis"),
 )
 
 
@@ -139,12 +139,12 @@ def _loop_table(kind: str) -> str:
 def _key(name: str, field: Field) -> Key:
     expects, default = _expected(field)
     if name.endswith("_end.inertia"):
-        default = "needed unless clamped"
+        default = "required unless clamped"
     return Key(name.split(".")[1], expects, default, _MEANINGS[name])
 
 
 def _expected(field: Field) -> tuple[str, str]:
-    """Return what a value must be, and what it is where it is not stated."""
+    """Return the expected value of a field, and its default."""
     bound = f", {'>=' if field.low_allowed else '>'} {field.low:g}" if math.isfinite(field.low) else ""
     if field.default is None:
         return f"{field.unit}{bound}", NEEDED

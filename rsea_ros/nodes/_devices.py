@@ -19,7 +19,6 @@ from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import Limits
 from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
 from rsea_ros.hardware.outside import outside_device
-from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_fields import END_NAMES
@@ -110,6 +109,8 @@ def _check_applicable(values: Values, rig: Rig) -> None:
 
 
 def _simulated(values: Values) -> Device:
+    from rsea_ros.hardware.simulated import SimulatedDevice  # and a compiler, which no real bench needs
+
     return SimulatedDevice(load_rig(values["rig"]), values["rate"], seed=values["seed"])
 
 

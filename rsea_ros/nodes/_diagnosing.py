@@ -13,6 +13,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.model.rig import Rig
 from rsea_ros.new_files import Place
 from rsea_ros.nodes._health import OK, WARN, Report
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import REPORT
 from rsea_ros.signals import Record
@@ -104,4 +105,4 @@ def report_of(diagnosis: Diagnosis, report: Path) -> Report:
         values[f"{cause.name}.probability"] = f"{cause.probability:.2f}"
     values["faults"] = "; ".join(fault_lines(diagnosis.faults))
     level = OK if diagnosis.verdict == "nothing_wrong" and not diagnosis.faults else WARN
-    return Report(level, diagnosis.sentence, {**values, "report": report})
+    return Report(level, diagnosis_sentence(diagnosis), {**values, "report": report})

@@ -34,6 +34,7 @@ from rsea_ros.nodes._trial import Ears, Trial
 from rsea_ros.report.campaign.files import write_campaign
 from rsea_ros.report.campaign.words import end_sentence, known
 from rsea_ros.report.diagnosis.files import write_diagnosis
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.experiment.words import shape_words
 from rsea_ros.signals import Record
 
@@ -194,7 +195,7 @@ class Experiment:
             )
         except RseaError as error:
             return f"none: {' '.join(str(error).split())}"
-        return verdict.sentence
+        return diagnosis_sentence(verdict)
 
     def close(self) -> None:
         """Zero torque first; then let the loop's thread end."""

@@ -27,6 +27,7 @@ from rsea_ros.nodes._parameters import AXIS, Parameter
 from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.file_names import IDENTIFICATION
 from rsea_ros.report.identification.words import verdict_sentence
@@ -97,7 +98,7 @@ class Identify:
         self._answering += 1
         try:
             diagnosis = await self._diagnosing.begin(self._record(strict=False))
-            response.success, response.message = True, diagnosis.sentence
+            response.success, response.message = True, diagnosis_sentence(diagnosis)
         except (RseaError, OSError) as error:
             response.success, response.message = False, " ".join(str(error).split())
         finally:

@@ -100,5 +100,5 @@ def test_identify_says_first_what_is_wrong_and_leaves_a_dead_channel_out(bag, go
 def test_identify_asks_whether_it_is_the_right_rig(bag, tmp_path, capsys):
     assert main(["identify", bag(), "--rig", "prototype_knee", "--out", str(tmp_path / "out")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "held against rig prototype_knee:"
+    assert lines[0] == "compared with rig prototype_knee:"
     assert "is this the right rig?" in lines[1]

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer import motor
 from rsea_ros.hardware.peer.remote import RemoteBench
@@ -47,15 +48,16 @@ def test_a_request_that_it_does_not_know_is_answered_and_changes_nothing(tmp_pat
         (("--return-delay", 300), "rsea bench: --return-delay 300, expected 0 to 254 (unit 2 µs)\n"),
     ],
 )
-def test_what_no_bench_can_have_is_refused(words, message):
-    _, errors = (process := start(*words)).communicate(timeout=30)
-    assert (process.returncode, errors) == (2, message)
+def test_what_no_bench_can_have_is_refused(words, message, capsys):
+    assert main(["bench", *map(str, words)]) == 2
+    assert capsys.readouterr() == ("", message)
 
 
-def test_a_file_in_the_place_of_the_port_stays(tmp_path):
+def test_a_file_in_the_place_of_the_port_stays(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("precious")
-    _, errors = (process := start("--port", tmp_path / "thesis.tex")).communicate(timeout=30)
-    assert (process.returncode, errors.count("\n")) == (2, 1)
+    assert main(["bench", "--port", str(tmp_path / "thesis.tex")]) == 2
+    errors = capsys.readouterr().err
+    assert errors.count("\n") == 1
     assert "thesis.tex: exists already, expected a new name" in errors
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 

@@ -9,6 +9,7 @@ from independent.hidden import hide
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import remark_sentences
 
 
 def test_strong_cogging_is_named_with_its_size():
@@ -23,4 +24,4 @@ def test_strong_cogging_is_named_with_its_size():
     assert sizes["amplitude"].value == pytest.approx(amplitude, rel=0.02)
     assert sizes["cycles_per_revolution"].value == pytest.approx(cycles, rel=0.001)
     assert diagnosis.causes[0].gain_holdout > 0.9
-    assert any("measured rotor angle" in sentence for sentence in diagnosis.statements)
+    assert any("measured rotor angle" in sentence for sentence in remark_sentences(diagnosis.remarks))

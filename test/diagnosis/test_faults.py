@@ -10,7 +10,9 @@ from independent.faults import FAULTS
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.diagnosis.words import headline
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
 
@@ -46,7 +48,7 @@ def test_a_dead_sensor_is_told_and_the_others_carry_on(good, name, value):
     diagnosis = diagnose([dead], load_rig("paper_high_impedance"))
     assert {f.channel for f in diagnosis.faults} == {name}
     assert (diagnosis.verdict, diagnosis.causes, diagnosis.next_experiment) == ("unexplained", (), None)
-    assert "measures nothing and is left out" in diagnosis.sentence
+    assert "measures nothing and is left out" in diagnosis_sentence(diagnosis)
     assert headline(diagnosis).endswith("measures nothing; in the other channels only noise is left")
 
 
@@ -56,10 +58,11 @@ def test_stamps_that_scatter_are_put_on_the_even_clock_and_it_is_said(good):
     scattered = {n: Channel(c.t + off[0 if n == "ft" else 1], c.y) for n, c in good.channels.items()}
     diagnosis = diagnose([good.with_channels(**scattered)], load_rig("paper_high_impedance"))
     assert diagnosis.verdict == "nothing_wrong"
-    assert diagnosis.statements[0].startswith("Stamps scatter about an even clock: command by 0.17 ms RMS")
+    first = remark_sentences(diagnosis.remarks)[0]
+    assert first.startswith("Stamps scatter about an even clock: command by 0.17 ms RMS")
 
 
 def test_a_diagnosis_without_the_ft_sensor_says_what_every_torque_rests_on(good):
     without = Record({n: c for n, c in good.channels.items() if n != "ft"}, "without")
     diagnosis = diagnose([without], load_rig("paper_high_impedance"))
-    assert diagnosis.statements[0].startswith("Without the F/T sensor every torque is known only through")
+    assert diagnosis.remarks[0].code == "torque_by_motor_constant"

@@ -14,6 +14,7 @@ from rsea_ros.identification.excitation import JOINT, excitation
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
 TRIED = ("coulomb_friction", "command_delay", "backlash", "stribeck_friction", "current_loop_lag")
@@ -37,7 +38,7 @@ def test_friction_and_a_delay_of_the_targets():
     assert sizes["coulomb_friction"] == pytest.approx(0.2, rel=0.03)
     assert sizes["command_delay"] == pytest.approx(0.015, abs=3e-4)
     assert found.verdict == "explained"
-    assert any("cannot determine the play in the gear" in s for s in found.statements)
+    assert any("cannot determine the play in the gear" in s for s in remark_sentences(found.remarks))
 
 
 def test_a_joint_that_is_as_its_rig_says_but_for_its_values():

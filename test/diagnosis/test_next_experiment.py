@@ -84,7 +84,7 @@ def test_a_run_that_cannot_be_made_is_none():
 
 
 @pytest.mark.parametrize(
-    ("times_noise", "factor"), [(40.0, "half"), (1.3, "twice"), (1.02, None)]
+    ("times_noise", "factor"), [(40.0, 0.5), (1.3, 2.0), (1.02, None)]
 )
 def test_an_amplitude_series_is_printed_only_where_its_residual_would_be_seen(times_noise, factor):
     rig = load_rig("paper_high_impedance")
@@ -93,8 +93,8 @@ def test_an_amplitude_series_is_printed_only_where_its_residual_would_be_seen(ti
     experiment = amplitude_series(solution, times_noise, RATE)
     assert (experiment is None) == (factor is None)
     if factor:
-        assert f"at {factor} the amplitude" in experiment.why
-        assert experiment.excitation["peak"] == pytest.approx({"half": 10.0, "twice": 40.0}[factor], rel=0.01)
+        assert (experiment.reason, experiment.amplitude) == ("amplitude_series", factor)
+        assert experiment.excitation["peak"] == pytest.approx(20.0 * factor, rel=0.01)
 
 
 def test_twice_an_amplitude_at_the_limit_is_not_printed():

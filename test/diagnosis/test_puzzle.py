@@ -7,6 +7,7 @@ from independent.puzzle import DELAY, RESONANCE, delayed, noisy_resonance
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import remark_sentences
 
 
 def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
@@ -15,7 +16,7 @@ def test_a_resonance_is_found_in_the_noise_and_what_the_noise_hides_is_said():
     for name in ("frequency", "participation"):
         low, high = diagnosis.causes[0].parameters[name].ci95
         assert low < RESONANCE[name] < high
-    lost = next(s for s in diagnosis.statements if "coherence" in s)
+    lost = next(s for s in remark_sentences(diagnosis.remarks) if "coherence" in s)
     assert float(lost.split()[1]) == pytest.approx(19.0, abs=1.5)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from effect_bench import ON_THE_BENCH, RIG, SIGNALS, command, difference, drive, record_of, rms, simulate
 
+from rsea_ros.effects._page import EffectPage
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
@@ -119,6 +120,8 @@ def test_described_for_people_and_fits(effect: Effect):
         assert p.low < p.high
         assert all(p.low <= v <= p.high for v in (p.typical, *p.starts)), p.name
         assert not p.logarithmic or p.low > 0.0
+        assert 15 < len(p.reason) < 110 or p.reason == "a share", p.name
+    assert "Source:" in EffectPage(effect).description
 
 
 @every_effect

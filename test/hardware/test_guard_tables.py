@@ -49,7 +49,7 @@ def test_commands_within_the_limits_are_not_counted():
 def test_no_command_is_no_torque_and_no_fault():
     it = guard()
     assert torques(it, (9.0, 0.0), (9.0, None), (9.0, None)) == [9.0, 0.0, 0.0]
-    assert it.fault is None
+    assert it.fault is None and it.limited == 0
 
 
 @pytest.mark.parametrize(("age", "tripped"), [(0.05, False), (0.0501, True)])
@@ -208,6 +208,16 @@ def test_a_torque_shows_in_the_measured_one_within_three_cycles():
     misses(it, 0.0, 0.0, 0.0, wanted=0.0)
     assert misses(it, 0.0, 0.0, 0.0, 0.0, 0.0, wanted=10.0) == [False] * 5, "the first miss is the third"
     assert misses(it, 0.0, wanted=10.0) == [True]
+
+
+@pytest.mark.parametrize("measured", [10.0, -10.0])
+def test_a_torque_between_the_last_ones_written_is_not_missed(measured):
+    it = guard(**EFFORT)
+    for k in range(12):
+        it.allowed(10.0 * (-1) ** k, 0.0)
+        if k > 1:
+            it.look(reading(measured))
+    assert it.fault is None
 
 
 def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():

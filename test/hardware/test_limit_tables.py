@@ -133,6 +133,11 @@ def test_a_fault_in_words(fault, text):
     assert str(fault) == text
 
 
+def test_a_fault_without_a_measured_value_has_no_unit():
+    bare = Fault("heldup")
+    assert math.isnan(bare.value) and math.isnan(bare.limit) and (bare.unit, bare.detail) == ("", "")
+
+
 @pytest.mark.parametrize(
     ("limits", "message"),
     [

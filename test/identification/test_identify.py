@@ -12,6 +12,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.remark_words import remark_sentences
 
 SEEDS = range(24)
 
@@ -57,7 +58,7 @@ def test_the_residual_is_the_noise_and_the_values_are_narrow():
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-4)
     assert result.rig["rotor.reflected_inertia"] == pytest.approx(true["rotor.reflected_inertia"], rel=1e-3)
     assert min(result.fit_percent.values()) > 98.0
-    assert result.statements == ()
+    assert result.remarks == ()
 
 
 def test_torque_alone_tells_only_ratios():
@@ -66,7 +67,7 @@ def test_torque_alone_tells_only_ratios():
     result = identify([only(recorded(true, 2, 20.0), "ft")], nominal)
     told = {p.name: p.told_by_data for p in result.parameters}
     assert all(told[name] < 0.01 for name in nominal.free()), told
-    (sentence,) = result.statements
+    (sentence,) = remark_sentences(result.remarks)
     assert sentence.startswith("Only ratios of ")
     assert all(name in sentence for name in nominal.free())
     assert "encoder" in sentence
@@ -82,14 +83,14 @@ def test_with_the_encoder_all_are_told():
     nominal, true = bench("paper_high_impedance", 2)
     result = identify([only(recorded(true, 2, 20.0), "ft", "position")], nominal)
     assert all(p.told_by_data > 0.99 for p in result.parameters if p.name in nominal.free())
-    assert result.statements == ()
+    assert result.remarks == ()
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=1e-3)
 
 
 def test_the_encoder_alone_does_not_tell_the_dampings_apart():
     nominal, true = bench("paper_high_impedance", 3)
     result = identify([only(recorded(true, 3, 10.0), "position")], nominal)
-    scale, sentence = result.statements
+    scale, sentence = remark_sentences(result.remarks)
     assert sentence.startswith("spring.damping")
     assert scale.startswith("Without the F/T sensor every torque is known only through the motor constant")
     both = [rig["rotor.reflected_damping"] + rig["spring.damping"] for rig in (result.rig, true)]
@@ -117,7 +118,7 @@ def test_an_effect_that_never_shows_is_not_told():
     assert limit.ci95 == (0.5, 200.0)
     assert (
         "torque_saturation.limit is not identifiable from these data: they do not show it"
-        in result.statements[0]
+        in remark_sentences(result.remarks)[0]
     )
 
 

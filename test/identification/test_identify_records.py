@@ -14,6 +14,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.model.rig import Controller, Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
 PERIOD = 1.0 / RATE
@@ -171,7 +172,8 @@ def test_stamps_that_scatter_about_the_clock_of_a_sensor_are_put_on_it(case):
     }
     result = identify([record.with_channels(**scattered)], nominal)
     assert result.verdict == "adequate"
-    assert result.statements[0].startswith("Stamps scatter about an even clock: ft by 0.17 ms RMS")
+    first = remark_sentences(result.remarks)[0]
+    assert first.startswith("Stamps scatter about an even clock: ft by 0.17 ms RMS")
     agree(result, true)
 
 
@@ -187,7 +189,7 @@ def test_so_are_the_stamps_of_commands(case, clocks):
     }
     result = identify([record.with_channels(**scattered)], nominal)
     assert result.verdict == "adequate"
-    assert "command by 0.17 ms RMS" in result.statements[0]
+    assert "command by 0.17 ms RMS" in remark_sentences(result.remarks)[0]
     agree(result, true)
 
 
@@ -198,7 +200,7 @@ def test_commands_that_did_act_at_scattered_stamps_stay(case):
     late = Channel(command.t + rng.uniform(0.0, 6e-4, len(command)), command.y)
     stamps = {n: record[n].t for n in ("ft", "position", "velocity")}
     result = identify([sampled(true, record.with_channels(command=late), stamps, 13)], nominal)
-    assert result.statements == ()
+    assert result.remarks == ()
     agree(result, true)
 
 
@@ -207,7 +209,7 @@ def test_stamps_at_which_a_sensor_did_measure_stay_however_they_scatter(case):
     rng = np.random.default_rng(10)
     stamps = {n: record[n].t + rng.uniform(0.0, 6e-4, len(record[n])) for n in ("ft", "position", "velocity")}
     result = identify([sampled(true, record, stamps, 10)], nominal)
-    assert result.statements == ()
+    assert result.remarks == ()
     agree(result, true)
 
 

@@ -15,6 +15,7 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
 TRUE = {
@@ -74,8 +75,8 @@ def test_without_a_current_only_ratios_to_the_gains_are_told(stiff):
     whole = run(stiff.with_values({n: v for n, v in TRUE.items() if n != "controller.k_p"}))
     only = replace(whole, channels={n: whole[n] for n in ("reference", "position")})
     result = identify([only], nominal)
-    assert any("controller.k_p" in s and "identifiable" in s for s in result.statements)
-    assert any("loop's gains" in s for s in result.statements)
+    assert any("controller.k_p" in s and "identifiable" in s for s in remark_sentences(result.remarks))
+    assert any("loop's gains" in s for s in remark_sentences(result.remarks))
     estimate, sigma = value(result, "controller.k_p")
     assert sigma > 0.1 * estimate
 

@@ -12,6 +12,7 @@ from rsea_ros.identification import confidence
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.problem import case_from
+from rsea_ros.identification.remark import Remark
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -32,5 +33,5 @@ def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_so(m
     monkeypatch.setattr(confidence, "central_jacobian", lambda *_: matrix)
     doubt = confidence.confidence_of(replace(solution, jacobian=matrix))
     assert np.sqrt(doubt.covariance[i, i]) == pytest.approx(solution.problem.unknowns[i].reach, rel=1e-6)
-    sentences = confidence.what_is_not_told(solution.problem.unknowns, doubt)
-    assert any(s.startswith("nonlinear_spring.cubic is not identifiable") for s in sentences)
+    remarks = confidence.undetermined(solution.problem.unknowns, doubt)
+    assert Remark("not_shown", ("nonlinear_spring.cubic",)) in remarks

@@ -16,6 +16,7 @@ from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Identification, Overlay, ParameterEstimate
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
@@ -82,7 +83,7 @@ def identification() -> Identification:
         responses=responses,
         models=tuple(frequency_response(rig, o, r.frequency) for o, r in zip(what, responses, strict=True)),
         overlays=tuple(Overlay(n, record[n].t, record[n].y, simulated[n]) for n in sensors),
-        statements=("spring.damping is not identifiable from these data.",),
+        remarks=(Remark("not_shown", ("spring.damping",)),),
     )
 
 

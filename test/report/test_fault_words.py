@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rsea_ros.diagnosis.sentences import verdict_sentence
+from rsea_ros.report.diagnosis.sentences import verdict_sentence
 from rsea_ros.report.fault_words import fault_lines, faults
 from rsea_ros.signals import Fault
 

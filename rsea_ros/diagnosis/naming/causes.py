@@ -11,14 +11,14 @@ from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Reason, Rejected
+from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
 from rsea_ros.diagnosis.score import gain, score_on
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.diagnosis.sentences import evidence_of
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
@@ -27,8 +27,6 @@ MODEL_DOUBT = 0.0025
 """Relative, one sigma: measured between the simulation and the second bench in test/independent."""
 _FALLS = 1.02
 """Ratio by which a channel's residual must fall for a cause's gain to speak of that channel."""
-PLAY = "backlash"
-_GAP = f"{PLAY}.gap"
 
 
 def cause_of(
@@ -54,9 +52,7 @@ def cause_of(
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
-        evidence=evidence_of(
-            effect, speaks, without.test.ratio(speaks), with_it.test.ratio(speaks), held_out
-        ),
+        times_noise=(without.test.ratio(speaks), with_it.test.ratio(speaks)),
         equation=effect.equation,
         channel=speaks,
         confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
@@ -131,16 +127,25 @@ def dropped_of(
     return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
 
 
-def play_not_told(selection: Selection, result: Diagnosis) -> tuple[str, ...]:
-    """Return the sentence for a joint in a position loop whose play these data do not show."""
-    named = {cause.name for cause in result.causes}
-    trials = [trial for trial in selection.trials if trial.name == PLAY]
-    gains = [rejected.gain_holdout for rejected in result.rejected if rejected.name == PLAY]
-    if result.baseline_rig.loop is None or PLAY in named or not (trials and gains):
+def undetermined_play(
+    selection: Selection, causes: Sequence[Cause], rejected: Sequence[Rejected]
+) -> tuple[Remark, ...]:
+    """Return what a joint's log says of play that is no cause: people ask for it by name."""
+    if selection.last.problem.rig.loop is None or any(_is_play(cause.name) for cause in causes):
         return ()
-    unknowns = zip(trials[-1].problem.unknowns, trials[-1].theta, strict=True)
-    gap = next(u.outer(float(value)) for u, value in unknowns if u.name == _GAP)
-    return (
-        f"These data cannot determine the play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the "
-        f"residual of data that took no part changes by {-100.0 * gains[-1]:+.1f} %.",
-    )
+    trials = [trial for trial in selection.trials if _is_play(trial.name)]
+    gains = {effect.name: effect.gain_holdout for effect in rejected}
+    if not trials or trials[-1].name not in gains:
+        return ()
+    return (Remark("play_undetermined", values=(_gap(trials[-1]), gains[trials[-1].name])),)
+
+
+def _is_play(name: str) -> bool:
+    return "play" in effect_named(name).tags
+
+
+def _gap(trial: Trial) -> float:
+    """Return the gap of a trial with play, rad."""
+    main = f"{trial.name}.{effect_named(trial.name).main.name}"
+    unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
+    return next(u.outer(float(value)) for u, value in unknowns if u.name == main)

@@ -6,7 +6,6 @@ makes a probability of it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from rsea_ros.diagnosis.criteria import preference
@@ -90,12 +89,10 @@ def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | 
 
 def is_at_edge(problem: Problem, theta: FloatArray, name: str) -> bool:
     """Tell whether a parameter of an effect, optional ones apart, has run to a bound of what it may be."""
-    parameters = {f"{name}.{p.name}": p for p in effect_named(name).parameters if not p.optional}
+    parameters = {f"{name}.{p.name}" for p in effect_named(name).parameters if not p.optional}
     for unknown, t in zip(problem.unknowns, theta, strict=True):
-        p = parameters.get(unknown.name)
-        if p is None or (p.unit == "rad" and math.isclose(p.high - p.low, 2.0 * math.pi, rel_tol=0.1)):
-            continue
-        margin = _NEAR * (p.high - p.low)
-        if not p.low + margin < unknown.outer(float(t)) < p.high - margin:
+        margin = _NEAR * (unknown.high - unknown.low)
+        inside = unknown.low + margin < unknown.outer(float(t)) < unknown.high - margin
+        if unknown.name in parameters and not inside:
             return True
     return False

@@ -21,9 +21,9 @@ import numpy as np
 
 from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.evidence import Claim
-from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
@@ -42,8 +42,13 @@ class Contest:
     rivals: tuple[Claim, ...]
 
 
-def contests(selection: Selection, stages: Sequence[Evaluated], pools: Pools) -> list[Contest]:
-    """Return the contest for the place of each accepted cause, in the order of the stages."""
+def contests(
+    selection: Selection, stages: Sequence[Evaluated], held_out: HeldOut, pools: Pools, far: float
+) -> list[Contest]:
+    """Return the contest for the place of each accepted cause, in the order of the stages.
+
+    far: from how many times the noise on the data are tempered (tempering.py).
+    """
     result = []
     for without, with_it in itertools.pairwise(stages):
         name = with_it.added
@@ -51,7 +56,7 @@ def contests(selection: Selection, stages: Sequence[Evaluated], pools: Pools) ->
         claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
         rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
         tried = beside(selection, rounds[-1].beside) if rounds else []
-        result.append(weighed(selection, claim, tried, pools))
+        result.append(weighed(selection, claim, tried, held_out, pools, far))
     return result
 
 
@@ -61,26 +66,32 @@ def beside(selection: Selection, model: Candidate) -> list[Trial]:
     return list(full.values())
 
 
-def weighed(selection: Selection, claim: Claim, tried: Sequence[Trial], pools: Pools) -> Contest:
+def weighed(
+    selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
+) -> Contest:
     """Return a contest of a claim with what was tried beside the same model, or does as well in its place.
 
     Another cause that was accepted too is no rival, whichever of the two came first.
     """
-    cases, last = selection.cases, set(selection.last.causes)
+    last = set(selection.last.causes)
     tried = [t for t in tried if t.name == claim.name or t.name not in last]
-    scores = list(pools.fits.map(lambda t: trial_score(t, cases), tried))
+    scores = list(pools.fits.map(lambda t: held_out.score(t.problem, t.theta), tried))
     priors = [prior_cost(t.problem, t.theta) for t in tried]
-    weights = _stacked(scores, priors, [effect_size(t.name) for t in tried])
+    weights = _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
     of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
-        Claim(t.name, t.problem, t.theta, s, score_on(t.problem, cases, TEST, t.beside.outputs), of[t.name])
+        Claim(t.name, t.problem, t.theta, s, _score_beside(t, held_out), of[t.name])
         for t, s in zip(tried, scores, strict=True)
         if t.name != claim.name
     ]
     swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(last)]
-    own, others = of.get(claim.name, 1.0), _weights_of(selection, swapped)
-    for model, weight in zip(swapped, others[1:], strict=True):
-        rivals.append(_in_place(claim, model, cases, weight))
+    models = [selection.last, *swapped]
+    tested = [_score_of(m, held_out) for m in models]
+    others = _stacked(tested, [m.prior_cost for m in models], [m.size for m in models], far)
+    own = of.get(claim.name, 1.0)
+    for model, with_it, weight in zip(swapped, tested[1:], others[1:], strict=True):
+        theta = model.solution.theta
+        rivals.append(Claim(model.newest, model.problem, theta, with_it, claim.without, weight))
     heavy = sorted((r for r in rivals if r.weight >= LEAST_WEIGHT), key=lambda r: -r.weight)
     once = {r.name: r for r in reversed(heavy)}
     kept = sorted(once.values(), key=lambda r: -r.weight)[:MOST_RIVALS]
@@ -93,21 +104,18 @@ def trial_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
     return score_on(problem, cases, TEST, problem.outputs(trial.theta))
 
 
-def _in_place(claim: Claim, model: Candidate, cases: tuple[Case, ...], weight: float) -> Claim:
-    """Return the claim of another effect that does as well in a cause's place."""
-    problem, theta = model.solution.problem, model.solution.theta
-    tested = score_on(problem, cases, TEST, model.outputs)
-    return Claim(model.newest, problem, theta, tested, claim.without, weight)
+def _score_beside(trial: Trial, held_out: HeldOut) -> Score:
+    """Return how the model does beside which an effect was tried."""
+    return _score_of(trial.beside, held_out)
 
 
-def _weights_of(selection: Selection, rivals: Sequence[Candidate]) -> list[float]:
-    """Return the weights of the last model and of those with another effect in a cause's place."""
-    models = [selection.last, *rivals]
-    scores = [score_on(m.solution.problem, selection.cases, TEST, m.outputs) for m in models]
-    return _stacked(scores, [m.prior_cost for m in models], [m.size for m in models])
+def _score_of(model: Candidate, held_out: HeldOut) -> Score:
+    return held_out.score(model.problem, model.solution.theta, model.outputs)
 
 
-def _stacked(scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int]) -> list[float]:
+def _stacked(
+    scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], far: float
+) -> list[float]:
     """Return weights; every number that describes an effect costs the logarithm of the number of blocks.
 
     A law that holds another as a special case does as well wherever the other is right (Schwarz, Annals of
@@ -116,7 +124,7 @@ def _stacked(scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[i
     if not scores:
         return []
     best = min(scores, key=lambda s: float(s.loss(s).sum()))
-    losses = [s.loss(best) for s in scores]
+    losses = [tempered_loss(s, best, far) for s in scores]
     prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
     return [float(w) for w in stacked(losses, prices)]
 

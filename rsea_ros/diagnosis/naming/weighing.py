@@ -15,7 +15,7 @@ from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
+from rsea_ros.diagnosis.evaluation import Evaluated, evaluate, held_out_of
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
 from rsea_ros.diagnosis.naming.rivals import beside, contests, trial_score
 from rsea_ros.diagnosis.score import Score, score_on
@@ -65,7 +65,8 @@ def weigh(
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
         selection, stages = promoted(selection, stages, holdout, pools, settings)
-    held = contests(selection, stages, pools)
+    tested_on = held_out_of(selection, holdout)
+    held = contests(selection, stages, tested_on, pools, settings.floor.far)
     claims = [c for contest in held for c in (contest.cause, *contest.rivals)]
     found = pools.fits.map(partial(evidence_for, cases=selection.cases, run=pools.run), claims)
     of = {id(c): e for c, e in zip(claims, found, strict=True)}

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from rsea_ros.effects import signal_table as st
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.observer.filter import CLOCK, SIGMA, Model, State, disturbance
@@ -18,7 +19,6 @@ from rsea_ros.model.structure import structured
 from rsea_ros.signals import FloatArray
 
 _GEAR = int(st.Port.GEAR)
-_DELAY = "command_delay"
 
 
 def without_delay(rig: Rig) -> tuple[Rig, float]:
@@ -27,8 +27,9 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
     The observer's steps are as long as the stamps ask for; a ring of steps, as the effect keeps one, is not.
     The delay moves the commands' stamps instead, which is exact.
     """
-    delay = sum(e.parameters["delay"] for e in rig.effects if e.name == _DELAY)
-    return rig.with_effects(*(e for e in rig.effects if e.name != _DELAY)), float(delay)
+    delays = [e for e in rig.effects if "delay" in effect_named(e.name).tags]
+    delay = sum(e.parameters[effect_named(e.name).main.name] for e in delays)
+    return rig.with_effects(*(e for e in rig.effects if e not in delays)), float(delay)
 
 
 def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[Model, State]:

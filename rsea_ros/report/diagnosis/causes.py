@@ -10,6 +10,7 @@ from rsea_ros.diagnosis.result import Cause, Diagnosis, Estimate, Rejected
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.sentences import evidence
 from rsea_ros.report.diagnosis.standing import STATUS, standing
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
 from rsea_ros.report.page.html import bullets, equation, paragraph, section
@@ -25,7 +26,7 @@ def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
     share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
     how_sure = standing(cause, diagnosis.alternatives, diagnosis.at_noise_floor)
     body = [_sizes(cause), paragraph(words.sentence(f"{say.prose(how_sure)}."))]
-    body += [equation(cause.equation) if cause.equation else "", paragraph(cause.evidence)]
+    body += [equation(cause.equation) if cause.equation else "", paragraph(evidence(cause))]
     body += [paragraph(_gain(cause)), _rivals(cause)]
     return section(words.sentence(f"{say.effect(cause.name)}: {share}"), *body)
 

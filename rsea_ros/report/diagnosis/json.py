@@ -8,8 +8,10 @@ from typing import Any
 from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, next_run
 from rsea_ros.report.identification.json import parameter
 from rsea_ros.report.json_values import fault_json, finite, numbers
+from rsea_ros.report.remark_words import remark_sentences
 
 SCHEMA = 1
 
@@ -22,7 +24,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "rig": d.rig_name,
         "verdict": d.verdict,
         "channel": d.channel,
-        "sentence": d.sentence,
+        "sentence": diagnosis_sentence(d),
         "data": {
             "bags": list(d.sources),
             "duration_s": finite(d.duration),
@@ -46,7 +48,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
             "misfit": [_misfit(m) for m in d.remaining],
         },
         "next_experiment": _experiment(d.next_experiment),
-        "statements": list(d.statements),
+        "statements": list(remark_sentences(d.remarks)),
         "settings": _settings(d.settings),
     }
 
@@ -80,7 +82,7 @@ def _cause(cause: Cause) -> dict[str, Any]:
             "holdout": finite(cause.gain_holdout),
             "holdout_ci95": _pair(cause.gain_holdout_ci95),
         },
-        "evidence": cause.evidence,
+        "evidence": evidence(cause),
         "equation": cause.equation,
         "confusable_with": list(cause.confusable_with),
     }
@@ -131,7 +133,7 @@ def _rejected(rejected: Rejected) -> dict[str, Any]:
 def _experiment(experiment: Experiment | None) -> dict[str, Any] | None:
     if experiment is None:
         return None
-    return {"why": experiment.why, "excitation": _finite_values(experiment.excitation)}
+    return {"why": next_run(experiment), "excitation": _finite_values(experiment.excitation)}
 
 
 def _finite_values(values: Mapping[str, float | str]) -> dict[str, float | str | None]:

@@ -24,6 +24,7 @@ from rsea_ros.report.identification.parameters import parameter_table
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.remark_words import remark_sentences
 
 
 def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
@@ -76,7 +77,7 @@ def _kicker(d: Diagnosis) -> str:
 
 
 def _untold(d: Diagnosis) -> str:
-    told = [*say.confusions(d), *d.statements]
+    told = [*say.confusions(d), *remark_sentences(d.remarks)]
     body = bullets(told) if told else paragraph("Nothing that was asked for.")
     return section("What these data cannot determine", body)
 

@@ -18,12 +18,6 @@ _OF_PORT = {
     Port.SENSOR: "F/T sensor",
     Port.STRUCTURE: "gear",
 }
-_OF_NAME = {
-    "command_delay": "command",
-    "base_compliance": "what holds it",
-    "structural_resonance": "what holds it",
-}
-"""Effects that sit elsewhere than their port says."""
 _WIDTH, _STEP, _BOX, _HEIGHT = 900, 128, 104, 40
 
 
@@ -44,7 +38,7 @@ def part_of(effect: Effect) -> str:
     """Return the part of the bench that an effect sits in."""
     if effect.port == Port.SENSOR and effect.claims.channel in ("position", "velocity"):
         return "encoder"
-    return _OF_NAME.get(effect.name, _OF_PORT[effect.port])
+    return effect.part if effect.part in _PARTS else _OF_PORT[effect.port]
 
 
 def _box(index: int, part: str, culprit: str) -> str:

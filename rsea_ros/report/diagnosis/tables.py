@@ -8,6 +8,7 @@ from rsea_ros.diagnosis.result import Diagnosis, Experiment
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.page.html import code, paragraph, section
 from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.signals import UNITS
@@ -44,7 +45,7 @@ def experiment_section(experiment: Experiment) -> str:
     settings = words.sentence(say.excitation(experiment.excitation))
     run = paragraph(f"{settings}.") if settings else ""
     title = "The run that would decide" if experiment.excitation else "What would decide"
-    return section(title, paragraph(say.prose(experiment.why)), run, _command(experiment))
+    return section(title, paragraph(say.prose(next_run(experiment))), run, _command(experiment))
 
 
 def _command(experiment: Experiment) -> str:

@@ -11,8 +11,10 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.causes import fitted_rivals
+from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.diagnosis.standing import standing
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.remark_words import remark_sentences
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _WIDTH = 12
@@ -40,7 +42,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         yield "rejected", f"{rival.name}: {say.prose(say.rejection(rival))}"
     if d.rejected:
         yield "tried", f"{len(d.causes) + len(d.rejected)} causes of the catalogue"
-    for sentence in (*say.confusions(d), *d.statements):
+    for sentence in (*say.confusions(d), *remark_sentences(d.remarks)):
         yield "unclear", sentence
     if d.next_experiment is not None:
         yield "next run" if d.next_experiment.excitation else "decides", _next(d.next_experiment)
@@ -50,7 +52,7 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
 
 def _next(experiment: Experiment) -> str:
     settings = say.excitation(experiment.excitation)
-    return f"{say.prose(experiment.why)}{f': {settings}' if settings else ''}"
+    return f"{say.prose(next_run(experiment))}{f': {settings}' if settings else ''}"
 
 
 def _size(name: str, parameter: Estimate) -> str:

@@ -19,6 +19,7 @@ _REASONS: Mapping[Reason, str] = {
     "at_bound": "its size ran to the bound of what such an effect has",
     "not_sure": "does not surely lower the residual of data that it was not fitted to",
     "too_small": "lowers the residual of data that it was not fitted to, but by too little",
+    "leaves_priors": "gains less than it costs to leave the rig's values so far outside their stated doubt",
     "explains_less": "{rival} explains more",
     "no_better_than_simpler": "no better than {rival}, which is simpler",
     "no_better_than_likelier": "no better than {rival}, which needs less of what is known beforehand",

@@ -8,6 +8,7 @@ from typing import Any
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.json_values import fault_json, finite, numbers
+from rsea_ros.report.remark_words import remark_sentences
 
 SCHEMA = 1
 
@@ -39,8 +40,8 @@ def identification_json(identification: Identification) -> dict[str, Any]:
         ],
         **({"statics": numbers(asdict(i.statics))} if i.statics else {}),
         "alternatives": list(i.alternatives),
-        "statements": [*doubt_sentences(i), *i.statements],
-        "notes": [*i.notes, *i.clocks],
+        "statements": [*doubt_sentences(i), *remark_sentences(i.remarks)],
+        "notes": [*i.notes, *remark_sentences(i.clocks)],
     }  # fmt: skip
 
 

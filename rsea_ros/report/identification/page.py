@@ -19,6 +19,7 @@ from rsea_ros.report.identification.words import doubt_sentences, next_command, 
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import SENSED, UNITS
 
 
@@ -126,7 +127,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 
 def _untold(identification: Identification) -> str:
     title = "What these data cannot determine"
-    said = (*doubt_sentences(identification), *identification.statements)
+    said = (*doubt_sentences(identification), *remark_sentences(identification.remarks))
     body = bullets(said) if said else paragraph("Nothing that was asked for.")
     return section(title, body)
 
@@ -146,6 +147,6 @@ def _footer(identification: Identification) -> list[str]:
         sources,
         *damage,
         *identification.notes,
-        *identification.clocks,
+        *remark_sentences(identification.clocks),
         "rsea identify. All values in SI.",
     ]

@@ -6,6 +6,7 @@ import shlex
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
+from rsea_ros.report.remark_words import coloured_noise
 from rsea_ros.wording import listed
 
 
@@ -44,11 +45,7 @@ def doubt_sentences(identification: Identification) -> tuple[str, ...]:
     """Return what the intervals hold for, where that is more or less than noise."""
     said = []
     if identification.coloured:
-        channels = listed([words.channel(n) for n in identification.coloured])
-        said.append(
-            f"The noise of the {channels} is coloured: its level was taken from the residual, which is "
-            "steady, falls with frequency, and agrees with neither command nor motion nor another sensor."
-        )
+        said.append(coloured_noise(identification.coloured))
     if not identification.at_noise:
         said.append(_misfit_sentence(identification))
     return tuple(said)

@@ -85,7 +85,9 @@ def test_what_is_not_a_number_is_null(diagnosed) -> None:
         causes=(unbounded,),
         noise_rms={"ft": np.nan},
         faults=(Fault("clock_jump", "ft", np.nan, "3.7 s"),),
-        next_experiment=Experiment("why", {"kind": "steps", "amplitude": np.inf}),
+        next_experiment=Experiment(
+            "separates", "a", ("b",), excitation={"kind": "steps", "amplitude": np.inf}
+        ),
     )
     document = strict(json.dumps(diagnosis_json(odd), allow_nan=False))
     assert document["causes"][0]["parameters"]["torque"]["ci95"] == [None, None]

@@ -59,14 +59,14 @@ def test_every_verdict_makes_a_page(diagnosed, name: str) -> None:
         d,
         faults=(Fault("frozen_samples", "ft", 0.05), Fault("nan", "ft", 0.01)),
         next_experiment=Experiment(
-            "A steps run <tells>.", {"kind": "steps", "amplitude": 12.5, "unit": "N m"}
+            "separates", "<a>", ("b",), 3.0, excitation={"kind": "steps", "amplitude": 12.5, "unit": "N m"}
         ),
     )
     html = diagnosis_report(d)
     own = html[: html.index('id="plotly"')]
     assert "Faults in the data, masked: frozen samples and NaN in F/T torque." in own
     assert "ros2 run rsea_ros excite --ros-args -p kind:=steps -p amplitude:=12.5" in own
-    assert "&lt;tells&gt;" in own and "<tells>" not in own
+    assert "&lt;a&gt;" in own and "<a>" not in own
     assert ("do not distinguish it from hard stop or F/T sensor lag" in own) == (name == "partly_explained")
 
 

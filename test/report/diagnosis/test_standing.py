@@ -15,7 +15,7 @@ DELAY = Cause(
     0.4,
     0.4,
     (0.3, 0.5),
-    "evidence.",
+    (2.0, 1.2),
     status="leading",
     probability=0.87,
 )

@@ -62,7 +62,7 @@ def test_reports_do_not_import_the_plotting_library(tmp_path: Path) -> None:
 
 
 def test_empty_identification_still_makes_a_page(identification: Identification, tmp_path: Path) -> None:
-    bare = replace(identification, responses=(), models=(), overlays=(), statements=(), parameters=())
+    bare = replace(identification, responses=(), models=(), overlays=(), remarks=(), parameters=())
     assert results.write_results(bare, tmp_path).exists()
 
 

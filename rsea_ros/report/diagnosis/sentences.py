@@ -1,26 +1,21 @@
-"""What a diagnosis says in words."""
+"""The verdict, the evidence and the next run of a diagnosis, a sentence each."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.result import Cause, Verdict
-from rsea_ros.effects.effect import Effect
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
+from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.fault_kinds import MASKED
-from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.silent import silent_channels
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
-_CHANNELS = {
-    "ft": "F/T torque",
-    "deflection": "spring deflection",
-    "position": "position",
-    "velocity": "velocity",
-    "motor_torque": "motor torque",
-}
+_AMPLITUDES = {0.5: "half", 2.0: "twice"}
 
 
 def verdict_sentence(
@@ -36,11 +31,11 @@ def verdict_sentence(
 
     before, after: held-out residual of the channel over its noise. at_floor: of all channels with all causes.
     """
-    name, data = _CHANNELS[channel], _data(faults)
+    name, data = words.channel(channel), _data(faults)
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
-    silent = [_CHANNELS.get(n, n) for n in silent_channels(faults)]
+    silent = [words.channel(n) for n in silent_channels(faults)]
     if verdict == "unexplained" and silent and before <= AT_NOISE:
         return (
             f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
@@ -62,53 +57,43 @@ def verdict_sentence(
     return f"{named.capitalize()}, a part of it: {fall} {after:.1f} times the noise; the rest is open.{data}"
 
 
-def evidence_of(effect: Effect, channel: str, before: float, after: float, gain: float) -> str:
+def diagnosis_sentence(diagnosis: Diagnosis) -> str:
+    """Return the verdict of a diagnosis as one sentence."""
+    d, (before, after) = diagnosis, num.times_noise(diagnosis, diagnosis.channel)
+    return verdict_sentence(
+        d.verdict, d.causes, d.channel, before, after, d.faults, at_floor=d.at_noise_floor
+    )
+
+
+def evidence(cause: Cause) -> str:
     """Return the evidence for a cause as one sentence."""
+    before, after = cause.times_noise
     return (
-        f"With {effect.about}, the {_CHANNELS[channel]} residual of data that took no part falls "
-        f"from {before:.2f} to {after:.2f} times the noise (gain {gain:.1%})."
+        f"With {effect_named(cause.name).about}, the {words.channel(cause.channel)} residual of data "
+        f"that took no part falls from {before:.2f} to {after:.2f} times the noise "
+        f"(gain {cause.gain_holdout:.1%})."
     )
 
 
-def also_in_model(names: Sequence[str]) -> tuple[str, ...]:
-    """Return what the extended model has beside the causes, as sentences."""
-    if not names:
-        return ()
-    effects = listed([n.replace("_", " ") for n in names])
+def next_run(experiment: Experiment) -> str:
+    """Return what a run would decide, or why none is recommended, as one sentence without its stop."""
+    rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
+    alike = f"{rivals} do as well on these data"
+    if experiment.reason == "other_amplitude":
+        return f"{alike}; a run at another amplitude would show more"
+    if experiment.reason == "separates":
+        return f"{alike}; this run makes them differ by {experiment.separation:.1f} times the noise"
+    if experiment.reason == "inseparable":
+        return (
+            f"{rivals} make the same motion under every excitation tried within the limits of rig and "
+            f"driver (at most {experiment.separation:.2f} times the noise apart): "
+            "only a separate measurement distinguishes them, such as the spring stiffness by a known weight"
+        )
+    multisine = " with an odd multisine, whose empty lines show distortion apart from noise"
     return (
-        f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
-        "law than that.",
-    )
-
-
-def coherence_lost(above: float | None, channel: str) -> tuple[str, ...]:
-    """Return above which frequency (Hz) a channel is noise, as a sentence; none where it is not."""
-    if above is None:
-        return ()
-    return (
-        f"Above {above:.3g} Hz the coherence of the {_CHANNELS[channel]} with the command is lost: "
-        "most of it is noise there, and what these data say of those frequencies is said by chance.",
-    )
-
-
-def on_measured_angle(problem: Problem) -> tuple[str, ...]:
-    """Return what a reader must know of a model that was simulated on the measured rotor angle."""
-    if not problem.ride:
-        return ()
-    return (
-        "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "
-        "settles in other detents, so `rsea predict` will show a larger residual than the gain here.",
-    )
-
-
-def coloured_noise(channels: Sequence[str]) -> tuple[str, ...]:
-    """Return what was taken for coloured noise of a sensor, and why, as sentences."""
-    if not channels:
-        return ()
-    return (
-        f"The noise of the {listed([_CHANNELS[n] for n in channels])} is coloured: its level was taken from "
-        "the residual, which is steady, falls with frequency, and agrees with neither command nor motion nor "
-        "another sensor.",
+        f"nothing in the catalogue explains what is left: repeat at {_AMPLITUDES[experiment.amplitude]} the "
+        f"amplitude{multisine if experiment.excitation else ''}; "
+        "what scales with the command is linear, what does not is friction-like"
     )
 
 

@@ -1,0 +1,128 @@
+"""The remarks of a fit or a diagnosis in words: what data cannot determine, what a reader must know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from rsea_ros.identification.remark import Code, Remark
+from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.report import words
+from rsea_ros.wording import listed
+
+_TORQUE_BY_MOTOR_CONSTANT = (
+    "Without the F/T sensor every torque is known only through the motor constant: "
+    "a constant g times as large scales inertia, damping and stiffness by g."
+)
+_TORQUE_BY_LOOP_GAINS = (
+    "Without the F/T sensor every torque is known only through the loop's gains, and through the motor "
+    "constant where a current was measured: gains g times as large scale inertia, damping and friction by g."
+)
+_ON_MEASURED_ANGLE = (
+    "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "
+    "settles in other detents, so `rsea predict` will show a larger residual than the gain here."
+)
+_FIXES = "A measured spring stiffness, the encoder (position), or a known inertia would fix it."
+_FIXES_LOOP = "A measured motor torque, a gain known from the firmware, or a known inertia would fix it."
+_MEASURE = "Measure it apart, or excite it more."
+_REMEDY = {
+    "spring.damping": "Excitation above the resonance, or F/T sensor with encoder, would determine it.",
+    "housing_end.damping": "A free swing of the housing would determine it.",
+}
+
+
+def remark_sentences(remarks: Iterable[Remark]) -> tuple[str, ...]:
+    """Return each remark as a sentence or two."""
+    return tuple(_WORDS[remark.code](remark) for remark in remarks)
+
+
+def coloured_noise(channels: Iterable[str]) -> str:
+    """Return what was taken for coloured noise of sensors, and why."""
+    return (
+        f"The noise of the {listed([words.channel(n) for n in channels])} is coloured: its level was taken "
+        "from the residual, which is steady, falls with frequency, and agrees with neither command nor "
+        "motion nor another sensor."
+    )
+
+
+def _even_clocks(remark: Remark) -> str:
+    scatter = zip(remark.names, remark.values, strict=True)
+    sizes = listed([f"{n} by {1e3 * s:.2g} ms RMS" for n, s in scatter])
+    return (
+        f"Stamps scatter about an even clock: {sizes}. The values agree with the even clock, "
+        "so the fit uses it."
+    )
+
+
+def _clocks_taken_as_right(remark: Remark) -> str:
+    return (
+        "The sensors' clocks are taken as right where the data ask for no correction: each unknown by "
+        f"{1e6 * CLOCK_DOUBT:.0f} µs, they would make the interval of {remark.names[0]} "
+        f"{remark.values[0]:.1f} times as wide."
+    )
+
+
+def _at_bound(remark: Remark) -> str:
+    return (
+        f"{remark.names[0]} ran to its bound, {remark.values[0]:.3g} {remark.unit}: "
+        "these data show nothing of it, or something that the rig lacks stands in for it."
+    )
+
+
+def _not_identifiable(remark: Remark) -> str:
+    name, is_prior = remark.names[0], remark.code == "only_prior"
+    source = "what is known of it is the rig's prior" if is_prior else "they do not show it"
+    return f"{name} is not identifiable from these data: {source}. {_REMEDY.get(name, _MEASURE)}"
+
+
+def _only_ratios(remark: Remark) -> str:
+    is_loop = any(name.startswith("controller.") for name in remark.names)
+    return (
+        f"Only ratios of {listed(remark.names)} are identifiable from these data: a common factor is taken "
+        f"from the rig. {_FIXES_LOOP if is_loop else _FIXES}"
+    )
+
+
+def _only_together(remark: Remark) -> str:
+    return f"{listed(remark.names)} are identifiable from these data only together, not each. {_MEASURE}"
+
+
+def _play_undetermined(remark: Remark) -> str:
+    gap, gain = remark.values
+    return (
+        f"These data cannot determine the play in the gear: with {1e3 * gap:.2g} mrad, which fits best, the "
+        f"residual of data that took no part changes by {-100.0 * gain:+.1f} %."
+    )
+
+
+def _also_in_model(remark: Remark) -> str:
+    effects = listed([n.replace("_", " ") for n in remark.names])
+    return (
+        f"The extended model also has {effects}: it predicts better with it, but the data speak for another "
+        "law than that."
+    )
+
+
+def _coherence_lost(remark: Remark) -> str:
+    return (
+        f"Above {remark.values[0]:.3g} Hz the coherence of the {words.channel(remark.names[0])} with the "
+        "command is lost: most of it is noise there, and what these data say of those frequencies is said "
+        "by chance."
+    )
+
+
+_WORDS: Mapping[Code, Callable[[Remark], str]] = {
+    "even_clocks": _even_clocks,
+    "clocks_taken_as_right": _clocks_taken_as_right,
+    "torque_by_motor_constant": lambda remark: _TORQUE_BY_MOTOR_CONSTANT,
+    "torque_by_loop_gains": lambda remark: _TORQUE_BY_LOOP_GAINS,
+    "at_bound": _at_bound,
+    "not_shown": _not_identifiable,
+    "only_prior": _not_identifiable,
+    "only_ratios": _only_ratios,
+    "only_together": _only_together,
+    "play_undetermined": _play_undetermined,
+    "also_in_model": _also_in_model,
+    "coherence_lost": _coherence_lost,
+    "on_measured_angle": lambda remark: _ON_MEASURED_ANGLE,
+    "coloured_noise": lambda remark: coloured_noise(remark.names),
+}

@@ -1,0 +1,247 @@
+"""The criteria at their edges: scores whose ratios are exact in binary, and limits that they just meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.criteria import (
+    break_tie,
+    costs_priors_less,
+    is_acceptable,
+    is_at_floor,
+    is_equally_good,
+    is_far_from_floor,
+    is_nearly_as_good,
+    preference,
+    refusal,
+    takes_most,
+    verdict_of,
+    worst_ratio,
+)
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.signals import Fault
+
+BLOCKS = 40
+
+
+def score(missed=0.0, samples=100.0, **ratios):
+    """Return a score with the same residual over the noise in all blocks."""
+    sums = {n: np.full(BLOCKS, samples * r**2) for n, r in ratios.items()}
+    return Score(sums, {n: np.full(BLOCKS, samples) for n in ratios}, missed)
+
+
+@dataclass(frozen=True)
+class Model:
+    """What the criteria ask of a model."""
+
+    validation: Score
+    causes: tuple[str, ...] = ()
+    size: int = 1
+    prior_cost: float = 0.0
+    parameters: int = 7
+    is_at_bound: bool = False
+
+
+def model(*causes, size=1, prior_cost=0.0, parameters=7, **ratios):
+    return Model(score(**ratios), causes, size, prior_cost, parameters)
+
+
+def settings(**acceptance):
+    return replace(DEFAULT, acceptance=replace(DEFAULT.acceptance, **acceptance))
+
+
+RULE = settings(matters=0.5, fall=0.5, fall_in_doubt=0.5, room=0.25)
+A, B, C = "coulomb_friction", "backlash", "hard_stop"
+
+
+@pytest.mark.parametrize(
+    ("now", "before", "matters"),
+    [
+        (score(ft=1.0), score(ft=2.0), False),  # by half, and more than half is asked
+        (score(ft=0.96875), score(ft=2.0), True),
+        (score(ft=2.0, missed=0.25), score(ft=2.0, missed=0.5), False),
+        (score(ft=2.0, missed=0.24), score(ft=2.0, missed=0.5), True),
+        (score(ft=2.0, missed=0.0), score(ft=2.0, missed=0.0), False),  # none was missed
+    ],
+)
+def test_what_just_meets_the_limit_does_not_matter(now, before, matters):
+    assert preference(now, before, rule=RULE.acceptance).matters is matters
+
+
+def test_better_is_sure_and_matters():
+    for now, better in ((1.9, False), (0.9, True), (4.0, False)):
+        assert preference(score(ft=now), score(ft=2.0), rule=RULE.acceptance).better is better
+
+
+def test_models_with_as_many_parameters_pay_nothing():
+    now, before = score(ft=0.9999), score(ft=1.0)  # gains 0.8 of a loss of 4000
+    assert preference(now, before).sure
+    assert not preference(now, before, 1).sure
+
+
+@pytest.mark.parametrize(
+    ("candidate", "present", "reason"),
+    [
+        (model(A, ft=10.0), model(ft=20.0), "too_small"),  # half of a channel, and more is asked
+        (model(A, ft=9.9375), model(ft=20.0), None),
+        (model(A, B, ft=10.0), model(ft=20.0), "too_small"),  # half of the worst, for two at once
+        (model(A, B, ft=9.9375), model(ft=20.0), None),
+        (model(A, B, ft=9.0, position=16.0), model(ft=20.0, position=16.0), "too_small"),  # not of the worst
+        (model(A, B, ft=9.0, position=16.0), model(A, ft=20.0, position=16.0), None),  # one more: of any
+        (model(B, ft=9.0, position=16.0), model(A, ft=20.0, position=16.0), "too_small"),  # a replacement
+        (model(A, B, C, ft=9.0, position=16.0), model(A, B, ft=20.0, position=16.0), "too_small"),
+        (model(A, B, C, ft=1.0, position=4.9), model(A, B, ft=20.0, position=4.9), None),  # leaves little
+        (model(A, ft=40.0), model(ft=20.0), "not_sure"),
+    ],
+)
+def test_how_much_a_candidate_must_take_away(candidate, present, reason):
+    assert refusal(candidate, present, RULE) == reason
+    assert is_acceptable(candidate, present, RULE) is (reason is None)
+
+
+def test_a_model_at_the_noise_is_enough_whatever_it_gains():
+    rule = replace(DEFAULT, floor=replace(DEFAULT.floor, only_noise=1.0))
+    assert refusal(model(A, ft=0.96875), model(ft=1.03125), rule) is None
+    assert refusal(model(A, ft=1.0), model(ft=1.0625), rule) == "too_small"
+
+
+def test_a_cause_pays_for_its_own_parameters_alone():
+    """Of 40 samples it takes a loss of 8: more than one parameter's price, less than that of all."""
+    now, before = score(samples=1.0, ft=1.2), score(samples=1.0, ft=1.5)
+    gained = float((before.loss(before) - now.loss(before)).sum())
+    assert 2.0 * 1 < gained < 2.0 * 13
+    assert refusal(Model(now, (A,), parameters=7), Model(before, parameters=6)) is None
+
+
+def test_far_from_the_floor_the_simplest_of_the_nearly_equal_is_accepted():
+    best = model(A, size=3, ft=8.0)
+    nearly, worse = model(B, ft=11.875), model(C, ft=12.0)
+    present = score(ft=40.0)
+    assert break_tie([worse, best, nearly], present, settings(room=0.25)) == (nearly, ())
+
+
+def test_of_as_simple_ones_what_a_model_loses_counts_as_much_as_its_prior():
+    best = model(A, ft=1.0, prior_cost=1.5)
+    other = model(B, ft=1.000125, prior_cost=1.0)  # loses 1.0 more
+    assert break_tie([other, best], score(ft=9.0)) == (best, (other,))
+
+
+def test_rivals_of_the_accepted_are_no_larger_than_it():
+    small, large = model(A, ft=1.0, prior_cost=1.0), model(B, size=2, ft=1.0)
+    assert break_tie([large, small], score(ft=9.0)) == (small, ())
+
+
+def test_what_is_surely_worse_is_no_rival_near_the_floor():
+    best, worse = model(A, size=3, ft=1.0), model(B, ft=1.5)
+    assert break_tie([worse, best], score(ft=9.0)) == (best, ())
+
+
+@pytest.mark.parametrize(
+    ("simpler", "best", "nearly"),
+    [
+        (model(A, ft=11.9375), model(B, size=3, ft=8.0), True),  # two numbers saved: half as much again
+        (model(A, ft=12.0), model(B, size=3, ft=8.0), False),
+        (model(A, size=2, ft=9.9375), model(B, size=3, ft=8.0), True),
+        (model(A, size=2, ft=10.0), model(B, size=3, ft=8.0), False),
+        (model(A, ft=4.0), model(B, size=3, ft=4.0), False),  # near the floor
+    ],
+)
+def test_nearly_as_good(simpler, best, nearly):
+    assert is_nearly_as_good(simpler, best, RULE) is nearly
+
+
+@pytest.mark.parametrize(("ratio", "equal"), [(4.0, True), (4.96875, True), (5.0, False), (40.0, False)])
+def test_equally_good(ratio, equal):
+    """25/16 of the loss are a quarter more of the residual."""
+    assert is_equally_good(model(A, ft=ratio), model(B, ft=4.0), settings(room=0.5625)) is equal
+
+
+@pytest.mark.parametrize(
+    ("prior_cost", "ratio", "less"),
+    [
+        (1.0, 1.0, False),  # less by 1, and more is asked
+        (0.96875, 1.0, True),
+        (0.5, 1.0001, False),  # it loses 0.8 more
+        (0.1, 1.0001, True),
+        (1.5, 0.9999, True),  # and 0.8 less
+    ],
+)
+def test_priors_between_equals(prior_cost, ratio, less):
+    other = model(A, ft=1.0, prior_cost=2.0)
+    assert costs_priors_less(model(B, ft=ratio, prior_cost=prior_cost), other) is less
+
+
+@pytest.mark.parametrize(("ratio", "far"), [(4.96875, False), (5.0, True), (6.0, True)])
+def test_the_worst_channel_says_how_far_the_floor_is(ratio, far):
+    far_model = model(ft=ratio, position=1.0)
+    assert worst_ratio(far_model) == ratio
+    assert is_far_from_floor(far_model) is far
+
+
+FINE, BAD = score(ft=1.0, position=1.0), score(ft=1.0, position=9.0)
+DEAD = Fault("dead_channel", "ft", 1.0)
+LOST = Fault("frozen_samples", "ft", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("scores", "statuses", "faults", "verdict"),
+    [
+        ([FINE], [], [], "nothing_wrong"),
+        ([FINE], [], [LOST], "nothing_wrong"),
+        ([FINE], [], [DEAD], "unexplained"),
+        ([BAD], [], [], "unexplained"),
+        ([BAD], [], [DEAD], "unexplained"),
+        ([BAD, FINE], [None], [], "unexplained"),
+        ([FINE, BAD], [None], [], "nothing_wrong"),
+        ([BAD, FINE], ["confirmed"], [], "explained"),
+        ([BAD, FINE], ["confirmed"], [DEAD], "explained"),
+        ([BAD, FINE], ["leading"], [], "partly_explained"),
+        ([BAD, FINE], ["one_of"], [], "partly_explained"),
+        ([BAD, BAD], ["confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], ["confirmed", "confirmed"], [], "explained"),
+        ([BAD, FINE, BAD], ["confirmed", "confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], ["leading", "confirmed"], [], "partly_explained"),
+        ([BAD, BAD, FINE], [None, "confirmed"], [], "partly_explained"),
+    ],
+)
+def test_the_verdict(scores, statuses, faults, verdict):
+    assert verdict_of(scores, statuses, faults=faults) == verdict
+
+
+@pytest.mark.parametrize(
+    ("ratios", "reached"),
+    [
+        ({"ft": 1.0, "position": 1.0}, True),
+        ({"ft": 1.03125, "position": 1.0}, False),
+        ({"ft": 0.5, "position": 1.03125}, False),
+    ],
+)
+def test_every_channel_must_reach_the_floor(ratios, reached):
+    assert is_at_floor(score(**ratios), replace(DEFAULT.floor, reached=1.0)) is reached
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "most"),
+    [
+        ({"ft": 1.0}, {"ft": 1.0}, False),  # nothing misfits
+        ({"ft": 1.5}, {"ft": 0.5}, False),
+        ({"ft": 1.5625}, {"ft": 0.75}, True),
+        ({"ft": 4.0}, {"ft": 1.96875}, True),
+        ({"ft": 4.0}, {"ft": 2.0}, False),  # half is left
+        ({"ft": 4.0}, {"ft": 3.9}, False),
+        ({"ft": 4.0, "position": 4.0}, {"ft": 1.9, "position": 3.0}, False),  # of one channel only
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.0}, True),  # all of one, the other as it was
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.125}, True),
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.4, "position": 2.15}, False),  # the other worse
+        ({"ft": 4.0, "position": 2.0}, {"ft": 1.5, "position": 2.0}, False),  # not all of it
+        ({"ft": 4.0, "position": 2.0}, {"ft": 3.5, "position": 2.0}, False),
+        ({"ft": 3.0, "position": 2.0}, {"ft": 1.4, "position": 2.0}, False),  # it did not misfit much
+        ({"ft": 4.0, "position": 1.0}, {"ft": 1.4, "position": 1.4}, True),  # at its noise before
+    ],
+)
+def test_what_takes_most_of_the_residual(before, after, most):
+    assert takes_most(score(**before), score(**after), settings(matters=0.0625)) is most

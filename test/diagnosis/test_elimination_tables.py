@@ -1,0 +1,235 @@
+"""Backward elimination as tables: what models leave in, the causes that stay and the reasons out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scripted
+from scripted import POOLS, Script, script
+
+from rsea_ros.diagnosis import backward_elimination as elimination
+from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
+from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.effects.catalogue import effect_named
+
+FRICTION, STRIBECK, LUGRE = "coulomb_friction", "stribeck_friction", "lugre_friction"
+GAP, STOP, CUBIC = "backlash", "hard_stop", "nonlinear_spring"
+DELAY, LAG, DRIFT, BIAS = "command_delay", "current_loop_lag", "ft_drift", "ft_bias"
+
+
+class World:
+    """Backward elimination on scripted fits. screened: by rival, whether a fit of it may begin."""
+
+    def __init__(self, monkeypatch, fits: Script, *effects):
+        self.fits, self.guesses, self.impossible = fits, {}, set()
+        self.models = ReducedModels([effect_named(n) for n in effects], POOLS, DEFAULT)
+        monkeypatch.setattr(elimination, "fit_candidate", fits.fit)
+        monkeypatch.setattr(elimination, "apply", lambda rig, unknowns, theta: (rig, None))
+        monkeypatch.setattr(elimination, "RecordView", lambda case, rig, outputs: (case, rig, outputs))
+        monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
+        monkeypatch.setattr(elimination, "screen", self.screen)
+
+    def screen(self, solution, rival, guesses):
+        self.guesses[rival.name] = guesses
+        if rival.name in self.impossible:
+            return None
+        made = scripted.problem(*solution.problem.added, rival.name)
+        return SimpleNamespace(problem=made, theta=np.zeros(len(made.unknowns)))
+
+    def eliminate(self, *causes):
+        """Return the selection that is left of some causes."""
+        selection = Selection((self.fits.candidate(), self.fits.candidate(*causes)))
+        return eliminate_backwards(selection, self.models.effects, POOLS, DEFAULT)
+
+
+@pytest.fixture
+def world(monkeypatch):
+    return lambda fits, *effects: World(monkeypatch, fits, *effects)
+
+
+def reasons(selection):
+    """The trials: cause, reason, rival."""
+    return [(t.name, t.reason, t.rival) for t in selection.trials]
+
+
+NEEDED = {"": 9.0, FRICTION: 4.0, GAP: 3.0, f"{FRICTION}+{GAP}": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("ratios", "left", "gone"),
+    [
+        (NEEDED, [FRICTION, GAP], []),
+        ({**NEEDED, GAP: 1.0}, [GAP], [FRICTION]),
+        ({**NEEDED, FRICTION: 1.0}, [FRICTION], [GAP]),
+        ({**NEEDED, FRICTION: 1.0, GAP: 1.0}, [GAP], [FRICTION]),  # one of two: the other is then alone
+        ({**NEEDED, GAP: 0.5}, [GAP], [FRICTION]),  # better without it
+    ],
+)
+def test_a_cause_that_the_others_make_redundant_goes(world, ratios, left, gone):
+    selection = world(script(ratios)).eliminate(FRICTION, GAP)
+    assert sorted(selection.last.causes) == sorted(left)
+    assert reasons(selection) == [(name, "redundant", "") for name in gone]
+
+
+def test_an_only_cause_is_not_taken_out(world):
+    it = world(script({"": 1.0, FRICTION: 1.0}))
+    selection = it.eliminate(FRICTION)
+    assert selection.last.causes == (FRICTION,)
+    assert it.fits.log == [], "and no fit is spent on it"
+
+
+def test_of_three_one_after_the_other_goes(world):
+    ratios = {"": 9.0, FRICTION: 1.0, GAP: 9.0, DELAY: 9.0, f"{FRICTION}+{GAP}": 1.0}
+    ratios |= {f"{FRICTION}+{DELAY}": 1.0, f"{GAP}+{DELAY}": 9.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
+    selection = world(script(ratios)).eliminate(FRICTION, GAP, DELAY)
+    assert [m.causes for m in selection.models] == [(), (FRICTION,)]
+    assert reasons(selection) == [(GAP, "redundant", ""), (DELAY, "redundant", "")]
+    assert [t.beside.causes for t in selection.trials] == [(FRICTION, DELAY), (FRICTION,)]
+
+
+def test_each_model_is_fitted_once(world):
+    it = world(script(NEEDED))
+    it.eliminate(FRICTION, GAP)
+    assert [added for added, _ in it.fits.log] == [(GAP,), (FRICTION,)]
+
+
+@pytest.mark.parametrize(("ratio", "quick"), [(1.0, False), (6.0, True)])
+def test_far_from_the_floor_fits_are_quick_and_in_units_of_what_is_left(world, ratio, quick):
+    it = world(script({"": 90.0, FRICTION: 40.0, GAP: 40.0, f"{FRICTION}+{GAP}": ratio}))
+    it.eliminate(FRICTION, GAP)
+    assert all(was is quick for _, was in it.fits.log)
+    for setup, _ in it.fits.setups:
+        assert setup.weights.ratio("ft") == ratio and setup.cases is it.fits.cases
+
+
+def test_each_parameter_of_a_cause_pays_for_itself(world):
+    """Friction brings a loss of 43 and 1 parameter of its own; as many as the model has would not be paid."""
+    it = world(script({f"{FRICTION}+{GAP}": 1.0, GAP: 1.03}))
+    both = it.fits.candidate(FRICTION, GAP)
+    without = it.fits.candidate(GAP)
+    assert it.models.is_needed(both, without)
+    assert not it.models.is_needed(without, both)
+
+
+SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
+
+
+@pytest.mark.parametrize(
+    ("ratios", "left", "said"),
+    [
+        (SIMPLER, (FRICTION,), [(STRIBECK, "no_better_than_simpler", FRICTION)]),
+        ({**SIMPLER, FRICTION: 2.0}, (STRIBECK,), []),
+        ({**SIMPLER, FRICTION: 2.0, "spring_hysteresis": 1.0}, ("spring_hysteresis",),
+         [(STRIBECK, "no_better_than_simpler", "spring_hysteresis")]),
+    ],
+)  # fmt: skip
+def test_a_simpler_one_that_does_as_well_takes_the_place(world, ratios, left, said):
+    it = world(script(ratios), FRICTION, "spring_hysteresis", LUGRE, GAP)
+    selection = it.eliminate(STRIBECK)
+    assert selection.last.causes == left
+    assert reasons(selection) == said
+    assert LUGRE not in it.guesses, "what is larger is not tried"
+
+
+def test_a_rival_that_the_rig_cannot_have_is_passed_over(world):
+    it = world(script(SIMPLER), FRICTION, "spring_hysteresis")
+    it.impossible = {FRICTION}
+    assert it.eliminate(STRIBECK).last.causes == (STRIBECK,)
+
+
+def test_a_rival_that_acts_already_is_not_tried(world):
+    ratios = {"": 9.0, STRIBECK: 4.0, FRICTION: 4.0, f"{FRICTION}+{STRIBECK}": 1.0}
+    it = world(script(ratios), FRICTION)
+    it.eliminate(STRIBECK, FRICTION)
+    assert it.guesses == {}
+
+
+@pytest.mark.parametrize(
+    ("ratio", "prior", "left"),
+    [
+        (1.0, 0.0, {GAP, LAG}),  # likelier by 4
+        (1.0, 3.5, {GAP, DELAY}),  # by 0.5: not clearly
+        (2.0, 0.0, {GAP, DELAY}),  # it does worse
+    ],
+)
+def test_one_as_simple_and_likelier_takes_the_place_beside_another_cause(world, ratio, prior, left):
+    ratios = {"": 9.0, DELAY: 4.0, LAG: 4.0, GAP: 4.0, f"{DELAY}+{GAP}": 1.0, f"{LAG}+{GAP}": ratio}
+    it = world(script(ratios, {f"{DELAY}+{GAP}": 4.0, f"{LAG}+{GAP}": prior}), LAG)
+    selection = it.eliminate(DELAY, GAP)
+    assert set(selection.last.causes) == left
+    replaced = LAG in left
+    assert reasons(selection) == [(DELAY, "no_better_than_likelier", LAG)] * replaced
+    if replaced:
+        (rival,) = selection.rivals[LAG]
+        assert rival.causes == (GAP, DELAY), "what it replaced stands against it, the newest"
+
+
+@pytest.mark.parametrize("both", [5.0, 9.0])
+def test_far_from_the_floor_priors_decide_nothing(world, both):
+    ratios = {"": 90.0, DELAY: 40.0, LAG: 40.0, GAP: 40.0, f"{DELAY}+{GAP}": both, f"{LAG}+{GAP}": both}
+    it = world(script(ratios, {f"{DELAY}+{GAP}": 9.0}), LAG)
+    assert set(it.eliminate(DELAY, GAP).last.causes) == {DELAY, GAP}
+    assert it.guesses == {}
+
+
+def test_an_only_cause_was_compared_with_its_equals_when_it_was_chosen(world):
+    it = world(script({"": 9.0, DELAY: 1.0, LAG: 1.0}, {DELAY: 9.0}), LAG)
+    assert it.eliminate(DELAY).last.causes == (DELAY,)
+    assert it.guesses == {}
+
+
+def test_a_replacement_is_followed_by_the_next(world):
+    """LuGre's gives way to Stribeck's, which in turn gives way to Coulomb's."""
+    ratios = {"": 9.0, LUGRE: 1.0, STRIBECK: 1.0, FRICTION: 1.0}
+    selection = world(script(ratios), STRIBECK, FRICTION).eliminate(LUGRE)
+    assert reasons(selection) == [
+        (LUGRE, "no_better_than_simpler", STRIBECK), (STRIBECK, "no_better_than_simpler", FRICTION)
+    ]  # fmt: skip
+    assert [m.causes for m in selection.models] == [(), (FRICTION,)]
+
+
+@pytest.mark.parametrize(
+    ("cause", "rival", "typical"),
+    [(STRIBECK, FRICTION, {"torque"}), (STOP, CUBIC, None)],  # N m for N m; 1/rad^2 for rad
+)
+def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, cause, rival, typical):
+    it = world(script({"": 9.0, cause: 1.0, rival: 4.0}), rival)
+    model = it.fits.candidate(cause)
+    model.solution.theta[1:] = 0.75  # every parameter of the cause
+    it.models.with_rivals(model)
+    begun = it.guesses[rival]
+    assert begun[0] == {"from": "residual"}
+    if typical is None:
+        assert len(begun) == 1
+    else:
+        assert begun[1:] == [{**effect_named(rival).typical, effect_named(rival).main.name: 0.75}]
+
+
+def test_models_nest_from_the_most_useful_cause_on(world):
+    ratios = {"": 9.0, FRICTION: 6.0, GAP: 5.0, DELAY: 7.0, f"{FRICTION}+{GAP}": 4.0}
+    ratios |= {f"{FRICTION}+{DELAY}": 2.0, f"{GAP}+{DELAY}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
+    it = world(script(ratios))
+    full = it.fits.candidate(GAP, FRICTION, DELAY)
+    nested = nested_sequence(Selection((it.fits.candidate(), full)), it.models)
+    assert [m.causes for m in nested.models] == [
+        (), (FRICTION,), (FRICTION, DELAY), (FRICTION, DELAY, GAP)
+    ]  # fmt: skip
+    assert [m.validation.ratio("ft") for m in nested.models] == [9.0, 6.0, 2.0, 1.0]
+
+
+def test_without_a_cause_the_nominal_model_is_the_only_one(world):
+    it = world(script({"": 9.0}))
+    nested = nested_sequence(Selection((it.fits.candidate(),)), it.models)
+    assert [m.causes for m in nested.models] == [()]
+
+
+def test_effects_that_the_rig_states_come_first_and_are_no_causes(world):
+    it = world(script({"": 9.0, FRICTION: 6.0, GAP: 5.0, f"{FRICTION}+{GAP}": 1.0}))
+    full = it.fits.candidate(FRICTION, GAP, stated=(BIAS, DELAY))
+    nested = nested_sequence(Selection((it.fits.candidate(stated=(BIAS, DELAY)), full)), it.models)
+    assert [m.problem.acting for m in nested.models] == [
+        (BIAS, DELAY), (BIAS, DELAY, GAP), (BIAS, DELAY, GAP, FRICTION)
+    ]  # fmt: skip

@@ -1,0 +1,56 @@
+"""What a diagnosis finds does not depend on how strong a machine is: bounds and starts go with its size.
+
+Scales are powers of 4, so that a machine 4^n times as strong gives the same to rounding;
+`python bench/similarity.py` diagnoses every effect at other factors.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).parents[1] / "effects"))
+
+from similar_machine import factor, record_with, similar
+
+from rsea_ros.diagnosis.diagnose import searched_effects
+from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
+from rsea_ros.diagnosis.screening import screen
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.solver import solve
+from rsea_ros.identification.unknowns import apply
+from rsea_ros.model.rig_file import load_rig
+
+RIG = load_rig("paper_high_impedance")
+SHOWN = ("torque_saturation", "coulomb_friction", "lugre_friction", "spring_hysteresis", "base_compliance")
+
+
+@functools.cache
+def screened(name: str, times: float):
+    """Return what screening makes of an effect on a machine with so many times the torque."""
+    record, rig = record_with(RIG, effect_named(name), times, duration=5.0), similar(RIG, times)
+    case = case_from(record, rig)
+    present = solve(Problem((case,), rig, unknowns_of(rig, (case,)), CHANNELS), iterations=3)
+    (effect,) = (e for e in searched_effects(present.problem, ()) if e.name == name)
+    fitted, _ = apply(present.problem.rig, present.problem.unknowns, present.theta)
+    view = RecordView(case, fitted, present.problem.outputs(present.theta)[0])
+    return screen(present, effect, initial_guesses(effect, view))
+
+
+@pytest.mark.parametrize("times", [4.0**-5, 16.0])
+@pytest.mark.parametrize("name", SHOWN)
+def test_screening_is_the_same_on_a_similar_machine(name: str, times: float):
+    one, other = screened(name, 1.0), screened(name, times)
+    assert other.cost == pytest.approx(one.cost, rel=1e-5)
+    pairs = zip(one.problem.unknowns, one.theta, other.theta, strict=True)
+    for unknown, a, b in pairs:
+        if unknown.name.startswith(name):
+            expected = unknown.outer(float(a)) * factor(unknown.unit, times)
+            same = next(u for u in other.problem.unknowns if u.name == unknown.name)
+            np.testing.assert_allclose(same.outer(float(b)), expected, rtol=1e-4, err_msg=unknown.name)

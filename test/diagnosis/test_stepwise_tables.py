@@ -1,0 +1,222 @@
+"""Stepwise selection as tables: the steps of a search, where it ends, what a replacement must bring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scripted
+from scripted import POOLS, RIG, script, settings
+
+from rsea_ros.diagnosis import stepwise
+from rsea_ros.diagnosis.forward_step import NO_STEP, StepResult
+from rsea_ros.diagnosis.selection import trial_of
+from rsea_ros.diagnosis.settings import DEFAULT
+from rsea_ros.diagnosis.stepwise import replacement_step, select_stepwise
+from rsea_ros.effects.catalogue import effect_named
+
+FRICTION, STRIBECK, LUGRE, HYSTERESIS = (
+    "coulomb_friction", "stribeck_friction", "lugre_friction", "spring_hysteresis"
+)  # fmt: skip
+GAP, STOP, DELAY, LAG = "backlash", "hard_stop", "command_delay", "current_loop_lag"
+OTHERS = [effect_named(n) for n in (FRICTION, STRIBECK, LUGRE, GAP, STOP, DELAY)]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A forward step by a script. steps: by present causes the causes that it accepts, None for none."""
+
+    present: object
+    effects: object
+    number: int
+    pools: object
+    tell: object
+    settings: object
+
+    def run(self):
+        world = World.now
+        world.runs.append((self.number, self.present.causes, tuple(e.name for e in self.effects)))
+        accepted = world.steps.get(self.present.causes)
+        tried = [trial_of(self.present, "dead_zone", self.present, "not_sure")]
+        if accepted is None:
+            return StepResult(None, tried, ())
+        return StepResult(world.fits.candidate(*accepted), tried, (world.fits.candidate(LAG),))
+
+
+class World:
+    """Stepwise selection on scripted fits and steps. told: what became of each model after its fit."""
+
+    now: World
+
+    def __init__(self, monkeypatch, fits, steps):
+        World.now = self
+        self.fits, self.steps, self.runs, self.told = fits, steps, [], []
+        self.theta = np.zeros(1)
+        for name, stand_in in {
+            "fit_candidate": fits.fit,
+            "ForwardStep": Step,
+            "refit": self.refit,
+            "with_noise_reestimated": self.requieted,
+            "scored_against": self.scored,
+            "leaves_only_noise": lambda model, limit: model.validation.ratio("ft") < limit,
+            "vector_of": lambda unknowns, start: (unknowns, start),
+        }.items():
+            monkeypatch.setattr(stepwise, name, stand_in)
+
+    def refit(self, model, setup):
+        assert setup.cases == self.nominal.cases and setup.iterations is None
+        self.told.append(("refit", model.causes))
+        return model
+
+    def requieted(self, model):
+        self.told.append(("noise", model.causes))
+        return model
+
+    def scored(self, model, cases):
+        self.told.append(("scored", model.causes))
+        assert cases == self.fits.cases
+        return replace(model, outputs=[{"scored": True}])
+
+    def select(self, rule=DEFAULT, start=None):
+        self.nominal = scripted.problem()
+        return select_stepwise(self.nominal, OTHERS, POOLS, lambda what, share: None, rule, start)
+
+
+@pytest.fixture
+def world(monkeypatch):
+    return lambda fits, steps=None: World(monkeypatch, fits, steps or {})
+
+
+def causes(selection):
+    return [m.causes for m in selection.models]
+
+
+BOTH = {"": 9.0, FRICTION: 4.0, f"{FRICTION}+{GAP}": 1.0, LAG: 5.0}
+ALONG = {(): (FRICTION,), (FRICTION,): (FRICTION, GAP)}
+
+
+@pytest.mark.parametrize(
+    ("ratios", "steps", "models"),
+    [
+        ({"": 1.0}, ALONG, [()]),  # only noise from the first on
+        ({**BOTH, FRICTION: 1.03}, ALONG, [(), (FRICTION,)]),  # only noise with one cause
+        (BOTH, {}, [()]),  # no effect helps
+        (BOTH, {(): (FRICTION,)}, [(), (FRICTION,)]),
+        (BOTH, ALONG, [(), (FRICTION,), (FRICTION, GAP)]),
+    ],
+)
+def test_a_search_goes_on_until_only_noise_is_left_or_nothing_helps(world, ratios, steps, models):
+    assert causes(world(script(ratios), steps).select()) == models
+
+
+def test_coloured_noise_may_hide_a_cause(world):
+    coloured = (SimpleNamespace(coloured=frozenset()), SimpleNamespace(coloured=frozenset({"ft"})))
+    fits = script({"": 1.0, FRICTION: 0.9, LAG: 1.0}, cases=coloured)
+    assert causes(world(fits, {(): (FRICTION,)}).select()) == [(), (FRICTION,)]
+
+
+def test_each_step_begins_with_the_last_model_and_says_its_number(world):
+    it = world(script({**BOTH, f"{FRICTION}+{GAP}": 3.0}), ALONG)
+    it.select()
+    names = tuple(e.name for e in OTHERS)
+    assert it.runs == [(0, (), names), (1, (FRICTION,), names), (2, (FRICTION, GAP), names)]
+
+
+@pytest.mark.parametrize("most", [1, 2])
+def test_as_many_causes_as_may_be(world, most):
+    ratios = {**BOTH, f"{FRICTION}+{GAP}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
+    it = world(script(ratios), {**ALONG, (FRICTION, GAP): (FRICTION, GAP, DELAY)})
+    assert causes(it.select(settings(max_causes=most))) == [(), (FRICTION,), (FRICTION, GAP)][: most + 1]
+    assert len(it.runs) == most, "no more is tried than may be accepted"
+
+
+@pytest.mark.parametrize(("replacements", "last"), [(0, (FRICTION,)), (1, (STRIBECK,)), (2, (LUGRE,))])
+def test_as_many_replacements_as_may_be(world, monkeypatch, replacements, last):
+    it = world(script({"": 90.0, FRICTION: 60.0, STRIBECK: 30.0, LUGRE: 10.0, LAG: 50.0}), {(): (FRICTION,)})
+    following = {(FRICTION,): (STRIBECK,), (STRIBECK,): (LUGRE,), (LUGRE,): (FRICTION,)}
+
+    def replaced(step):
+        name = following[step.present.causes]
+        return StepResult(it.fits.candidate(*name), [], (it.fits.candidate(FRICTION),))
+
+    monkeypatch.setattr(stepwise, "replacement_step", replaced)
+    selection = it.select(settings(max_causes=1, replacements=replacements))
+    assert selection.last.causes == last
+
+
+def test_what_was_tried_and_what_does_as_well_is_kept(world):
+    selection = world(script(BOTH), ALONG).select()
+    assert [(t.name, t.beside.causes, t.reason) for t in selection.trials] == [
+        ("dead_zone", (), "not_sure"),
+        (FRICTION, (), "replaced"),
+        ("dead_zone", (FRICTION,), "not_sure"),
+        (GAP, (FRICTION,), "replaced"),
+    ]
+    assert {name: [m.causes for m in equals] for name, equals in selection.rivals.items()} == {
+        FRICTION: [(LAG,)],
+        GAP: [(LAG,)],
+    }
+
+
+def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_the_last(world):
+    it = world(script(BOTH), ALONG)
+    selection = it.select()
+    each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
+    assert it.told == [*each, ("scored", ()), ("scored", (FRICTION,))]
+    assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
+
+
+@pytest.mark.parametrize("start", [None, RIG])
+def test_the_first_fit_goes_further_and_begins_where_it_is_said(world, start):
+    it = world(script({"": 1.0}))
+    it.select(start=start)
+    ((setup, theta),) = it.fits.setups
+    assert setup.iterations == DEFAULT.fits.first_iterations
+    assert theta == (None if start is None else (it.nominal.unknowns, RIG))
+
+
+def replacing(it, *present, effects=OTHERS):
+    """The causes of the model that a replacement leads to; None for none."""
+    step = Step(it.fits.candidate(*present), effects, 7, POOLS, None, DEFAULT)
+    result = replacement_step(step)
+    return None if result is NO_STEP else result.accepted.causes
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        (20.0, 13.5, (STRIBECK,)),  # 30 % less, as one in another's place must bring
+        (20.0, 14.5, None),
+        (5.0, 1.0, (STRIBECK,)),
+        (4.9, 1.0, None),  # near the floor nothing is replaced
+    ],
+)
+def test_a_more_detailed_effect_takes_a_place_where_it_brings_enough(world, before, after, expected):
+    it = world(script({"": 40.0, FRICTION: before, STRIBECK: after, LAG: 9.0}), {(): (STRIBECK,)})
+    assert replacing(it, FRICTION) == expected
+    tried = [(7, (), (STRIBECK, LUGRE))] if before >= 5.0 else []
+    assert it.runs == tried, "its look-alikes that say more than it does, and no others"
+    assert it.fits.log == [((), True)] * len(tried)
+    for setup, _ in it.fits.setups:
+        assert setup.weights.ratio("ft") == before and setup.cases == it.fits.cases
+
+
+def test_a_place_is_offered_to_nothing_simpler_and_to_nothing_that_acts(world):
+    it = world(script({f"{STRIBECK}+{LUGRE}": 20.0}))
+    assert replacing(it, STRIBECK, LUGRE) is None
+    assert it.runs == it.fits.log == []
+
+
+@pytest.mark.parametrize("first", [None, (STRIBECK, GAP)])
+def test_where_one_place_brings_nothing_the_next_is_offered(world, first):
+    """Delay has no rival here; Stribeck's in friction's place brings too little or nothing; a stop helps."""
+    ratios = {"": 99.0, f"{DELAY}+{FRICTION}+{GAP}": 20.0, f"{DELAY}+{FRICTION}": 50.0, LAG: 9.0}
+    ratios |= {f"{DELAY}+{GAP}": 50.0, f"{STRIBECK}+{GAP}": 19.0, f"{DELAY}+{FRICTION}+{STOP}": 9.0}
+    steps = {(DELAY, GAP): first, (DELAY, FRICTION): (DELAY, FRICTION, STOP)}
+    it = world(script(ratios), steps)
+    assert replacing(it, DELAY, FRICTION, GAP) == (DELAY, FRICTION, STOP)
+    assert [(present, names) for _, present, names in it.runs] == [
+        ((DELAY, GAP), (STRIBECK, LUGRE)), ((DELAY, FRICTION), (STOP,))
+    ]  # fmt: skip

@@ -1,0 +1,185 @@
+"""One file that RSEA_EFFECTS names is an effect everywhere: nothing else knows effects by their names."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from effect_bench import RIG, command
+from similar_machine import record_with
+
+import rsea_ros.effects as effects
+from rsea_ros.cli.main import main
+from rsea_ros.control.compensation import compensation
+from rsea_ros.control.lags import lagging
+from rsea_ros.control.sampled import responses, sampled
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.naming.causes import play_not_told
+from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import catalogue, effect_named
+from rsea_ros.exports.bam import export_bam
+from rsea_ros.exports.mjcf import export_mjcf
+from rsea_ros.exports.urdf import export_urdf
+from rsea_ros.identification.identify import CHANNELS, identify, unknowns_of
+from rsea_ros.identification.problem import Problem, case_from
+from rsea_ros.identification.solver import solve
+from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
+from rsea_ros.laws.base import fitted_base
+from rsea_ros.model.observer.assemble import without_delay
+from rsea_ros.model.rig import EffectSetting
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.report.diagnosis.sketch import part_of
+
+PADDLE = '''
+"""Torque of a paddle in oil: between dry and viscous friction.
+
+    T = -coefficient * sqrt(|w|) * sign(w)
+
+Source: this test.
+"""
+
+import math
+
+from rsea_ros.compiler import njit
+from rsea_ros.effects._friction import PRESLIDING, against, mean_friction
+from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled
+from rsea_ros.effects.signal_table import GEAR_TORQUE, GEAR_VELOCITY, Port
+
+
+@njit(inline="always")
+def level(p, w):
+    return p[0] * math.sqrt(abs(w))
+
+
+@compiled
+def apply(s, p, x):
+    x[0] = mean_friction(s, level(p, s[GEAR_VELOCITY]), x[0], p[1])
+    s[GEAR_TORQUE] -= x[0]
+
+
+def guesses(defaults, view):
+    return [{**defaults[0], "coefficient": share * (view.largest_command() or 1.0)} for share in (0.1, 0.3)]
+
+
+EFFECT = Effect(
+    name="paddle",
+    port=Port.GEAR,
+    parameters=(
+        Parameter("coefficient", "N m", null=0.0, low=0.0, high=200.0, typical=8.0, reason="of the paddle"),
+        PRESLIDING,
+    ),
+    claims=Claims("velocity", "odd", amplitude_exponent=None, passive=True),
+    function=apply,
+    states=1,
+    reads=(GEAR_VELOCITY,),
+    guesses=guesses,
+    tags=("friction",),
+    compensation=against(level, creep=1),
+    part="what holds it",
+    about="a paddle in oil",
+    equation="T = -coefficient · √|ω| · sign(ω), smooth below creep_velocity",
+)
+'''
+ANOTHER_NAME = '''
+"""The effect {old} under another name."""
+
+from dataclasses import replace
+
+from rsea_ros.effects.{old} import EFFECT as _KNOWN
+
+EFFECT = replace(_KNOWN, name="{new}")
+'''
+SIZE = {"coefficient": 8.0, "creep_velocity": 2e-3}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def outside(tmp_path_factory):
+    folder: Path = tmp_path_factory.mktemp("effects")
+    (folder / "paddle.py").write_text(PADDLE)
+    for old, new in (("command_delay", "late_bus"), ("backlash", "worn_key")):
+        (folder / f"{new}.py").write_text(ANOTHER_NAME.format(old=old, new=new))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RSEA_EFFECTS", str(folder))
+        yield
+
+
+@pytest.fixture(scope="module")
+def record():
+    return synthesize(with_paddle(), command(280.0, 10.0), seed=3)
+
+
+def with_paddle():
+    return RIG.with_effects(EffectSetting("paddle", SIZE))
+
+
+def test_it_is_simulated_and_identified(record):
+    guessed = RIG.with_effects(EffectSetting("paddle", {**SIZE, "coefficient": 3.0}))
+    identified = identify([record], guessed)
+    sizes = {p.name: p.value for p in identified.parameters}
+    assert sizes["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
+
+
+def test_a_diagnosis_names_it(record):
+    tried = ("paddle", "coulomb_friction", "damping_drift")
+    settings = DiagnosisSettings(max_causes=1, without=tuple(n for n in catalogue() if n not in tried))
+    diagnosis = diagnose([record], RIG, settings=settings)
+    assert [cause.name for cause in diagnosis.causes] == ["paddle"]
+    assert diagnosis.causes[0].parameters["coefficient"].value == pytest.approx(8.0, rel=0.1)
+    assert part_of(effect_named("paddle")) == "what holds it"
+
+
+def test_a_law_is_looked_for_beside_it(record):
+    base = fitted_base([record], with_paddle())
+    assert base.solution.values["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
+
+
+def test_its_page_and_its_line_in_the_catalogue(capsys):
+    assert "a paddle in oil" in repr(effects) and "of the paddle" in effects["paddle"]._repr_html_()
+    assert main(["effects", "paddle"]) == 0
+    shown = capsys.readouterr().out
+    assert "coefficient (N m): typical 8" in shown and "Source: this test." in shown
+
+
+@pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)
+def test_an_export_says_that_it_leaves_it_out(export):
+    rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
+    exported = export(rig.with_effects(EffectSetting("paddle", SIZE)))
+    assert "paddle" in {unsaid.name for unsaid in exported.unsaid}
+
+
+def test_the_controller_compensates_it_by_the_law_of_the_step():
+    mean = 8.0 * np.mean(np.sqrt(np.linspace(0.19, 0.21, 20001)))
+    assert compensation(with_paddle()).friction(0.19, 0.21) == pytest.approx(mean, rel=1e-3)
+    assert compensation(with_paddle(), ()).friction(0.19, 0.21) == 0.0
+
+
+def test_play_of_another_name_is_crossed_by_the_controller():
+    gap = compensation(RIG.with_effects(EffectSetting("worn_key", {"gap": 3e-3}))).gap
+    assert gap == 3e-3
+
+
+def test_a_joint_is_told_of_play_of_another_name_that_its_data_do_not_show():
+    (gap,) = unknowns_of_effect(effect_named("worn_key"), {"gap": 2e-3})
+    problem = SimpleNamespace(unknowns=(gap,))
+    trial = SimpleNamespace(name="worn_key", problem=problem, theta=start_vector((gap,)))
+    rejected = SimpleNamespace(name="worn_key", gain_holdout=0.004)
+    joint = SimpleNamespace(baseline_rig=SimpleNamespace(loop="pd"), causes=(), rejected=(rejected,))
+    (sentence,) = play_not_told(SimpleNamespace(trials=(trial,)), joint)
+    assert "with 2 mrad" in sentence and "changes by -0.4 %" in sentence
+
+
+def test_a_delay_of_another_name_is_a_delay():
+    rig = RIG.with_effects(EffectSetting("late_bus", {"delay": 4e-3}))
+    assert without_delay(rig) == (RIG.with_effects(), 4e-3)
+    hz, plant = np.array([10.0]), sampled(RIG, 280.0)
+    response, path = lagging(rig, plant, hz)
+    assert path[0] == pytest.approx(np.exp(-2j * math.pi * 10.0 * 4e-3))
+    np.testing.assert_array_equal(response, responses(plant, hz))
+    case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)
+    solution = solve(Problem((case,), rig, unknowns_of(rig, (case,)), CHANNELS), iterations=0)
+    assert with_common_clock_in_delay(solution) is not None

@@ -1,0 +1,256 @@
+"""Which clocks a fit asks for, as tables: small linear problems whose answers are worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rsea_ros.identification import clocks
+from rsea_ros.identification.clocks import Asked, asked_of, freed, without_needless
+from rsea_ros.identification.solver import Solution
+from rsea_ros.identification.unknowns import Unknown
+
+
+def unknown(name, doubt=math.inf):
+    return Unknown(name, 0.0, "s", -1e9, 1e9, False, doubt, 1.0)
+
+
+FT, POSITION = unknown("clock.ft"), unknown("clock.position")
+FT_RATE, POSITION_RATE = unknown("clock_rate.ft"), unknown("clock_rate.position")
+LEFT = [FT, POSITION, FT_RATE, POSITION_RATE]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What the clocks' test asks of a problem."""
+
+    unknowns: tuple
+    cases: tuple = ("one", "two")
+    rig: str = "rig"
+
+    def present(self, case):
+        return {"one": ["ft"], "two": ["ft", "position"]}[case]
+
+
+def solution(residual, *columns, doubt=math.inf, theta=None, names=None):
+    """A solution of a linear problem; columns: of its jacobian."""
+    names = names or [f"value.{k}" for k in range(len(columns))]
+    unknowns = tuple(unknown(n, doubt) for n in names)
+    jacobian = np.array(columns, float).T.reshape(len(residual), len(columns))
+    theta = np.zeros(len(columns)) if theta is None else np.array(theta)
+    return Solution(Problem(unknowns), theta, np.array(residual, float), jacobian, 0.0)
+
+
+ONE_BLOCK, OWN_BLOCKS = np.zeros(4, np.int64), np.arange(4)
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "doubt", "residual", "blocks", "z"),
+    [
+        # apart from the other unknown: c'r / sqrt(c'c)
+        ((1, 0, 0, 0), math.inf, (0, 3, 1, 0), ONE_BLOCK, 8.0 / math.sqrt(8.0)),
+        ((1, 0, 0, 0), math.inf, (0, -3, -1, 0), ONE_BLOCK, 8.0 / math.sqrt(8.0)),  # late or early
+        ((1, 0, 0, 0), math.inf, (0, 9, 1, 0), ONE_BLOCK, 20.0 / math.sqrt(8.0)),
+        # blocks that disagree: +8 and -8 beside what both say
+        ((1, 0, 0, 0), math.inf, (0, 9, 1, 0), OWN_BLOCKS, 20.0 / math.sqrt(128.0)),
+        ((1, 0, 0, 0), math.inf, (0, 5, 5, 0), OWN_BLOCKS, 20.0 / math.sqrt(8.0)),  # they agree
+        # half of it is the other unknown's: c - J/2 has 2 x 2 (1/2)^2 of c'c left
+        ((1, 1, 1, 1), math.inf, (-2, 2, 2, -2), ONE_BLOCK, 8.0 / math.sqrt(4.0)),
+        # less of it where that one is known beforehand: c - J 4/(4 + 4)
+        ((1, 1, 1, 1), 0.5, (-2, 2, 2, -2), ONE_BLOCK, 8.0 / math.sqrt(2 * 1.5**2 + 2 * 0.5**2)),
+        ((0, 1, 1, 0), math.inf, (1, 0, 0, 1), ONE_BLOCK, 0.0),  # the other unknown itself
+    ],
+)
+def test_by_how_many_standard_deviations_a_clock_is_asked_for(jacobian, doubt, residual, blocks, z):
+    fit = solution(residual, jacobian, doubt=doubt)
+    columns = np.array([[0.0, 2.0, 2.0, 0.0]]).T
+    assert clocks._score(fit, columns, [0], [FT], blocks) == pytest.approx(z, abs=1e-9)
+
+
+def test_a_clock_that_nothing_shows_is_not_asked_for():
+    fit = solution((1, 2, 3, 4), (1, 0, 0, 0))
+    assert clocks._score(fit, np.zeros((4, 1)), [0], [FT], ONE_BLOCK) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("doubt", "z"),
+    [
+        (math.inf, 2.0 / math.sqrt(1.5)),  # (0 2 2 2) less the first clock's 2: (0 0 0 2)
+        # the first is known to 1/sqrt(2): c'r/(2 + 2) = 1 of it; the second less a quarter of the first
+        (math.sqrt(0.5), 2.5 / math.sqrt(0.25**2 + 0.75**2 + 1.0)),
+    ],
+)
+def test_a_second_clock_is_asked_for_beside_the_first(doubt, z):
+    fit = solution((0, 2, 2, 2), (1, 0, 0, 0))
+    columns = np.array([(0, 0, 1, 1), (9, 9, 9, 9), (0, 1, 1, 0)], float).T
+    left = [POSITION, FT_RATE, unknown("clock.ft", doubt)]
+    assert clocks._score(fit, columns, [2, 0], left, ONE_BLOCK) == pytest.approx(z)
+
+
+@pytest.mark.parametrize(
+    ("doubt", "taken", "left"),
+    [
+        (math.inf, [], math.sqrt((16 + 25) / 4)),  # the fit takes the 3
+        (math.inf, [(0, 1, 0, 0)], math.sqrt(25 / 4)),  # and the clock the 4
+        (1.0, [], math.sqrt((1.5**2 + 16 + 25) / 4)),  # half of it where zero is known as well
+        (1.0, [(0, 1, 0, 0)], math.sqrt((1.5**2 + 2.0**2 + 25) / 4)),
+    ],
+)
+def test_what_a_fit_with_clocks_would_leave(doubt, taken, left):
+    fit = solution((3, 4, 0, 5), (1, 0, 0, 0), doubt=doubt)
+    columns = np.array(taken, float).reshape(len(taken), 4).T
+    free = [unknown("clock.ft", doubt)] * len(taken)
+    assert clocks._left_over(fit, columns, free) == pytest.approx(left)
+
+
+@pytest.mark.parametrize(
+    ("doubt", "clock_doubt", "wider"),
+    [
+        (math.inf, math.inf, 2.0),  # 1/2 becomes 1: the inverse of (2 1, 1 1)
+        (math.inf, 1.0, 4.0 / 3.0),  # of (2 1, 1 2)
+        (1.0, math.inf, 1.5),  # 1/3 becomes 1/2: of (3 1, 1 1)
+        (1.0, 0.5, 15.0 / 14.0),  # of (3 1, 1 5)
+    ],
+)
+def test_how_many_times_as_wide_an_interval_were_with_a_clock_free(doubt, clock_doubt, wider):
+    fit = solution((0, 0, 0, 0), (1, 1, 0, 0), (0, 0, 0, 3), doubt=doubt, names=["near", "apart"])
+    columns = np.array([(1, 0, 0, 0)], float).T
+    cost = clocks._cost(fit, columns, [unknown("clock.ft", clock_doubt)])
+    assert cost == pytest.approx({"near": math.sqrt(wider), "apart": 1.0})
+
+
+def test_an_unknown_that_nothing_shows_costs_nothing():
+    cost = clocks._cost(solution((0, 0), (0, 0)), np.array([[1.0], [0.0]]), [FT])
+    assert cost == {"value.0": 0.0}
+
+
+class World:
+    """Scripted scores. z: by clock and the set of those taken before it, 0 where nothing is said."""
+
+    def __init__(self, monkeypatch):
+        self.z, self.left, self.inverse, self.cost = {}, 1.0, False, None
+        for name, stand_in in {
+            "clock_columns": lambda problem, theta, left, run: np.arange(4.0).reshape(1, 4),
+            "sample_blocks": lambda problem, length: ("blocks", length),
+            "clocks": lambda channels, rig: [unknown(f"clock.{n}") for n in channels],
+            "clock_rates": lambda channels: [unknown(f"clock_rate.{n}") for n in channels],
+            "is_inverse": lambda rig: self.inverse,
+            "_score": self.score,
+            "_left_over": self.left_over,
+            "_cost": lambda fit, columns, free: {u.name: c for u, c in zip(free, columns[0], strict=True)},
+        }.items():
+            monkeypatch.setattr(clocks, name, stand_in)
+
+    def score(self, fit, columns, which, left, blocks):
+        assert blocks == ("blocks", 1.0), "blocks of a second"
+        *before, last = [left[i].name for i in which]
+        return self.z.get((last, *sorted(before)), 0.0)
+
+    def left_over(self, fit, columns, taken):
+        self.taken = [u.name for u in taken]
+        assert columns.tolist() == [[float([u.name for u in LEFT].index(n)) for n in self.taken]]
+        return self.left
+
+    def asked(self):
+        return asked_of(solution((0, 0)))
+
+
+@pytest.fixture
+def world(monkeypatch):
+    return World(monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("z", "taken"),
+    [
+        ({}, []),
+        ({("clock.ft",): 3.49}, []),
+        ({("clock.ft",): 3.5}, ["clock.ft"]),
+        ({("clock.ft",): 4.0, ("clock_rate.position",): 5.0}, ["clock_rate.position"]),
+        (
+            {("clock.ft",): 4.0, ("clock.position",): 5.0, ("clock.ft", "clock.position"): 3.6},
+            ["clock.position", "clock.ft"],
+        ),
+        ({("clock.ft",): 9.0, ("clock.ft", "clock.ft"): 9.0}, ["clock.ft"]),  # each once
+    ],
+)
+def test_clocks_are_asked_for_one_after_the_other(world, z, taken):
+    world.z = z
+    asked = world.asked()
+    assert [u.name for u in asked.clocks] == taken == world.taken
+
+
+def test_every_clock_may_be_asked_for(world, monkeypatch):
+    monkeypatch.setattr(clocks, "_score", lambda *rest: 4.0)
+    asked = world.asked()
+    assert [u.name for u in asked.clocks] == [u.name for u in LEFT]
+    assert asked.cost == {}
+
+
+@pytest.mark.parametrize(
+    ("left", "taken"), [(1.3, ["clock_rate.ft", "clock.position"]), (1.31, ["clock.position"])]
+)
+def test_a_rate_that_stands_in_for_a_misfit_is_none(world, left, taken):
+    world.z = {("clock_rate.ft",): 9.0, ("clock.position", "clock_rate.ft"): 4.0}
+    world.left = left
+    assert [u.name for u in world.asked().clocks] == taken
+
+
+@pytest.mark.parametrize(
+    ("z", "cost"),
+    [
+        ({}, {"clock.ft": 0.0, "clock.position": 1.0}),
+        ({("clock.ft",): 9.0}, {"clock.position": 1.0}),
+        ({("clock_rate.ft",): 9.0}, {"clock.ft": 0.0, "clock.position": 1.0}),
+    ],
+)
+def test_the_cost_is_that_of_the_offsets_that_are_taken_as_right(world, z, cost):
+    world.z = z
+    assert world.asked().cost == cost
+
+
+def test_a_rig_that_is_judged_by_torque_has_no_clocks_to_ask_for(world):
+    world.z, world.inverse = {("clock.ft",): 9.0}, True
+    assert world.asked() == Asked((), None)
+
+
+def test_clocks_asked_for_begin_at_right():
+    fit = solution((0, 0), (1, 0), theta=[0.5])
+    problem, theta = freed(fit, Asked((FT, FT_RATE)))
+    assert [u.name for u in problem.unknowns] == ["value.0", "clock.ft", "clock_rate.ft"]
+    assert theta.tolist() == [0.5, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "doubt", "jacobian", "theta", "kept"),
+    [
+        ("value", math.inf, 2.0, 0.0, True),  # no clock
+        ("clock.ft", math.inf, 2.0, 1.0, False),  # 2 standard deviations of 1/2
+        ("clock.ft", math.inf, 2.0, 1.01, True),
+        ("clock.ft", math.inf, 2.0, -1.01, True),
+        ("clock_rate.ft", math.inf, 2.0, 0.99, False),
+        ("clock.ft", 0.5, 1.5, 0.81, True),  # known beforehand to 1/2: 0.4 together
+        ("clock.ft", 0.5, 1.5, 0.79, False),
+    ],
+)
+def test_a_clock_within_two_standard_deviations_of_right_is_taken_as_right(
+    name, doubt, jacobian, theta, kept
+):
+    fit = solution((0, 0), (1, 0), (0, jacobian), theta=[0.0, theta], doubt=doubt, names=["other", name])
+    problem, left = without_needless(fit)
+    assert [u.name for u in problem.unknowns] == (["other", name] if kept else ["other"])
+    assert left.tolist() == ([0.0, theta] if kept else [0.0])
+
+
+@pytest.mark.parametrize(
+    ("cost", "said"),
+    [(None, ()), ({}, ()), ({"a": 1.0, "b": 1.9}, ()), ({"a": 2.0, "b": 1.0}, ("a", 2.0)),
+     ({"a": 2.0, "b": 3.0, "c": 1.0}, ("b", 3.0))],
+)  # fmt: skip
+def test_the_largest_cost_is_said_from_twice_on(cost, said):
+    assert [(r.code, r.names, r.values) for r in Asked((), cost).remarks] == [
+        ("clocks_taken_as_right", said[:1], said[1:])
+    ] * bool(said)

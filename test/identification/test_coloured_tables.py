@@ -1,0 +1,292 @@
+"""Noise or misfit, as tables: each measure against theory, and the decision at each of its limits."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rsea_ros.identification import coloured
+from rsea_ros.identification.coloured import is_noise, residual_of
+from rsea_ros.identification.spectra import Shape, segment_spectra, shape_of
+
+RATE = 256.0
+
+
+def white(size, seed=0):
+    return np.random.default_rng(seed).normal(size=size)
+
+
+def case(y, rate=RATE, mask=None):
+    """A case of one channel, at whose command and motion nobody looks."""
+    t = np.arange(len(y)) / rate
+    return SimpleNamespace(
+        t={"ft": t},
+        mask={"ft": np.ones(len(y), bool) if mask is None else mask},
+        measured={"ft": y},
+        drive=SimpleNamespace(t=t, torque=np.sin(3.0 * t), q=np.cos(5.0 * t), v=np.sin(7.0 * t)),
+    )
+
+
+def passes(y, **more):
+    return is_noise(case(y, **more), {"ft": np.zeros(len(y))}, "ft")
+
+
+FINE = {"_lasting": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis": 0.0, "_shared": 0.0}
+
+
+@pytest.fixture
+def measured(monkeypatch):
+    """Have every measure of a residual give a number."""
+
+    def set_to(**values):
+        numbers = {**FINE, **values}
+        for name in set(numbers) - {"off", "_shared"}:
+            monkeypatch.setattr(coloured, name, lambda *rest, value=numbers[name]: value)
+        monkeypatch.setattr(coloured, "shape_of", lambda spectra: SimpleNamespace(off=numbers["off"]))
+        shares = iter(np.atleast_1d(numbers["_shared"]))
+        monkeypatch.setattr(coloured, "_shared", lambda *rest: next(shares))
+        count = len(np.atleast_1d(numbers["_shared"]))
+        monkeypatch.setattr(coloured, "witnesses", lambda *rest: [white(2000)] * count)
+
+    return set_to
+
+
+@pytest.mark.parametrize(
+    ("values", "noise"),
+    [
+        ({}, True),
+        ({"_lasting": 0.1}, True),
+        ({"_lasting": 0.11}, False),
+        ({"_slow": 6.0}, True),
+        ({"_slow": 6.1}, False),
+        ({"off": 5.0}, True),
+        ({"off": 5.1}, False),
+        ({"_unsteady": 4.0}, True),
+        ({"_unsteady": 4.1}, False),
+        ({"_kurtosis": 1.0}, True),
+        ({"_kurtosis": 1.1}, False),
+        ({"_kurtosis": -1.2}, True),  # flatter than Gaussian
+        ({"_shared": [0.19, 0.19]}, True),
+        ({"_shared": [0.0, 0.2]}, False),
+        ({"_shared": [0.2, 0.0]}, False),
+    ],
+)
+def test_a_residual_that_fails_in_one_point_is_a_misfit(measured, values, noise):
+    measured(**values)
+    assert passes(white(2000)) is noise
+
+
+@pytest.mark.parametrize(("size", "noise"), [(1499, False), (1500, True)])
+def test_short_records_do_not_say(measured, size, noise):
+    measured()
+    assert passes(white(size)) is noise
+
+
+def test_no_residual_is_no_noise(measured):
+    measured()
+    assert passes(np.zeros(2000)) is False
+    assert passes(np.where(np.arange(2000) % 2, 0.0, white(2000))) is True, "some zeros are"
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9, 0.97])
+@pytest.mark.parametrize("rate", [100.0, 256.0, 1000.0])
+def test_noise_of_first_order_passes(memory, rate):
+    y = lfilter([1.0], [1.0, -memory], white(9000, seed=3))[1000:]
+    assert passes(y, rate=rate)
+
+
+T = np.arange(8192) / RATE
+
+
+@pytest.mark.parametrize(
+    "misfit",
+    [
+        0.5 * np.ones(8192),  # an offset
+        np.linspace(-1.0, 1.0, 8192),  # a drift
+        np.sin(2 * math.pi * 40.0 * T),  # a line
+        np.where(np.arange(8192) % 512 == 0, 20.0, 0.0),  # knocks
+        np.where(T > 16.0, 2.0, 0.0) * white(8192, seed=8),  # more of it later
+        0.8 * np.sin(3.0 * T) ** 3,  # of the command
+    ],
+)
+def test_a_misfit_in_noise_does_not_pass(misfit):
+    assert not passes(white(8192, seed=4) + misfit)
+    assert passes(white(8192, seed=4))
+
+
+def test_the_residual_is_measured_less_simulated_and_zero_where_it_does_not_count():
+    made = case(np.array([5.0, 7.0, 9.0]), mask=np.array([True, False, True]))
+    assert residual_of(made, {"ft": np.array([1.0, 1.0, 2.0])}, "ft").tolist() == [4.0, 0.0, 7.0]
+
+
+ALTERNATING = np.resize([1.0, -1.0], 10_000)
+
+
+@pytest.mark.parametrize(
+    ("values", "share"),
+    [
+        (np.full(1000, 3.0), 1.0),
+        (np.linspace(-2.0, 5.0, 1000), 1.0),
+        (ALTERNATING, 0.0),
+        (ALTERNATING + 1.0, 0.5),
+        (ALTERNATING + 2.0, 0.8),
+        (ALTERNATING + np.linspace(-3.0, 3.0, 10_000), 0.75),  # a trend of RMS sqrt(3)
+        (np.linspace(-1.0, 1.0, 10_000) ** 2 - 1.0 / 3.0, 0.0),  # a curve is neither
+    ],
+)
+def test_the_share_of_a_constant_and_a_trend(values, share):
+    assert coloured._lasting(values) == pytest.approx(share, abs=2e-3)
+
+
+def toned(size, *tones, rate=RATE):
+    """Sines of given frequency (Hz) and amplitude."""
+    t = np.arange(size) / rate
+    return sum(a * np.sin(2.0 * math.pi * f * t + 0.3) for f, a in tones)
+
+
+def shaped(size, density, seed=0):
+    """Noise of a power density that is a function of frequency (Hz)."""
+    spectrum = np.fft.rfft(white(size, seed))
+    frequency = np.linspace(0.0, 0.5 * RATE, len(spectrum))
+    return np.fft.irfft(spectrum * np.sqrt(density(frequency)), size)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (0.0, 0.25, 50.0),  # all of what is called slow
+        (0.12, 0.25, 50.0 * 0.5),  # half of it
+        (0.25, 0.3, 1.0),  # between: neither
+        (0.3, 1.0, 1.0 / 50.0),
+        (0.3, 0.65, 1.0 / 25.5),  # half of what it is compared with
+        (1.0, 99.0, 1.0),
+    ],
+)
+def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
+    """Power of 50 within a band and of 1 elsewhere, over 1024 s."""
+    y = shaped(2**18, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
+    assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.2)
+
+
+def test_a_mean_is_not_slow():
+    y = white(2**15)
+    assert coloured._slow(y + 1e3, RATE) == pytest.approx(coloured._slow(y, RATE), rel=1e-6)
+
+
+@pytest.mark.parametrize(("seconds", "known"), [(14, False), (33, True)])
+def test_a_record_without_two_slow_lines_does_not_say_whether_it_is_slow(seconds, known):
+    """Segments of half its length: of 8 s one line lies below 0.25 Hz, of 16 s three."""
+    y = white(int(seconds * RATE)) + toned(int(seconds * RATE), (0.12, 9.0))
+    assert (coloured._slow(y, RATE) > 0.0) is known
+
+
+def test_values_too_rare_for_a_hertz_are_not_slow():
+    assert coloured._slow(white(64), 1e9) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "excess"),
+    [
+        (lambda rng: rng.normal(size=200_000), 0.0),
+        (lambda rng: rng.uniform(-1.0, 1.0, 200_000), -1.2),
+        (lambda rng: rng.laplace(size=200_000), 3.0),
+        (lambda rng: 5.0 + 2.0 * rng.uniform(-1.0, 1.0, 200_000), -1.2),  # whatever mean and size
+    ],
+)
+def test_excess_kurtosis_of_known_distributions(values, excess):
+    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
+    assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.1)
+
+
+def test_kurtosis_is_that_of_the_whitened_residual():
+    """Smoothing makes anything Gaussian; what was smoothed is not."""
+    y = lfilter([1.0], [1.0, -0.97], np.random.default_rng(2).laplace(size=2**16))
+    shape = shape_of(segment_spectra(y, 1024, 8))
+    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
+    assert coloured._kurtosis(flat, y) < 0.3
+    assert coloured._kurtosis(shape, y) > 0.7
+
+
+def unsteady(y, shape=None):
+    spectra = segment_spectra(y, 1024, 8)
+    return coloured._unsteady(spectra, shape or shape_of(spectra), RATE)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.95])
+def test_power_of_stationary_noise_varies_as_it_should(memory):
+    worst = [unsteady(lfilter([1.0], [1.0, -memory], white(2**16, seed=k))) for k in range(8)]
+    assert 0.8 < np.mean(worst) < 1.6
+
+
+@pytest.mark.parametrize(("band", "least"), [((0.6, 3.0), 1.4), ((3.0, 10.0), 5.0), ((10.0, 40.0), 20.0)])
+def test_noise_that_comes_late_in_one_band_is_unsteady(band, least):
+    """The power of a band of n lines is off by its mean half of the time: n / 1.5 times what it may be."""
+    size = 2**16
+    burst = shaped(size, lambda f: np.where((f >= band[0]) & (f < band[1]), 40.0, 0.0), seed=5)
+    burst[: size // 2] = 0.0
+    lines = (band[1] - band[0]) * 1024 / RATE
+    value = unsteady(white(size) + burst)
+    assert value == pytest.approx(lines / 1.5, rel=0.35) and value > least
+
+
+def test_the_worst_band_says_whether_noise_is_steady():
+    calm = np.ones((10, 513), complex)
+    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
+    assert coloured._unsteady(calm, flat, RATE) == 0.0
+    burst = calm.copy()
+    burst[:5, 40:160] *= math.sqrt(3.0)  # from 10 to 40 Hz: 3 and 1, off by half of its mean
+    assert coloured._unsteady(burst, flat, RATE) == pytest.approx(0.25 * 120 / 1.5)
+    assert coloured._unsteady(burst, Shape(flat.share, 9.0 * flat.level, 0.0), RATE) == pytest.approx(20.0)
+
+
+def share(a, b):
+    return coloured._shared(segment_spectra(a, 512, 16), segment_spectra(b, 512, 16), RATE)
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected"),
+    [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (2.0, 0.8), (-1.0, 0.5), (1e6, 1.0)],
+)
+def test_the_share_of_the_power_that_is_coherent(gain, expected):
+    witness = white(2**17, seed=1)
+    assert share(white(2**17) + gain * witness, witness) == pytest.approx(expected, abs=0.02)
+    assert share(white(2**17) + gain * witness, 1e3 * witness) == pytest.approx(expected, abs=0.02)
+
+
+def test_chance_is_taken_away_from_coherence():
+    """Of 16 segments, 31 half overlapping, one in 29 of the power agrees by chance, in no band more."""
+    one_band = [share(white(8192, seed=k), white(8192, seed=1000 + k)) for k in range(40)]
+    assert -0.01 < np.mean(one_band) < 0.05  # the worst of four bands
+
+
+def test_the_worst_band_says_what_is_shared():
+    witness = white(2**16, seed=1)
+    low = shaped(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
+    assert share(white(2**16) + 3.0 * low, witness) == pytest.approx(0.9, abs=0.03)
+
+
+def test_no_power_is_not_shared():
+    assert share(np.zeros(8192), white(8192)) == pytest.approx(-1.056 / 31 / (1.0 - 1.056 / 31))
+
+
+def test_lines_lie_between_zero_and_half_the_rate():
+    assert coloured._lines(np.zeros((3, 5)), 8.0).tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+@pytest.mark.parametrize(
+    ("top", "lows", "inside"),
+    [
+        (10, (0.4, 3.0, 7.0), [[1, 2], [3, 4, 5, 6], [7, 8, 9]]),  # the last ends at 9.6
+        (10, (3.0, 9.0), [[3, 4, 5, 6, 7, 8]]),  # a band of one line has none
+        (10, (3.0, 20.0), [[3, 4, 5, 6, 7, 8, 9]]),
+        (10, (7.0, 8.0), [[8, 9]]),
+        (200, (188.5, 195.0), [[189, 190, 191]]),
+    ],
+)
+def test_bands_and_their_lines(top, lows, inside):
+    bands = coloured._bands(np.arange(top + 1.0), lows)
+    assert [np.flatnonzero(b).tolist() for b in bands] == inside

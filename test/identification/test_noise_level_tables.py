@@ -1,0 +1,176 @@
+"""The noise after a fit as tables: residuals of known power, and what passes for noise, in; the noise out."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rsea_ros.identification import noise_level
+from rsea_ros.identification.noise_level import reestimate_noise
+from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
+
+RATE, START = 256.0, 10.0
+NONE = np.zeros(0)
+DRIVE = Drive(1 / RATE, START, np.zeros(4096), {}, {}, NONE, NONE, (0.0, 0.0))
+MOTION = SimpleNamespace(t=np.array([START, START + 16.0]))
+"""As of a bare drive, whose torque is filtered before it is compared."""
+
+
+def alternating(amplitude, size=4096):
+    """A residual of exactly that RMS."""
+    return np.resize([1.0, -1.0], size) * amplitude
+
+
+def case(noise, drive=DRIVE, least=None, mask=None, first=START, **measured):
+    times = {n: first + np.arange(len(y)) / RATE for n, y in measured.items()}
+    masks = {n: np.ones(len(y), bool) for n, y in measured.items()}
+    return Case(
+        drive, times, measured, MappingProxyType(noise), {**masks, **(mask or {})}, least=least or {}
+    )
+
+
+class World:
+    """Scripts. white: by size, level and flatness of the top of the band. noises: what passes for noise."""
+
+    def __init__(self, monkeypatch):
+        self.white, self.noises, self.asked = {}, set(), []
+        monkeypatch.setattr(noise_level, "is_noise", self.is_noise)
+        monkeypatch.setattr(noise_level, "top_of_band", lambda left: self.white[len(left)])
+
+    def is_noise(self, case, outputs, channel, ratio):
+        self.asked.append((channel, ratio))
+        return channel in self.noises
+
+    def known(self, case, **more):
+        outputs = {n: np.zeros(len(y)) for n, y in case.measured.items()}
+        return reestimate_noise(case, outputs, **more)
+
+
+@pytest.fixture
+def world(monkeypatch):
+    return World(monkeypatch)
+
+
+# of 4096 samples the white part is doubtful to 1.5/64: coloured is what lies 4 x 1.5/64 = 9.4 % above it
+@pytest.mark.parametrize(
+    ("before", "white", "flat", "drive", "passes", "after", "coloured"),
+    [
+        (2.0, 0.97, True, DRIVE, True, 0.97, False),  # its white part, and next to nothing above it
+        (2.0, 0.95, True, DRIVE, True, 1.0, False),  # above it, but no more than chance may be
+        (2.0, 0.90, True, DRIVE, True, 1.0, True),
+        (2.0, 0.90, True, DRIVE, False, 0.90, False),  # a misfit: only the white part is noise
+        (0.5, 0.90, True, DRIVE, True, 1.0, True),
+        (0.5, 0.90, True, DRIVE, False, 0.5, False),  # a floor never rises by a misfit
+        (2.0, 0.50, False, DRIVE, False, 1.0, False),  # not flat: no more than all of the residual
+        (0.5, 0.10, False, DRIVE, False, 0.5, False),
+        (2.0, 0.50, True, MOTION, False, 1.0, False),  # filtered: the top of the band says nothing
+    ],
+)
+def test_the_noise_of_a_channel(world, before, white, flat, drive, passes, after, coloured):
+    world.white = {4096: (white, flat)}
+    world.noises = {"ft"} if passes else set()
+    known = world.known(case({"ft": before}, drive, ft=alternating(1.0)))
+    assert known.noise == pytest.approx({"ft": after})
+    assert known.coloured == ({"ft"} if coloured else set())
+
+
+@pytest.mark.parametrize(("least", "after"), [({"ft": 3.0}, 3.0), ({"ft": 0.1}, 0.97), ({}, 0.97)])
+def test_no_noise_below_the_least(world, least, after):
+    world.white = {4096: (0.97, True)}
+    known = world.known(case({"ft": 2.0}, least=least, ft=alternating(1.0)))
+    assert known.noise == pytest.approx({"ft": after}, rel=1e-12)
+
+
+@pytest.mark.parametrize(("rms", "asked"), [(1.04, []), (1.0401, ["ft"])])
+def test_what_lies_four_percent_above_is_asked_about(world, rms, asked):
+    world.white = {4096: (1.0, True)}
+    world.known(case({"ft": 1.0}, ft=alternating(rms)))
+    assert [channel for channel, _ in world.asked] == asked
+
+
+@pytest.mark.parametrize(("size", "rms", "coloured"), [(4096, 1.0937, False), (4096, 1.0938, True),
+                                                     (65536, 1.0401, True), (256, 1.374, False),
+                                                     (256, 1.376, True)])  # fmt: skip
+def test_a_short_record_must_lie_farther_above_to_be_coloured(world, size, rms, coloured):
+    world.white, world.noises = {size: (1.0, True)}, {"ft"}
+    known = world.known(case({"ft": 2.0}, ft=alternating(rms, size)))
+    assert (known.coloured == {"ft"}) is coloured
+
+
+def test_a_misfit_of_one_channel_leaves_no_other_coloured(world):
+    world.white, world.noises = {4096: (0.5, True), 2048: (0.5, True)}, {"ft"}
+    both = case({"ft": 9.0, "position": 9.0}, ft=alternating(1.0), position=alternating(1.0, 2048))
+    known = world.known(both)
+    assert known.noise == {"ft": 0.5, "position": 0.5} and known.coloured == set()
+    world.noises = {"ft", "position"}
+    known = world.known(both)
+    assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft", "position"}
+
+
+def test_a_channel_at_its_noise_is_not_asked_about(world):
+    world.white, world.noises = {4096: (0.5, True), 2048: (1.0, True)}, {"ft"}
+    known = world.known(
+        case({"ft": 9.0, "position": 1.0}, ft=alternating(1.0), position=alternating(1.0, 2048))
+    )
+    assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft"}
+    assert [channel for channel, _ in world.asked] == ["ft"]
+
+
+@pytest.mark.parametrize(("more", "ratio"), [({}, 1.0), ({"ratio": 502.0}, 502.0)])
+def test_the_ratio_of_the_gear_goes_to_whoever_looks_for_ripple(world, more, ratio):
+    world.white = {4096: (0.5, True)}
+    world.known(case({"ft": 9.0}, ft=alternating(1.0)), **more)
+    assert world.asked == [("ft", ratio)]
+
+
+def test_only_samples_that_count_and_channels_that_are_simulated(world):
+    world.white = {4096: (0.5, False), 100: (0.5, True)}
+    y, keep = alternating(1.0), np.ones(4096, bool)
+    y[:1000], keep[:1000] = 50.0, False
+    before = {"ft": 9.0, "position": 7.0, "velocity": 8.0}
+    made = case(
+        before, ft=y, position=alternating(1.0, 100), velocity=alternating(1.0, 200),
+        mask={"ft": keep, "position": np.zeros(100, bool)},
+    )  # fmt: skip
+    outputs = {"ft": np.zeros(4096), "position": np.zeros(100)}
+    assert reestimate_noise(made, outputs).noise == {"ft": 1.0, "position": 7.0, "velocity": 8.0}
+
+
+SQRT3 = math.sqrt(3.0)
+
+
+def seconds(*amplitudes):
+    """A residual whose RMS is given second by second."""
+    return np.concatenate([alternating(a, 256) for a in amplitudes])
+
+
+@pytest.mark.parametrize(
+    ("left", "first", "gone", "rms", "doubt"),
+    [
+        (seconds(*[1.0] * 16), START, None, 1.0, 0.0),
+        # powers 1 and 3 by turns: 2 on average, off by 1: half of that, over sqrt(2 x 16), in the RMS
+        (seconds(*[1.0, SQRT3] * 8), START, None, math.sqrt(2.0), 0.0625),
+        (seconds(1.0, SQRT3), START, None, math.sqrt(2.0), 0.25 / math.sqrt(2.0)),
+        (seconds(1.0), START, None, 1.0, 0.0),  # one block says nothing
+        (seconds(*[1.0, SQRT3] * 8), START - 2.0, None, math.sqrt(2.0), 0.0625),  # begins before the command
+        (seconds(*[1.0, SQRT3] * 8), START + 100.0, None, math.sqrt(2.0), 0.0625),
+        # a gap of six seconds: ten blocks are left
+        (seconds(*[1.0, SQRT3] * 8), START, slice(4 * 256, 10 * 256), math.sqrt(2.0), 0.25 / math.sqrt(10.0)),
+        # one sample is left of the last second
+        (seconds(1.0, 1.0, 1.0, SQRT3), START, slice(3 * 256 + 1, None), None, 0.25 * SQRT3 / 1.5 / 2.0),
+    ],
+)
+def test_coloured_noise_has_room_for_its_own_doubt(world, left, first, gone, rms, doubt):
+    """Two standard deviations of the RMS, from how the power varies from second to second."""
+    world.white, world.noises = {len(left): (0.1, True)}, {"ft"}
+    keep = np.ones(len(left), bool)
+    if gone is not None:
+        keep[gone] = False
+    rms = float(np.sqrt(np.mean(left[keep] ** 2))) if rms is None else rms
+    known = world.known(case({"ft": 9.0}, mask={"ft": keep}, first=first, ft=left))
+    assert known.coloured == {"ft"}
+    assert known.noise["ft"] == pytest.approx(rms * (1.0 + 2.0 * doubt), rel=1e-9)

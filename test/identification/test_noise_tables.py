@@ -1,0 +1,266 @@
+"""The noise floor of a channel as tables: signals of known noise in, the floor out; coarse steps."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from rsea_ros.identification import noise
+from rsea_ros.identification.noise import least_noise, noise_floor, top_of_band
+from rsea_ros.identification.quantum import step_of
+from rsea_ros.model.rig import Sensor
+from rsea_ros.signals import Channel, Record
+
+RATE = 256.0
+"""Hz; its period is exact."""
+
+
+def sensor(rms=0.0, quantum=0.0):
+    return Sensor(rms, quantum)
+
+
+def record(y, command=None, rate=RATE, command_rate=RATE):
+    """A record of a channel `ft`, and a command without any relation to it where none is given."""
+    span = len(y) / rate
+    if command is None:
+        command = np.random.default_rng(99).normal(size=max(2, int(span * command_rate)))
+    return Record(
+        {
+            "command": Channel(np.arange(len(command)) / command_rate, command),
+            "ft": Channel(np.arange(len(y)) / rate, y),
+        }
+    )
+
+
+def white(size, rms=1.0, seed=0):
+    return rms * np.random.default_rng(seed).normal(size=size)
+
+
+def alternating(size, amplitude=1.0):
+    """Values of one size whose signs alternate: all of their power lies at the Nyquist frequency."""
+    return amplitude * (-1.0) ** np.arange(size)
+
+
+SECOND = 4.0 / math.sqrt(6.0)
+"""What second differences make of alternating values of size 1."""
+
+
+@pytest.mark.parametrize(
+    ("y", "stated", "floor"),
+    [
+        (alternating(2), sensor(), 1e-9),  # too few to say anything: rounding
+        (alternating(3), sensor(), 1e-9 * math.sqrt(8.0) / 3.0),
+        (alternating(3), sensor(0.25), 0.25),
+        (alternating(4), sensor(), SECOND),
+        (alternating(62), sensor(), SECOND),
+        (alternating(62), sensor(0.25), SECOND),
+        (alternating(62), sensor(2.0), 2.0),  # so few do not contradict the rig
+        (alternating(62), sensor(0.0, 12.0), 6.0),  # half a step of the rig's
+        (np.linspace(0.0, 9.0, 62), sensor(0.25), 0.25),  # a line has no noise
+        (np.linspace(0.0, 9.0, 62) ** 2, sensor(0.25), 0.25),
+    ],
+)
+def test_a_short_channel_has_the_noise_of_its_second_differences(y, stated, floor):
+    assert noise_floor(record(y), "ft", stated) == pytest.approx(floor, rel=1e-6)
+
+
+@pytest.mark.parametrize(("size", "short"), [(63, True), (64, False)])
+def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
+    floor = noise_floor(record(alternating(size)), "ft", sensor())
+    assert (abs(floor - SECOND) < 0.1) == short
+
+
+@pytest.mark.parametrize(
+    ("stated", "least"),
+    [
+        (sensor(), 1e-9),
+        (sensor(2.0), 0.2),  # a tenth: what looks better was filtered
+        (sensor(0.0, 3.0), 1.5),  # half a step
+        (sensor(2.0, 3.0), 1.5),
+        (sensor(40.0, 3.0), 4.0),
+    ],
+)
+def test_the_least_noise_of_fine_values(stated, least):
+    assert least_noise(white(4000) / np.std(white(4000)), stated) == pytest.approx(least, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("quantum", "least"),
+    [(0.0, 1.0), (math.sqrt(12.0) - 1e-9, math.sqrt(3.0)), (1.0, 1.0), (4.0, 2.0)],
+)
+def test_steps_coarser_than_the_rig_says_have_their_own_noise(quantum, least):
+    coarse = math.sqrt(12.0) * np.round(white(4000))
+    assert least_noise(coarse, sensor(0.0, quantum)) == pytest.approx(least)
+
+
+def test_fine_steps_count_half_as_the_rig_states_them():
+    coarse = np.round(white(4000))
+    assert least_noise(coarse, sensor(0.0, 1.0)) == 0.5
+
+
+def test_a_channel_that_stands_still_has_more_than_no_noise():
+    assert least_noise(np.zeros(100), sensor()) > 0.0
+
+
+@pytest.mark.parametrize("rms", [0.1, 1.0, 30.0])
+def test_white_noise_has_its_own_level(rms):
+    y = white(2**15, rms)
+    level, flat = top_of_band(y)
+    assert flat and level == pytest.approx(rms, rel=0.03)
+    assert noise_floor(record(y), "ft", sensor()) == pytest.approx(rms, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("levels", "level", "flat"),
+    [
+        ([(0.0, 100.0), (0.60, 1.0)], 1.0, True),  # what lies below the top of the band
+        ([(0.86, 1.5)], 1.0, True),  # most of the top of the band
+        ([(0.80, 1.7)], None, True),
+        ([(0.80, 2.4)], None, False),
+        ([(0.0, 2.4), (0.80, 1.0)], None, False),
+        ([(0.0, 4.0), (0.70, 1.0)], 1.0, None),
+    ],
+)
+def test_the_noise_is_read_off_the_top_of_the_band(levels, level, flat):
+    spectrum = np.ones(2**15 // 2 + 1)
+    share = np.linspace(0.0, 1.0, len(spectrum))
+    for first, power in levels:
+        spectrum[share >= first] = power
+    y = np.fft.irfft(np.sqrt(spectrum) * np.fft.rfft(white(2**15)), 2**15)
+    rms, is_flat = top_of_band(y)
+    assert flat is None or is_flat is flat
+    assert level is None or rms == pytest.approx(math.sqrt(level), rel=0.06)
+
+
+def lines(count, **powers):
+    """Powers of some lines, 1 where nothing is said: halves of the top of the band, and the rest."""
+    power = np.full(count, powers.get("rest", 1.0))
+    top = noise._top(power)
+    half = (top.stop - top.start + 1) // 2
+    power[top.start : top.start + half] = powers.get("lower", 1.0)
+    power[top.start + half : top.stop] = powers.get("upper", 1.0)
+    return power
+
+
+@pytest.mark.parametrize(
+    ("count", "first", "last"), [(100, 62, 97), (257, 160, 250), (8, 5, 6), (5, 4, 4), (7, 5, 5)]
+)
+def test_the_top_of_the_band_is_62_to_98_percent_and_a_line_at_least(count, first, last):
+    assert list(range(count))[noise._top(np.ones(count))] == list(range(first, last + 1))
+
+
+@pytest.mark.parametrize(
+    ("power", "flat"),
+    [
+        (lines(100), True),
+        (lines(100, rest=1e6), True),
+        (lines(100, lower=2.0), True),
+        (lines(100, upper=2.0), True),
+        (lines(100, lower=2.001), False),
+        (lines(100, upper=2.001), False),
+        (lines(100, lower=0.0, upper=0.0), True),
+        (lines(100, lower=0.0), False),
+        (lines(8), True),
+        (lines(8, upper=3.0), False),
+        (lines(5), False),  # one line does not say whether it is flat
+    ],
+)
+def test_flat_is_up_to_twice_the_power_in_one_half(power, flat):
+    assert noise._is_flat(power) is flat
+
+
+LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
+"""As of a smoothed log: at 0.8 of the Nyquist frequency 0.095 of its noise is left."""
+
+
+@pytest.mark.parametrize(
+    ("y", "stated", "floor"),
+    [
+        (white(2**14), sensor(5.0), 1.0),  # flat: what is measured counts, not what is stated
+        (white(2**14), sensor(0.1), 1.0),
+        (white(2**14), sensor(20.0), 2.0),  # but no less than a tenth of that
+        (LOG, sensor(5.0), 5.0),  # not flat
+        (LOG, sensor(0.01), 0.095),
+        (LOG, sensor(100.0), 100.0),
+    ],
+)
+def test_what_the_rig_states_counts_where_the_spectrum_is_not_flat(y, stated, floor):
+    assert noise_floor(record(y), "ft", stated) == pytest.approx(floor, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("rate", "stated", "floor"),
+    [
+        (100.0, sensor(0.4), 0.4),  # the command's upper half is folded over it
+        (100.0, sensor(0.0, 1.2), 0.6),  # half a step: no model is asked for more
+        (100.0, sensor(0.3, 0.4), math.hypot(0.3, 0.4 / math.sqrt(12.0))),
+        (100.0, sensor(), 1.0),  # nothing is stated: what is measured
+        (224.0, sensor(0.4), 0.4),  # seven eighths of the command's rate
+        (240.0, sensor(0.4), 1.0),  # fifteen sixteenths
+        (256.0, sensor(0.4), 1.0),
+        (512.0, sensor(0.4), 1.0),
+    ],
+)
+def test_a_channel_slower_than_the_command_has_the_noise_that_is_stated(rate, stated, floor):
+    assert noise_floor(record(white(2**13), rate=rate), "ft", stated) == pytest.approx(floor, rel=0.05)
+
+
+@pytest.mark.parametrize("gain", [0.0, 0.5, 20.0])
+def test_what_follows_the_command_linearly_is_no_noise(gain):
+    command = white(2**15, seed=5)
+    response = lfilter([0.0, gain], [1.0, -0.3], command)
+    y = response + white(2**15, 0.1, seed=6)
+    assert noise_floor(record(y, command), "ft", sensor()) == pytest.approx(0.1, rel=0.06)
+
+
+def test_few_segments_do_not_make_noise_smaller():
+    """In 15 segments a fourteenth of the noise agrees with any command by chance."""
+    floors = [noise_floor(record(white(1024, seed=k)), "ft", sensor()) for k in range(60)]
+    alone = [top_of_band(white(1024, seed=k))[0] for k in range(60)]
+    assert 0.98 < np.mean(floors) / np.mean(alone) < 1.05
+
+
+def test_what_is_not_finite_does_not_count():
+    y, command = white(2**13), white(2**13, seed=7)
+    y[100:200] = np.nan
+    command[50] = np.nan
+    assert noise_floor(record(y, command), "ft", sensor()) == pytest.approx(1.0, rel=0.05)
+
+
+def test_a_channel_that_only_repeats_the_command_has_nearly_no_noise():
+    command = white(2**13)
+    assert noise_floor(record(np.roll(command, 1), command), "ft", sensor()) < 0.02
+
+
+def test_the_command_held_before_an_instant():
+    command = Channel(np.arange(4.0), np.array([1.0, 2.0, np.nan, 4.0]))
+    at = np.array([-1.0, 0.0, 0.9, 1.0, 2.5, 3.0, 9.0])
+    assert noise._held_before(command, at).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
+
+
+GRID = np.resize(np.arange(-3.0, 4.0), 100)
+
+
+@pytest.mark.parametrize(
+    ("values", "step"),
+    [
+        (0.5 * GRID, 0.5),
+        (0.5 * GRID + 0.2, 0.5),
+        (np.where(np.arange(100) == 50, np.nan, GRID), 1.0),
+        (np.resize([0.0, 1.0, 2.0], 100), 1.0),  # three values are the fewest
+        (np.resize([0.0, 1.0], 100), 0.0),
+        (np.resize(np.arange(19.0), 100), 1.0),
+        (np.resize(np.arange(20.0), 100), 0.0),  # a fifth of the samples: no steps worth the name
+        (np.resize([0.0, 1.0, 2.0, 3.0, 7.0], 100), 1.0),  # some are left out
+        (np.resize([0.0, 1.0, 2.0009], 100), 1.00045),
+        (np.resize([0.0, 1.0, 2.0, 3.0009], 100), 1.0),
+        (np.resize([0.0, 1.0, 2.0, 3.0012], 100), 0.0),  # off the grid
+        (np.resize([0.0, 1.0, 2.0, 3.4], 100), 0.0),
+        (np.full(100, 5.0), 0.0),
+    ],
+)
+def test_the_step_of_coarse_values(values, step):
+    assert step_of(values) == pytest.approx(step)
