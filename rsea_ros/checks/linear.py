@@ -16,9 +16,9 @@ from rsea_ros.checks.shape import Shape
 from rsea_ros.identification.problem import case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
 
-_Z95 = 1.959964
 _ROUNDS = 6
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 """Of a step, tried until the loss falls."""
@@ -42,7 +42,7 @@ class Number:
     @property
     def ci95(self) -> tuple[float, float]:
         """The 95 % interval."""
-        return self.value - _Z95 * self.sd, self.value + _Z95 * self.sd
+        return self.value - Z95 * self.sd, self.value + Z95 * self.sd
 
 
 @dataclass(frozen=True)

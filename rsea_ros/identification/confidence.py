@@ -20,13 +20,13 @@ from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig_fields import FIELDS
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray, IntArray
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
 _MOST_CORRECTED = 4.0
 """Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
-_Z95 = 1.959964
 _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
 _WEAK = 100.0
@@ -128,7 +128,7 @@ def sample_blocks(problem: Problem, length: float) -> IntArray:
 
 def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, float]:
     """Return the 95 % interval in SI."""
-    return unknown.outer(coordinate - _Z95 * sd), unknown.outer(coordinate + _Z95 * sd)
+    return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 
 def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
