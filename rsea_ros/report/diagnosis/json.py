@@ -8,7 +8,8 @@ from typing import Any
 from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
-from rsea_ros.report.identification.json import fault_json, finite, numbers, parameter
+from rsea_ros.report.identification.json import parameter
+from rsea_ros.report.json_values import fault_json, finite, numbers
 
 SCHEMA = 1
 

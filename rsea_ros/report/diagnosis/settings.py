@@ -6,8 +6,8 @@ from html import escape
 
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, Setting
 from rsea_ros.report import words
-from rsea_ros.report.diagnosis.tables import table
-from rsea_ros.report.page.frame import folded, paragraph
+from rsea_ros.report.page.html import folded, paragraph
+from rsea_ros.report.page.table import table_of_rows
 
 _DEFAULTS = {s.name: s.value for s in DEFAULT.listed()}
 
@@ -18,7 +18,7 @@ def settings_section(settings: DiagnosisSettings) -> str:
     limits = f"At most {settings.max_causes} causes."
     if settings.without:
         limits += f" Not tried: {', '.join(settings.without)}."
-    shown = table(("Setting", "#Value", "Meaning", "Why this value"), rows)
+    shown = table_of_rows(("Setting", "#Value", "Meaning", "Why this value"), rows)
     return folded("Settings: the numbers that steer the verdict", paragraph(limits), shown)
 
 
