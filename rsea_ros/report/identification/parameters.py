@@ -1,4 +1,4 @@
-"""The table of parameters: value, interval, where it started, and how much of it the data told."""
+"""The table of parameters: value, interval, initial value, and how well the data determine it."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ _LOPSIDED = 1.5
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the HTML table of the physical parameters, sensor clocks left out."""
     physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
-    head = ("Parameter", "#Value ± 95 %", "Unit", "Against what the rig stated", "#Rig", "#Change",
-            "Told by the data")  # fmt: skip
+    head = ("Parameter", "#Value ± 95 %", "Unit", "Compared with the rig", "#Rig", "#Change",
+            "Determined by data")  # fmt: skip
     return table_of_rows(head, (_row(p) for p in physical))
 
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
-    """Return what was found of the sensors' clocks, empty where all may be true to their stamps."""
+    """Return the time offsets of the sensors; empty if all stamps may be correct."""
     clocks = [p for p in parameters if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
     if not clocks:
         return ""
@@ -37,7 +37,7 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
         f"{' of the time passed' if p.unit == 'ppm' else ''}"
         for p in clocks
     ]
-    return f"Sensors read later than stamped by: {'; '.join(parts)}."
+    return f"Sensors read later than their stamps by: {'; '.join(parts)}."
 
 
 def told(p: ParameterEstimate) -> str:

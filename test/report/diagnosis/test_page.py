@@ -15,7 +15,7 @@ from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.signals import Fault
 
 HEADINGS = (
-    "is what the simulation lacks",
+    "explains the misfit",
     "times above the noise floor",
     "F/T torque over time",
     "causes were tried, 1 accepted",

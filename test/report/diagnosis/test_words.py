@@ -35,7 +35,7 @@ def terminal(diagnosis):
 
 def test_the_terminal_says_the_essence_in_about_ten_lines(diagnosed):
     lines = terminal(diagnosed.diagnosis)
-    assert lines[0] == "Coulomb friction (3.00 N·m) is what the simulation lacks; with it, only noise is left"
+    assert lines[0] == "Coulomb friction (3.00 N·m) explains the misfit; only noise is left"
     assert lines[1].startswith("residual    F/T torque ")
     assert lines[2].startswith("cause       coulomb_friction: torque ")
     assert len(lines) <= 12
