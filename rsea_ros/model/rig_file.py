@@ -55,9 +55,9 @@ def rig_folders() -> list[Path]:
 
 
 def load_rig(name_or_path: str | Path | Rig) -> Rig:
-    """Read a rig; one that is a Rig already is returned as it is.
+    """Return the rig of a YAML file, or of a name in config/rigs; a Rig is returned unchanged.
 
-    Raises RigError naming file, field, value and what was expected.
+    Raises RigError with file, field, value and expected value. Format: docs/rig.md.
     """
     if isinstance(name_or_path, Rig):
         return name_or_path
