@@ -19,5 +19,5 @@ def is_decimal(text: str) -> bool:
 def decimal(text: str) -> float:
     """Return the number. Raises ValueError where `is_decimal` is false; blanks around it do not count."""
     if not is_decimal(text.strip()):
-        raise ValueError(f"{text!r} is no finite decimal number")
+        raise ValueError(f"{text!r} is not a finite decimal number")
     return float(text)

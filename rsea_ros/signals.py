@@ -130,7 +130,7 @@ class Record:
     def from_arrays(cls, t: npt.ArrayLike, *, source: str = "arrays", **channels: npt.ArrayLike) -> Record:
         """Return a record of channels that share their stamps; the arrays are copied.
 
-        t: stamps, s, shape (n,), increasing. A command takes effect at its stamp and is held; a measurement was
+        t: stamps, s, shape (n,), increasing. A command takes effect at its stamp and holds; a measurement was
         taken at its stamp. So one row of a control loop that reads and then commands has one stamp.
         channels: values by name of UNITS (or an alias such as `q`, `u`, `tau`), in SI, shape (n,): arrays,
         lists or columns of a table; NaN or masked for a missing measurement.

@@ -32,7 +32,7 @@ class Joint:
     """A joint as its map states it, with all that a worker on another machine needs.
 
     rig: the text of the rig's file. bags: patterns of paths, none for every bag. temperature: a topic, or
-    empty. date: a pattern of strptime, or empty. table: the import map where the sources are no bags.
+    empty. date: a pattern of strptime, or empty. table: the import map where the sources are not bags.
     """
 
     name: str

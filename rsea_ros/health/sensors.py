@@ -1,4 +1,4 @@
-"""Sensors that have stopped, are missing or send what is no number; stamps that go back or jump."""
+"""Sensors that have stopped, are missing or send what is not a number; stamps that go back or jump."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _Sensor:
 
 @dataclass
 class Sensors:
-    """What is wrong with the sensors of a rig just now. bad_values: samples that were no numbers."""
+    """What is wrong with the sensors of a rig just now. bad_values: samples that were not numbers."""
 
     rig: Rig
     bad_values: int = 0
