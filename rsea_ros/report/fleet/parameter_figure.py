@@ -109,7 +109,7 @@ def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float
         "fillcolor": faint(BEFORE, 0.15), "hoverinfo": "skip"}  # fmt: skip
     y = numbers(np.array([now.value, ends.value]) * factor)
     dashed = {"color": BEFORE, "width": 1.6, "dash": "dash"}
-    stroke = points(np.array([last, until]), y, "if it goes on", mode="lines", line=dashed, hoverinfo="skip")
+    stroke = points(np.array([last, until]), y, "forecast", mode="lines", line=dashed, hoverinfo="skip")
     return [fan, stroke], until
 
 

@@ -1,4 +1,4 @@
-"""The page of a law: the missing torque over what it depends on, the law in it, and what else was tried."""
+"""The page of a law: the missing torque over its variable, the law, and the other candidates."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rsea_ros.signals import FloatArray
 _WINDOWS = 12
 _CURVE = 160
 _MOST_TRIED = 12
-_DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of what the law leaves")
+_DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of the rest")
 
 
 def law_report(result: LawResult, provenance: Provenance | None = None) -> str:
@@ -93,8 +93,8 @@ def _over(written: WrittenLaw) -> Figure:
     wave = "one period of the " if _cycles(written) else ""
     return Figure(
         f"The missing {what} over the {NAMES[shown.over]}, and the law in it",
-        f"Grey: what the simulation lacks, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
-        "Black: its mean with 95 %. Blue: the law; its band is the spread by what else the law reads. The "
+        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
+        "Black: its mean with 95 %. Blue: the law; its band is the spread from its other variables. The "
         "slider shows one stretch of time in orange.",
         data,
         layout(
@@ -187,7 +187,7 @@ def _depends(result: LawResult) -> str:
         for d in top
     ]
     return section(
-        "What it depends on", table_of_rows(_DEPENDENCE_HEADS, rows),
+        "Dependence of the residual", table_of_rows(_DEPENDENCE_HEADS, rows),
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
         "others: share of the power above the noise that they take.",
     )  # fmt: skip
@@ -219,7 +219,7 @@ def _levels(result: LawResult) -> str:
         gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
     )
     return section(
-        "What is gained",
+        "Gain",
         table_of_rows(("Channel", "#without", "#with the law", "#noise"), rows),
         caption=text,
     )
@@ -240,7 +240,7 @@ def _tried(result: LawResult) -> str:
         "The shortest law within one standard error of the best is taken (bold); its terms are then fitted "
         "in the simulation, and those that it does not need fall away."
     )
-    return folded("What else was tried", note, table_of_rows(("Terms", "#left, held out"), rows))
+    return folded("Other candidates", note, table_of_rows(("Terms", "#left, held out"), rows))
 
 
 def _files(result: LawResult) -> str:
