@@ -9,7 +9,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 
-_PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "what holds it")
+_PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")
 _OF_PORT = {
     Port.COMMAND: "motor",
     Port.MOTOR: "motor",
@@ -20,8 +20,8 @@ _OF_PORT = {
 }
 _OF_NAME = {
     "command_delay": "command",
-    "base_compliance": "what holds it",
-    "structural_resonance": "what holds it",
+    "base_compliance": "support",
+    "structural_resonance": "support",
 }
 """Effects that sit elsewhere than their port says."""
 _WIDTH, _STEP, _BOX, _HEIGHT = 900, 128, 104, 40

@@ -16,7 +16,7 @@ from rsea_ros.signals import Fault
 
 HEADINGS = (
     "explains the misfit",
-    "times above the noise floor",
+    "times the noise floor",
     "F/T torque over time",
     "causes were tried, 1 accepted",
     "What these data cannot determine",

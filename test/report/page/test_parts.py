@@ -71,7 +71,7 @@ def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed)
         ("command_delay", "command"),
         ("torque_constant_error", "motor"),
         ("ft_gain_error", "F/T sensor"),
-        ("base_compliance", "what holds it"),
+        ("base_compliance", "support"),
     ],
 )
 def test_the_culprit_is_marked_where_it_sits(name, part):
