@@ -122,7 +122,7 @@ class _Scanner:
         return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
 
     def _broken_off(self, buffer: Buffer, at: int, opcode: int) -> None:
-        """Use what there is of an uncompressed chunk; tell of other leavings."""
+        """Use what there is of an uncompressed chunk; report other remains."""
         if opcode == CHUNK and not self.ended:
             self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)
         elif self.ended:

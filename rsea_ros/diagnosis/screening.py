@@ -72,7 +72,7 @@ def with_values(present: Solution, values: Mapping[str, float]) -> Solution:
 
 
 def is_mode(effect: Effect) -> bool:
-    """Tell whether an effect adds a mode: a mode has a damping ratio."""
+    """Return whether an effect adds a mode: a mode has a damping ratio."""
     return any(p.name == "damping_ratio" for p in effect.parameters)
 
 

@@ -46,7 +46,7 @@ class Joint:
     diagnose: Diagnose = "misfit"
 
     def is_in(self, path: str) -> bool:
-        """Tell whether a recording holds this joint, by its path."""
+        """Return whether a recording holds this joint, by its path."""
         return not self.bags or any(fnmatchcase(path, p) or fnmatchcase(path, f"*/{p}") for p in self.bags)
 
     @property

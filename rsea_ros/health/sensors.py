@@ -107,7 +107,7 @@ class Sensors:
             sensor.frozen = sensor.since
 
     def _others_moved(self, name: str, since: float) -> bool:
-        """Tell whether something else moved by more than its noise since an instant, s."""
+        """Return whether something else moved by more than its noise since an instant, s."""
         for other in WITNESSES[name]:
             later = [span for span in self._spans.get(other, []) if span[0] >= since]
             moved = max((s[2] for s in later), default=0.0) - min((s[1] for s in later), default=0.0)

@@ -1,4 +1,4 @@
-"""How sure a fit is, and what its data cannot tell.
+"""How sure a fit is, and what its data cannot determine.
 
 The covariance is the sandwich H^-1 (sum_b g_b g_b' + W^2) H^-1 with H = J'J + W^2, W the inverse prior
 doubts, and g_b = J_b' r_b the scores of blocks of one second: right also where the residual is coloured or
@@ -54,7 +54,7 @@ _REMEDY = {
 
 @dataclass(frozen=True)
 class Confidence:
-    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share that the data told.
+    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
     told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
     unknowns free: 0 where only a ratio with others is told. information: J'J, shape (n, n).
@@ -108,7 +108,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _alike(case: Case) -> float:
-    """Return how many samples of a case tell what one independent one would: a filter makes them alike."""
+    """Return how many samples of a case are worth one independent sample: a filter makes them alike."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
@@ -147,7 +147,7 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
 
 
 def what_is_not_told(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[str, ...]:
-    """Return plain sentences on what the data cannot tell, and what would make it so.
+    """Return plain sentences on what the data cannot determine, and what would make it so.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
     prior's: a common factor of several values cannot be told, only their ratios, or a single value not.
@@ -206,7 +206,7 @@ def _bound_sentence(unknown: Unknown, coordinate: float) -> str:
 
 
 def _sentence(unknowns: Sequence[Unknown], moved: FloatArray) -> str:
-    """Return what cannot be told of unknowns that move together. moved: how far each, relatively."""
+    """Return what cannot be determined about correlated unknowns. moved: how far each, relatively."""
     names = [u.name for u in unknowns]
     if len(names) == 1:
         prior = np.isfinite(unknowns[0].doubt)

@@ -105,7 +105,7 @@ def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> 
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
-    """Tell whether a solution leaves more than the noise of its cases."""
+    """Return whether a solution leaves more than the noise of its cases."""
     outputs = solution.problem.outputs(solution.theta)
     return max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
 
@@ -183,7 +183,7 @@ def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -
 
 
 def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
-    """Tell whether the noise of any channel has changed by more than a fit would notice."""
+    """Return whether the noise of any channel has changed by more than a fit would notice."""
     ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
     return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
 

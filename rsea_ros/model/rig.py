@@ -226,11 +226,11 @@ class Rig:
         return unit_of(name)
 
     def measures(self, channel: str) -> bool:
-        """Tell whether a bench of this rig can have a channel: without a spring nothing shows its torque."""
+        """Return whether a bench of this rig can have a channel; a rigid spring has no ft or deflection."""
         return not (self.rigid_spring and channel in ("ft", "deflection"))
 
     def zero_unknown(self, channel: str) -> bool:
-        """Tell whether a channel's sensor counts from another zero in every record."""
+        """Return whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
@@ -243,7 +243,7 @@ class Rig:
         return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
 
     def end_is_free(self, end: str) -> bool:
-        """Tell whether an end can move (it has an inertia of its own)."""
+        """Return whether an end can move (it has an inertia of its own)."""
         return end not in self.clamped
 
 

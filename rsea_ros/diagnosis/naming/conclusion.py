@@ -130,7 +130,7 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
 
 
 def is_named(stage: Evaluated, said: Mapping[str, Named]) -> bool:
-    """Tell whether the cause that a stage adds may be named."""
+    """Return whether the cause that a stage adds may be named."""
     return stage.added in said and said[stage.added].status is not None
 
 
@@ -150,7 +150,7 @@ def main_channel(test: Score, channel: str, reached: float = DEFAULT.floor.reach
 def _next_experiment(
     selection: Selection, stages: Sequence[Evaluated], verdict: Verdict, record: Record
 ) -> Experiment | None:
-    """Return the run that would tell what these data cannot; None when nothing is left to tell."""
+    """Return the run that would decide what these data cannot; None if nothing is open."""
     for stage in stages[1:]:
         rivals = selection.rivals_of(stage.added)
         if rivals:

@@ -27,7 +27,7 @@ _OFTEN = 0.5
 
 
 def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links) -> str:
-    """Return the section of a parameter, the first joint on top; grey where recordings could not tell."""
+    """Return the section of a parameter, the first joint on top; grey if not determined."""
     rows = [fleet.trends.get((joint, parameter), fleet.sizes.get((joint, parameter))) for joint in joints]
     shown = [_row(trend, steps) for trend in rows]
     change, undetermined = np.array([c for c, _ in shown]), np.array([u for _, u in shown])

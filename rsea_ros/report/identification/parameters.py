@@ -41,7 +41,7 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
 
 
 def told(p: ParameterEstimate) -> str:
-    """Return in words how much of a parameter the data told: against what was known, and against its size.
+    """Return in words how well the data determine a parameter, relative to the prior and to its size.
 
     None where the interval reaches as far as the value is large, or where the fit ended at a bound.
     """

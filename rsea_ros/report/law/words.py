@@ -10,7 +10,7 @@ from rsea_ros.laws.result import LawResult
 from rsea_ros.report import words
 
 _CLEARLY = 0.1
-"""Share of what the law leaves that another variable must take to be told of."""
+"""Share of what the law leaves that another variable must explain to be reported."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
          "t": "time", "share": "time", "h": "load's angle", "law": "law's value"}  # fmt: skip
 UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s",
