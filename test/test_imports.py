@@ -195,7 +195,7 @@ def offences(path: Path, source: str) -> list[str]:
 
 
 def may_import(layer: str, module: str) -> bool:
-    """Tell whether the tables allow it; a part of a layer belongs to that layer too."""
+    """Return whether the tables allow it; a part of a layer belongs to that layer too."""
     whole, top = layer.split(".")[0], module.split(".")[0]
     if top in ("rsea_ros", "msg_adapters"):
         return layer_of(module).split(".")[0] in OWN[layer] | {whole}

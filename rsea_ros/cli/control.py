@@ -103,7 +103,7 @@ def _print(found: Study, report: Path) -> None:
     blocks = [
         (tables.trial_head(found), tables.trial_rows(found)),
         (["compensated", "sine", *rates], tables.compensation_rows(found)),
-        (["motor", "amplitude", "clamped: not from", "free: not from"], tables.reach_rows(found)),
+        (["motor", "amplitude", "clamped: limit from", "free: limit from"], tables.reach_rows(found)),
     ]
     for head, rows in blocks:
         shown = Table(*head, box=None, pad_edge=False, header_style="dim")

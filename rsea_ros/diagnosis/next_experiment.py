@@ -1,4 +1,4 @@
-"""The next experiment: the cheapest run that would tell rivals apart, by simulating them.
+"""The next experiment: the cheapest run that would separate rivals, by simulating them.
 
 Each possible excitation, as large as rig and driver allow, is applied to the accepted model; the rival, with
 all that it may move, is fitted to that (one linearised step), and what it cannot follow is held against the
@@ -24,11 +24,11 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import UNITS, FloatArray
 
 _DURATION, _SERIES = 12.0, 60.0
-"""s of a run that tells rivals apart, and of one of an amplitude series."""
+"""s of a run that separates rivals, and of one of an amplitude series."""
 _SERIES_TOP = 60.0
 """Hz: above it the driver's limit of the slew leaves little amplitude."""
 _ENOUGH = 0.5
-"""RMS of what a rival cannot follow, over the noise, that tells it apart in a run of 12 s beyond doubt."""
+"""RMS of what a rival cannot follow, over the noise, that separates it in a run of 12 s beyond doubt."""
 _VISIBLE = 1.1
 """RMS of a residual over the noise from which on it is seen."""
 _NEARLY = 0.8
@@ -64,7 +64,7 @@ EXCITATIONS = tuple(
 
 
 def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
-    """Return the cheapest allowed run that tells an accepted model from its rivals, or say that none does."""
+    """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
         "other_amplitude", accepted.problem.added[-1], tuple(r.problem.added[-1] for r in rivals)

@@ -2,7 +2,7 @@
 
     T_m(t) = T_command(t - delay),   of a position loop r(t) = target(t - delay)
 
-Commands are kept on the grid of the step; a delay that is no whole number of steps mixes two of them, which
+Commands are kept on the grid of the step; a delay between two steps mixes two of them, which
 is the exact mean over the step of the held command. Source: Astrom, Wittenmark, Computer-Controlled Systems,
 1997, ch. 2 (systems with a time delay).
 """

@@ -13,7 +13,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
-"""Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
+"""Whether the model fits down to the noise, and if so, whether the data determine any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
 _TOLD = 0.5
@@ -79,7 +79,7 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters with confidence, how well they explain the record, and what the data cannot tell.
+    """Parameters with confidence, how well they explain the record, and what the data cannot determine.
 
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
@@ -130,7 +130,7 @@ class Identification:
 
     @property
     def verdict(self) -> Verdict:
-        """Return whether the model fits what the sensors measured, and whether that tells any value.
+        """Return whether the model fits what the sensors measured, and whether that determines any value.
 
         A sensor that measures nothing is a misfit: the model says what it should have measured.
         """

@@ -121,7 +121,7 @@ class PureTorque:
     def calibrate(self, error: ErrorModel, dt: float) -> None:
         """Take in what the sensors' noise makes of the estimates at a sample period of dt s.
 
-        Noise that is no finite number, such as of an observer that does not settle, makes the flag deaf.
+        Noise that is not a finite number, such as of an observer that does not settle, makes the flag deaf.
         """
         corner = self._limits[CORNER]
         floor = np.array([0.0, error.sigma**2])

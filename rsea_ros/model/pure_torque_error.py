@@ -117,7 +117,7 @@ class ErrorFlag:
 
     @property
     def share(self) -> float:
-        """RMS(T_p - T_d) / RMS(T_d) over the window; nan where the torque is too small to tell."""
+        """RMS(T_p - T_d) / RMS(T_d) over the window; nan if the torque is too small."""
         return float(self._state[SHARE])
 
 

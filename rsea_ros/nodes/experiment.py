@@ -1,4 +1,4 @@
-"""experiment: tells the causes apart that a bench may have, run by run, each with a person's consent.
+"""experiment: separates the possible causes of a bench, run by run, each with a person's consent.
 
 It begins with what was recorded before (`bag`). ~/approve plays the run that is proposed,
 ~/decline ends the session, ~/cancel stops a run softly at any sample. What is known stands in /diagnostics.
@@ -170,7 +170,7 @@ class Experiment:
         return response
 
     def finished(self) -> bool:
-        """Tell whether the loop has ended."""
+        """Return whether the loop has ended."""
         return self._work.done()
 
     def conclude(self) -> None:

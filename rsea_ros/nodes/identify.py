@@ -108,7 +108,7 @@ class Identify:
         return response
 
     def finished(self) -> bool:
-        """Tell whether the commands are over and every diagnosis has been answered."""
+        """Return whether the commands are over and every diagnosis has been answered."""
         waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
         over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
         self._done = (self._asked or (over and not self._values["stay"])) and not self._answering

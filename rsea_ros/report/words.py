@@ -1,4 +1,4 @@
-"""Names, units and numbers as people read them."""
+"""Names, units and numbers for readers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One parameter of one joint over time, as the recordings tell it."""
+"""One parameter of one joint over time, from the recordings."""
 
 from __future__ import annotations
 

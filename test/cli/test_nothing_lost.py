@@ -205,7 +205,7 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
     (folder / "out" / names[0]).symlink_to(folder / "precious")
     assert main(words) == 2
     assert main([*words, "--force"]) == 2
-    assert "is no regular file, expected a new name" in capsys.readouterr().err
+    assert "is not a regular file, expected a new name" in capsys.readouterr().err
     assert (folder / "precious").read_bytes() == OLD
     assert [p.name for p in (folder / "out").iterdir()] == [names[0]]
 
@@ -218,9 +218,9 @@ def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
     os.mkfifo(folder / "out" / names[0])
     assert main([*words, "--force"]) == 2
     line = capsys.readouterr().err
-    assert "is no regular file, expected a new name" in line and line.count("\n") == 1
+    assert "is not a regular file, expected a new name" in line and line.count("\n") == 1
     assert (folder / "out" / names[0]).is_fifo()
-    with pytest.raises(OutputError, match="is no regular file"):
+    with pytest.raises(OutputError, match="is not a regular file"):
         files.give_names([(folder / "run.csv", folder / "out" / names[0])], force=True)
 
 

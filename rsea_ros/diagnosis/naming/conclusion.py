@@ -116,7 +116,7 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
 
 
 def is_named(stage: Evaluated, naming: Mapping[str, Named]) -> bool:
-    """Tell whether the cause that a stage adds may be named."""
+    """Return whether the cause that a stage adds may be named."""
     return stage.added in naming and naming[stage.added].status is not None
 
 
@@ -198,7 +198,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
 
 
 def _next_experiment(selection: Selection, outcome: Outcome, record: Record) -> Experiment | None:
-    """Return the run that would decide what these data cannot; None where nothing is left to decide."""
+    """Return the run that would decide what these data cannot; None if nothing is open."""
     rate, last = record["command"].rate, outcome.stages[-1]
     for stage in outcome.stages[1:]:
         rivals = selection.rivals_of(stage.added)

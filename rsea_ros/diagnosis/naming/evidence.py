@@ -88,7 +88,7 @@ def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | 
 
 
 def is_at_edge(problem: Problem, theta: FloatArray, name: str) -> bool:
-    """Tell whether a parameter of an effect, optional ones apart, has run to a bound of what it may be."""
+    """Return whether a parameter of an effect, optional ones apart, has run to a bound of what it may be."""
     parameters = {f"{name}.{p.name}" for p in effect_named(name).parameters if not p.optional}
     for unknown, t in zip(problem.unknowns, theta, strict=True):
         margin = _NEAR * (unknown.high - unknown.low)

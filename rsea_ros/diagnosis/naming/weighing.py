@@ -108,6 +108,6 @@ def promoted(
 
 
 def _helps(trial: Trial, score: Score, cases: tuple[Case, ...]) -> bool:
-    """Tell whether a trial surely does better than the model that it was tried beside."""
+    """Return whether a trial surely does better than the model that it was tried beside."""
     without = score_on(trial.problem, cases, TEST, trial.beside.outputs)
     return preference(score, without, len(trial.theta) - trial.beside.parameters).better

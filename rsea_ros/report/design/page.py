@@ -1,4 +1,4 @@
-"""The report of a design: what the paper's method gives, what it does not say, and what meets all demands."""
+"""The report of a design: the result of the method, its gaps, and the designs that meet all demands."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _keys(d: Design) -> list[tuple[str, str]]:
     return [
         (f"{d.band_eq_7:.1f} Hz", "bandwidth by Eq. (7)"),
         (_hz(d.band_exact), "with the rotor's spin"),
-        (f"{d.stiffness / 2:.0f} N·m", "most that Eq. (8) carries"),
+        (f"{d.stiffness / 2:.0f} N·m", "largest torque by Eq. (8)"),
         (turned, f"at {d.requirement.torque:.0f} N·m by Eq. (8)"),
         (f"{math.degrees(d.linear):.0f}°", "as if linear"),
     ]
@@ -84,7 +84,7 @@ def _sentences(asked: Design, least: Design) -> str:
     r = asked.requirement
     spin, turns = asked.unit.spin, words.signed(asked.unit.turns, 0)
     return section(
-        "What the method gives, and what it does not say",
+        "Result of the method, and its gaps",
         equation(
             f"Eq. (7)   K_s = {asked.stiffness:.0f} N·m/rad, f = √(0.292 K_s / J_sc) / 2π = "
             f"{asked.band_eq_7:.1f} Hz\n"
@@ -139,7 +139,7 @@ def _map_title(d: Design) -> str:
     if spin > 0.0:
         return (
             f"However light the chassis, {r.bandwidth:g} Hz need {alone:.0f} N·m/rad with this rotor: "
-            "Eq. (7) sees only the chassis"
+            "Eq. (7) considers only the chassis"
         )
     return (
         f"A chassis without mass needs {alone:.0f} N·m/rad for {r.bandwidth:g} Hz; a heavier one less, "

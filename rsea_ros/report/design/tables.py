@@ -68,9 +68,9 @@ def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
         f"widens the band. Train: {d.unit.sources['train']}."
     )
     title = (
-        "Which way the rotor turns is not known: both senses side by side"
+        "The sense of rotation is not known: both are shown"
         if sense_unknown(rows)
-        else "What the rotor's spin makes of the band"
+        else "Effect of the rotor's spin on the band"
     )
     return section(title, table(head, body, numbers=range(1, 7)), caption=caption)
 
@@ -94,7 +94,7 @@ def springs_table(designs: Sequence[Design]) -> str:
         )
     short = 100.0 * designs[0].error
     caption = (
-        f"Eq. (9) turned round, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
+        f"Eq. (9) inverted, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
         f"{math.degrees(r.deflection):g}°, where the sin·cos "
         f"law of Eq. (8) falls {short:.2f} % short of linear."
     )

@@ -36,7 +36,7 @@ def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
 
 
 def _gained(spectrum: Spectrum) -> dict[str, object]:
-    """Return the area between before and after: what was gained."""
+    """Return the area between before and after, the improvement."""
     frequency, before = in_bands(spectrum.frequency, spectrum.before)
     _, after = in_bands(spectrum.frequency, spectrum.after)
     return band(frequency, np.minimum(after, before), before, faint(BEFORE, 0.10), name="gained")
@@ -47,11 +47,11 @@ def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
     f, before = in_bands(s.frequency, s.before / s.noise)
     _, after = in_bands(s.frequency, s.after / s.noise)
     k, left = int(np.argmax(before)), int(np.argmax(after))
-    peak = f"{words.number(before[k], 2)} times above the noise floor at {words.number(f[k], 2)} Hz"
+    peak = f"{words.number(before[k], 2)} times the noise floor at {words.number(f[k], 2)} Hz"
     rest = f"at most {words.number(after[left], 2)} times at {words.number(f[left], 2)} Hz"
-    end = "it lies on the floor" if after[left] < ABOVE_FLOOR else rest
+    end = "it is at the floor" if after[left] < ABOVE_FLOOR else rest
     them = "it" if len(diagnosis.causes) == 1 else "them"
-    return f"Without {causes} the residual stands up to {peak}; with {them}, {end}"
+    return f"Without {causes} the residual is up to {peak}; with {them}, {end}"
 
 
 def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:

@@ -13,7 +13,7 @@ from rsea_ros.report.page.html import folded, paragraph
 from rsea_ros.signals import FloatArray
 
 STRONG = 0.9
-"""Correlation from which two values are hardly told apart."""
+"""Correlation from which two values are hardly distinguishable."""
 
 
 def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
@@ -35,7 +35,7 @@ def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
 
 
 def finding(names: Sequence[str], matrix: FloatArray) -> str:
-    """Return a sentence on the pair that is told apart least."""
+    """Return a sentence on the pair that is least distinguishable."""
     apart = np.abs(np.where(np.eye(len(names), dtype=bool), 0.0, np.nan_to_num(matrix)))
     i, k = (int(v) for v in np.unravel_index(int(np.argmax(apart)), apart.shape))
     pair = f"{words.parameter(names[i])} and {words.parameter(names[k])}"

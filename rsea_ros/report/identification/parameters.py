@@ -1,4 +1,4 @@
-"""The table of parameters: value, interval, where it started, and how far the data determine it."""
+"""The table of parameters: value, interval, initial value, and how well the data determine it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _UNTOLD = 0.5
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the HTML table of the physical parameters, sensor clocks left out."""
     physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
-    head = ("Parameter", "#Value ± 95 %", "Unit", "Against what the rig stated", "#Rig", "#Change",
-            "Told by the data")  # fmt: skip
+    head = ("Parameter", "#Value ± 95 %", "Unit", "Compared with the rig", "#Rig", "#Change",
+            "Determined by data")  # fmt: skip
     return table_of_rows(head, (_row(p) for p in physical))
 
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
-    """Return what was found of the sensors' clocks, empty where all may be true to their stamps."""
+    """Return the time offsets of the sensors; empty if all stamps may be correct."""
     clocks = [p for p in parameters if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
     if not clocks:
         return ""
@@ -35,11 +35,11 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
         f"{' of the time passed' if p.unit == 'ppm' else ''}"
         for p in clocks
     ]
-    return f"Sensors read later than stamped by: {'; '.join(parts)}."
+    return f"Sensors read later than their stamps by: {'; '.join(parts)}."
 
 
 def how_determined(p: ParameterEstimate) -> str:
-    """Return in words how far the data determine a parameter: against what was known, and against its size.
+    """Return in words how well the data determine a parameter, relative to the prior and to its size.
 
     None where the interval reaches as far as the value is large, or where the fit ended at a bound.
     """

@@ -37,8 +37,8 @@ def over_figure(written: WrittenLaw) -> Figure:
     wave = "one period of the " if _cycles(written) else ""
     return Figure(
         f"The missing {what} over the {NAMES[shown.over]}, and the law in it",
-        f"Grey: what the simulation lacks, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
-        "Black: its mean with 95 %. Blue: the law; its band is the spread by what else the law reads. The "
+        f"Grey: missing in the simulation, point by point (one sigma {shown.sd:.2g} {words.unit(unit)}). "
+        "Black: its mean with 95 %. Blue: the law; its band is the spread from its other variables. The "
         "slider shows one stretch of time in orange.",
         data,
         layout(

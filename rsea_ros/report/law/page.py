@@ -1,4 +1,4 @@
-"""The page of a law: the missing torque over what it depends on, the law in it, and what else was tried."""
+"""The page of a law: the missing torque over its variable, the law, and the other candidates."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.signals import UNITS as CHANNEL_UNITS
 
 _MOST_TRIED = 12
-_DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of what the law leaves")
+_DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of the rest")
 
 
 def dependence_section(result: LawResult) -> str:
@@ -29,7 +29,7 @@ def dependence_section(result: LawResult) -> str:
         for d in top
     ]
     return section(
-        "What it depends on", table_of_rows(_DEPENDENCE_HEADS, rows),
+        "Dependence of the residual", table_of_rows(_DEPENDENCE_HEADS, rows),
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
         "others: share of the power above the noise that they take.",
     )  # fmt: skip
@@ -52,7 +52,7 @@ def gain_section(result: LawResult) -> str:
         gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
     )
     return section(
-        "What is gained",
+        "Gain",
         table_of_rows(("Channel", "#without", "#with the law", "#noise"), rows),
         caption=text,
     )
@@ -74,7 +74,7 @@ def tried_section(result: LawResult) -> str:
         "The shortest law within one standard error of the best is taken (bold); its terms are then fitted "
         "in the simulation, and those that it does not need fall away."
     )
-    return folded("What else was tried", note, table_of_rows(("Terms", "#left, held out"), rows))
+    return folded("Other candidates", note, table_of_rows(("Terms", "#left, held out"), rows))
 
 
 def _share_bar(share: float) -> str:
