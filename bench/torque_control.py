@@ -60,7 +60,7 @@ def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         )
     yield markdown(tables.trial_head(found), tables.trial_rows(found))
     yield markdown(["compensated", "sine of 10 N·m", *shown], tables.compensation_rows(found))
-    yield markdown(["motor", "amplitude", "clamped: not from", "free: not from"], tables.reach_rows(found))
+    yield markdown(["motor", "amplitude", "clamped: up to", "free: up to"], tables.reach_rows(found))
 
 
 def followed(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:

@@ -23,6 +23,7 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_title = "rsea_ros"
+html_show_copyright = False
 exclude_patterns = ["figures", "**.ipynb"]
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"

@@ -89,7 +89,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
 
 
 def _scan_all(files: Sequence[Path], contents: Contents) -> list[Contents]:
-    """Return what each file holds. One that cannot be read is left out and told, if others can."""
+    """Return what each file holds. One that cannot be read is left out and reported, if others can."""
     parts = []
     errors = []
     for file in files:

@@ -92,5 +92,5 @@ def _one_frame(decompressor: Any, packed: bytes, most: int) -> bytes:
 
 
 def _ends(decompressor: Any) -> bool:
-    """Tell whether a frame that has given all its bytes has its end too."""
+    """Return whether a frame that has given all its bytes has its end too."""
     return not decompressor.decompress(b"", max_length=1) and bool(decompressor.eof)

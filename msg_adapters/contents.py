@@ -35,7 +35,7 @@ class Contents:
     faults: list[Fault] = field(default_factory=list)
 
     def wants(self, topic: str) -> bool:
-        """Tell whether the messages of a topic are kept."""
+        """Return whether the messages of a topic are kept."""
         return self.wanted is None or topic in self.wanted
 
     def sink(self, topic: str, msgtype: str) -> Messages | None:
@@ -54,7 +54,7 @@ class Contents:
         unit: str = "",
         share: float = math.nan,
     ) -> None:
-        """Add a fault of a topic or a file, once where two witnesses tell of the same."""
+        """Add a fault of a topic or a file, once if two sources report the same."""
         if not any((f.kind, f.channel, f.size) == (kind, where, size) for f in self.faults):
             self.faults.append(Fault(kind, where, share, detail, size, unit))
 

@@ -30,7 +30,7 @@ class Decoded:
         self.filled: dict[str, BoolArray] = {field: np.zeros(count, bool) for field in fields}
 
     def blocks(self, topic: str, where: str, told: Contents) -> list[Block]:
-        """Return the messages by layout, without the damaged ones, which are told.
+        """Return the messages by layout, without the damaged ones, which are reported.
 
         Raises BagError where all are damaged.
         """

@@ -67,7 +67,7 @@ class _States:
 
 
 def tell_health(contents: Contents, told: Contents) -> None:
-    """Add the faults that the nodes of the run have told of."""
+    """Add the faults that the nodes of the run have reported."""
     messages = contents.topics.get(DIAGNOSTICS)
     if messages is None or messages.msgtype != TYPE or not messages.raw:
         return

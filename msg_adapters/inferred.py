@@ -11,7 +11,7 @@ STAMP_SIZE = 8
 
 
 def is_inferred(contents: Contents, topics: TopicMap) -> bool:
-    """Tell whether `ft` is a rig's stiffness times `deflection`: it has that one's frame_id, no sensor's.
+    """Return whether `ft` is a rig's stiffness times `deflection`: it has that one's frame_id, no sensor's.
 
     A fit to both would find the very stiffness that was put in.
     """

@@ -46,7 +46,7 @@ def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     """Add all messages of a file to the contents, in the order in which they were written.
 
     A file without end (its recorder was killed) gives what is complete, and a note.
-    Raises ValueError for a file that is no MCAP.
+    Raises ValueError for a file that is not an MCAP.
     """
     with path.open("rb") as file:
         if file.read(len(MAGIC)) != MAGIC:
@@ -122,11 +122,11 @@ class _Scanner:
         return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
 
     def _broken_off(self, buffer: Buffer, at: int, opcode: int) -> None:
-        """Use what there is of an uncompressed chunk; tell of other leavings."""
+        """Use what there is of an uncompressed chunk; report other remains."""
         if opcode == CHUNK and not self.ended:
             self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)
         elif self.ended:
-            detail = f"{len(buffer) - at} bytes at byte {at} are no records"
+            detail = f"{len(buffer) - at} bytes at byte {at} are not records"
             self.damage.add("damaged_records", detail, len(buffer) - at)
 
     def _take(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:

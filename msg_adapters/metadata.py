@@ -23,7 +23,7 @@ VERSION = 9
 
 @dataclass
 class Topic:
-    """What the metadata tell of a topic."""
+    """The metadata of a topic."""
 
     name: str
     msgtype: str

@@ -70,7 +70,7 @@ class _Series:
 
 
 def _check_apart(series: Sequence[_Series]) -> None:
-    """Refuse two roles on one topic: no reader could tell them apart. Raises BagError."""
+    """Refuse two roles on one topic: no reader could distinguish them. Raises BagError."""
     roles: dict[str, tuple[TopicMap, str]] = {}
     for one in series:
         topic, this = one.topics.topic(one.role), (one.topics, one.role)

@@ -41,7 +41,7 @@ def check_topic(topic: str) -> None:
     """Refuse a name that no node can have: rosbag2 could not play it. Raises BagError."""
     if not _NAME.fullmatch(topic) or len(topic) > _LONGEST:
         expected = f"letters, digits and _ between slashes, none beginning with a digit, up to {_LONGEST}"
-        raise BagError(f"topic {shown(topic)}: is no name of ROS, expected {expected} characters")
+        raise BagError(f"topic {shown(topic)}: is not a name of ROS, expected {expected} characters")
 
 
 @dataclass(frozen=True)

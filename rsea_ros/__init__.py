@@ -6,7 +6,7 @@
     fit = rsea.identify(data, rsea.load_rig("paper_high_impedance"))
     print(fit.summary())
 
-Every name of the door is imported when it is first used; none of them needs ROS.
+Each name is imported on first use; none of them needs ROS.
 """
 
 from importlib import import_module

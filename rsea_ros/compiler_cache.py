@@ -58,7 +58,7 @@ def trusted_cache(name: str) -> Path:
 
 
 def private(folder: Path, forbidden: int = 0o022) -> bool:
-    """Tell whether a folder is this user's alone, and its parent no stranger's; make it where it is missing.
+    """Return whether only this user can write to a folder, and no stranger to its parent; make it if missing.
 
     forbidden: mode bits that it may not have.
     """
@@ -76,6 +76,6 @@ def private(folder: Path, forbidden: int = 0o022) -> bool:
 
 
 def _strangers(parent: os.stat_result) -> bool:
-    """Tell whether another user could put a folder of his in the place of one in here."""
+    """Return whether another user could put a folder of his in the place of one in here."""
     sticky = parent.st_mode & stat.S_ISVTX
     return parent.st_uid not in (0, os.geteuid()) or bool(parent.st_mode & 0o002 and not sticky)

@@ -47,7 +47,7 @@ def write_at(descriptor: int, data: bytes, offset: int = 0) -> None:
 
 
 def write_new(path: Path, content: str | bytes) -> None:
-    """Write a new file, text as UTF-8; bytes of a file name that are no UTF-8 are escaped."""
+    """Write a new file, text as UTF-8; bytes of a file name that are not UTF-8 are escaped."""
     data = content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
     with naming(path):
         descriptor = create(path)
@@ -105,7 +105,7 @@ def taken(path: Path) -> OutputError:
 def check_replaceable(path: Path) -> None:
     """Refuse what nobody may replace: a device, a pipe, a symbolic link. Raises OutputError."""
     if path.is_symlink() or not (path.is_file() or path.is_dir()):
-        raise OutputError(f"{path}: is no regular file, expected a new name")
+        raise OutputError(f"{path}: is not a regular file, expected a new name")
 
 
 def remove(path: Path) -> None:

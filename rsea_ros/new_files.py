@@ -163,7 +163,7 @@ def check_free(
 
 
 def _touches(path: Path, one: Path) -> bool:
-    """Tell whether a path is an input, by whatever name, or lies directly in it."""
+    """Return whether a path is an input, by whatever name, or lies directly in it."""
     whole = one.resolve()
     return whole in (path.resolve(), path.resolve().parent) or (path.exists() and path.samefile(one))
 

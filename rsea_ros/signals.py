@@ -31,21 +31,26 @@ UNITS: Mapping[str, str] = MappingProxyType(
 )
 """Channel names and their units.
 
-command       motor torque asked for, at the gear output; the stamp is when it takes effect
-motor_torque  motor torque from measured current, at the gear output
+command       commanded motor torque at the gear output; it takes effect at its stamp
+motor_torque  motor torque from the measured current, at the gear output
 position      gear output relative to the housing
-velocity      its rate
+velocity      rate of the position
 ft            torque of the F/T sensor about the actuator axis, positive when the spring pushes
               the distal side forward
-deflection    angle of the spring by an encoder of its own, positive when the spring pushes the distal side
+deflection    angle of the spring from a separate encoder, positive when the spring pushes the distal side
               forward
-reference     position asked for by a controller that ran during the record
+reference     target position of a controller that was active during the record
 """
+
+SENSED = ("ft", "deflection", "position", "velocity")
+"""Channels that judge a model, in the order in which verdicts speak of them."""
+MEASURED = (*SENSED, "motor_torque")
+"""All channels that a fit sees: the motor torque only echoes the command, and judges where no other can."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """Values of one quantity at their own stamps.
+    """Values of one quantity with their stamps.
 
     t: seconds since the record's epoch, shape (n,), as recorded (a fault may put them out of order).
     y: values in the unit of UNITS, shape (n,), as recorded (may hold NaN).
@@ -75,7 +80,7 @@ class Channel:
 
     @property
     def is_still(self) -> bool:
-        """Whether it holds one value throughout, numbers that are not finite aside."""
+        """Whether all finite values are equal."""
         finite = self.y[np.isfinite(self.y)]
         return not len(finite) or bool(np.all(finite == finite[0]))
 
@@ -87,12 +92,12 @@ class Channel:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the data, found before any physics.
+    """A defect of the data, found before any fit.
 
     kind: one of fault_kinds.FAULT_KINDS.
     channel: the channel, or the topic or file where no channel is known.
-    share: of the channel's samples, 0 to 1; NaN where the fault is not one of single samples.
-    size: how large, in `unit`, where the fault has a size; detail: where and what, for people.
+    share: of the samples of the channel, 0 to 1; NaN if the fault does not concern single samples.
+    size: in `unit`, if the fault has a size. detail: place and description in words.
     """
 
     kind: str
@@ -105,11 +110,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class Record:
-    """One run: channels by name (see UNITS), and where they came from.
+    """One run: channels by name (see UNITS), and their origin.
 
     epoch_ns: the stamp that is t = 0, nanoseconds since the epoch of the recording clock.
-    source: path or topic prefix, for messages to people. notes: what was repaired or taken for granted.
-    faults: damage found while reading; every result made from the record repeats it.
+    source: path or topic prefix, for messages. notes: repairs and assumptions. faults: damage found while
+    reading; every result made from the record repeats it.
     """
 
     channels: Mapping[str, Channel]
@@ -128,14 +133,14 @@ class Record:
 
     @classmethod
     def from_arrays(cls, t: npt.ArrayLike, *, source: str = "arrays", **channels: npt.ArrayLike) -> Record:
-        """Return a record of channels that share their stamps; the values are copied.
+        """Return a record of channels that share their stamps; the arrays are copied.
 
-        t: stamps, s, shape (n,), rising: a command takes effect at its stamp and is held, a measurement was
-        taken at its stamp, so the row of a control loop that reads and then commands is one stamp.
+        t: stamps, s, shape (n,), increasing. A command takes effect at its stamp and holds; a measurement was
+        taken at its stamp. So one row of a control loop that reads and then commands has one stamp.
         channels: values by name of UNITS (or an alias such as `q`, `u`, `tau`), in SI, shape (n,): arrays,
-        lists or columns of a table; NaN, or masked, where a measurement is missing.
-        Raises ChannelError for an unknown name, another shape, what is no real number, stamps that do not
-        rise, and stamps or commands that are not finite.
+        lists or columns of a table; NaN or masked for a missing measurement.
+        Raises ChannelError for an unknown name, a wrong shape, values that are not real numbers, stamps that
+        do not increase, and stamps or commands that are not finite.
         """
         from rsea_ros.arrays import record_from_arrays
 
@@ -145,7 +150,7 @@ class Record:
     def from_dataframe(
         cls, table: Any, columns: Mapping[str, str], *, time: str = "t", source: str = "table"
     ) -> Record:
-        """Return a record of a table's columns (pandas, Polars, or any mapping of columns).
+        """Return a record from the columns of a table (pandas, Polars, or any mapping of columns).
 
         columns: the column of each channel, `{"command": "tau_cmd", "ft": "tau_ft"}`. time: the column of
         the stamps, s. Raises ChannelError as from_arrays does, and for a column that the table lacks.
@@ -171,7 +176,7 @@ class Record:
 
     @property
     def driving(self) -> Channel | None:
-        """What drove the run: its torques, else its target positions; None where neither was recorded."""
+        """The commands of the run: torques, else target positions; None without either."""
         return self.channels.get("command", self.channels.get("reference"))
 
     @property

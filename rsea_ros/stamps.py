@@ -1,4 +1,4 @@
-"""Stamps of a run put right: samples in their order, clock jumps taken out, gaps and repeats told.
+"""Stamps of a run put right: samples in order, clock jumps removed, gaps and repeats reported.
 
 Samples that only arrived out of order are sorted. A clock that jumped shifts all the samples after the jump:
 sorted, they would mix with those before it, so the jump is taken out first. The two are told apart by
@@ -41,11 +41,11 @@ _FEW = 0.01
 """Share of a channel's samples that lie far from all others: they are stray, not the run."""
 
 _EXPLAIN_GAPS = ("duplicate_stamps", "dropped_samples")
-"""Kinds of faults that, once told, have told of the gaps too."""
+"""Kinds of faults that include the gaps once they are reported."""
 
 
 def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
-    """Return the record with rising stamps, and what was wrong with them that it does not tell yet.
+    """Return the record with rising stamps, and the defects of the stamps that it does not report yet.
 
     Raises ChannelError for stamps so uneven that no clock of a sensor can have made them.
     """
@@ -132,7 +132,7 @@ def jumps_back(t: FloatArray) -> BoolArray:
 
 
 def _mixes(t: FloatArray, k: int, period: float) -> bool:
-    """Tell whether the samples after k lie between those before it, rather than where these leave gaps."""
+    """Return whether the samples after k lie between those before it, rather than where these leave gaps."""
     low, high = float(t[k + 1]), float(t[k])
     around = int(min(len(t), 4.0 * (high - low) / period + 2 * _AROUND))
     before = t[max(0, k + 1 - around) : k + 1]

@@ -148,7 +148,7 @@ def _mapping(events: Iterator[yaml.Event], way: Way, lines: dict[Way, int]) -> d
     body: dict[Any, Any] = {}
     for event in _until_end(events):
         if not isinstance(event, yaml.ScalarEvent):
-            raise _refusal(event, "a key that is no single word, expected a name")
+            raise _refusal(event, "a key that is not a single word, expected a name")
         key = _scalar(event, "key")
         name = (*way, str(key))
         if name in lines:

@@ -36,7 +36,7 @@ def in_motion(unit: str, *, linear: bool) -> str:
 
 
 def same_unit(text: object, unit: str) -> bool:
-    """Tell whether a text means a unit, which is written as in `N m s/rad`.
+    """Return whether a text means a unit, which is written as in `N m s/rad`.
 
     Blanks between the symbols may be left out, but not put into a symbol: `m s` is no millisecond.
     """

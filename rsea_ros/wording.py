@@ -40,8 +40,8 @@ def shown(value: object, longest: int = 60) -> str:
 
 
 def no_utf_8(error: UnicodeDecodeError) -> str:
-    """Return which byte of a file is no text in UTF-8."""
-    return f"byte {error.start} is {error.object[error.start]:#04x}, which is no UTF-8"
+    """Return which byte of a file is not text in UTF-8."""
+    return f"byte {error.start} is {error.object[error.start]:#04x}, which is not UTF-8"
 
 
 def brief(text: str, longest: int = _LONGEST) -> str:

@@ -1,4 +1,4 @@
-"""Every kind of fault that the code tells stands in one table, and in the docs."""
+"""Every kind of fault of the code is in one table, and in the docs."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
+FACTS = {"errors", "fault_kinds", "normal", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
@@ -23,6 +23,7 @@ OWN = {
     "signals": {"errors", "arrays"},
     "stamps": {"errors", "signals"},
     "fault_kinds": set(),
+    "normal": set(),
     "progress": set(),
     "wording": set(),
     "version": set(),
@@ -95,6 +96,16 @@ NAMING = (
     {"conclusion"},
 )
 """Layers of its folder naming: how the selected causes are named."""
+
+REPORT = {
+    "figures": set(),
+    "page": {"figures"},
+    "diagnosis": {"figures", "page", "identification"},
+    "campaign": {"figures", "page", "experiment"},
+    "fleet": {"figures", "page", "diagnosis"},
+    "paper": {"figures", "page", "design"},
+}
+"""Folders of rsea_ros/report that a folder imports; one that is not listed has figures and page alone."""
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
@@ -185,7 +196,7 @@ def offences(path: Path, source: str) -> list[str]:
 
 
 def may_import(layer: str, module: str) -> bool:
-    """Tell whether the tables allow it; a part of a layer belongs to that layer too."""
+    """Return whether the tables allow it; a part of a layer belongs to that layer too."""
     whole, top = layer.split(".")[0], module.split(".")[0]
     if top in ("rsea_ros", "msg_adapters"):
         return layer_of(module).split(".")[0] in OWN[layer] | {whole}
@@ -233,6 +244,19 @@ def used_by(package: str, name: str) -> set[str]:
     modules = (module for p in paths for module, _ in imports(p, p.read_text(encoding="utf-8")))
     inside = (m.removeprefix(package + ".") for m in modules if m.startswith(package + "."))
     return {m.split(".")[0] for m in inside}
+
+
+REPORT_FOLDER = ROOT / "rsea_ros" / "report"
+
+
+@pytest.mark.parametrize("folder", sorted(p.name for p in REPORT_FOLDER.iterdir() if list(p.glob("*.py"))))
+def test_a_folder_of_the_report_imports_only_what_it_may(folder):
+    folders = {p.name for p in REPORT_FOLDER.iterdir() if p.is_dir()}
+    used = set()
+    for path in (REPORT_FOLDER / folder).glob("*.py"):
+        modules = (module.split(".") for module, _ in imports(path, path.read_text(encoding="utf-8")))
+        used |= {parts[2] for parts in modules if parts[:2] == ["rsea_ros", "report"] and len(parts) > 2}
+    assert used & folders - {folder} <= REPORT.get(folder, {"figures", "page"})
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ REFUSED = {
     "a: *x": r"line 1: an anchor or alias",
     "a: !!binary aGk=": r"not YAML: line 1: tag 'tag:yaml.org,2002:binary', expected none",
     "a: !!str 5": r"not YAML: line 1: tag",
-    "? [1]\n: 2": r"line 1: a key that is no single word",
+    "? [1]\n: 2": r"line 1: a key that is not a single word",
     "a: 1\n---\nb: 2": r"not YAML: a second document",
     "a: [": r"not YAML: ",
     "a\tb: \t- 1\n\tc": r"not YAML: ",

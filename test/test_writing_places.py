@@ -25,7 +25,7 @@ def offences(source: str) -> list[int]:
 
 
 def writes(call: ast.Call) -> bool:
-    """Tell whether a call writes a file: by its name, or by the mode that it opens one with."""
+    """Return whether a call writes a file: by its name, or by the mode that it opens one with."""
     name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
     if name == "open":
         modes = [a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]

@@ -77,7 +77,7 @@ def _descended(place: dict[str, Any], variables: dict[str, Any]) -> Any:
         if at:
             names = getattr(getattr(value, "dtype", None), "names", None)
             if names is None:
-                raise Refused(f"column {place['column']!r}: {way} is no struct, expected one with {part}")
+                raise Refused(f"column {place['column']!r}: {way} is not a struct, expected one with {part}")
             if match["name"] not in names:
                 raise KeyError(f"{way}.{match['name']}", [f"{way}.{name}" for name in names])
             value = _single(value, way)[match["name"]]

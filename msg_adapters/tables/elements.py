@@ -71,5 +71,5 @@ def chosen(column: str, index: int | None) -> str:
 
 
 def is_open(text: str) -> bool:
-    """Tell whether a column or an expression still waits for a number in the place of `#`."""
+    """Return whether a column or an expression still waits for a number in the place of `#`."""
     return chosen(text, 0) != text

@@ -38,7 +38,7 @@ class Imported:
 
     @property
     def name(self) -> str:
-        """What tells it from the others of the same file: `-joint2-run7`."""
+        """Its suffix among the others of the same file: `-joint2-run7`."""
         joint = "" if self.index is None else f"-joint{self.index}"
         return joint + ("" if self.run is None else f"-run{self.run:.15g}")
 
@@ -54,7 +54,7 @@ class _Part:
 
 
 def import_record(path: str | Path, mapping: ImportMap, index: int | None = None) -> Record:
-    """Read a measurement of one run as its map says; the record's notes tell what was repaired.
+    """Read a measurement of one run as its map says; the record's notes list the repairs.
 
     path: a file, or the directory of the files that the map names. index: of the joint, from 0, where cells
     hold several. Raises ImportMapError with file, row, column, value and expectation.

@@ -74,7 +74,7 @@ def _vector(column: str, document: Any) -> FloatArray:
         cells = _cells(document, place.base)
     except KeyError:
         index_of(column, list(dict.fromkeys(_names(document))))
-        raise ValueError(f"column {column!r} is no list of numbers, expected one") from None
+        raise ValueError(f"column {column!r} is not a list of numbers, expected one") from None
     if place.is_row:
         cells = _element(cells, place, column, 0)
     if not isinstance(cells, list) or len(cells) < 2:

@@ -32,7 +32,7 @@ class Layout:
         return cells[:-1] if len(cells) == len(self.names) + 1 and not cells[-1] else cells
 
     def fits(self, line: str) -> bool:
-        """Tell whether a line without quotes has a cell for every name."""
+        """Return whether a line without quotes has a cell for every name."""
         if self.delimiter == BLANKS:
             return len(line.split()) == len(self.names)
         extra = line.count(self.delimiter) + 1 - len(self.names)
@@ -40,7 +40,7 @@ class Layout:
 
 
 def counts(line: str) -> bool:
-    """Tell whether a line is neither empty nor a comment."""
+    """Return whether a line is neither empty nor a comment."""
     text = line.strip()
     return bool(text) and not text.startswith(COMMENT)
 

@@ -20,7 +20,7 @@ _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BO
 
 
 def blocks_of_lines(path: Path) -> Iterator[list[str]]:
-    """Yield the lines of a file without their ends. Raises ValueError for what is no text."""
+    """Yield the lines of a file without their ends. Raises ValueError for what is not text."""
     rest = ""
     with _opened(path) as file:
         text = io.TextIOWrapper(cast("IO[bytes]", file), encoding=_encoding(path), errors="replace")

@@ -77,7 +77,7 @@ class _Reader:
             parts.append(np.ascontiguousarray(values[:, at]))
 
     def table(self) -> Table:
-        """Return what was collected. Raises ValueError where that is no table."""
+        """Return what was collected. Raises ValueError where that is not a table."""
         if not self._rows:
             raise ValueError("no rows, expected numbers below the column names")
         if self._left_out > MOST_LEFT_OUT * self._rows:

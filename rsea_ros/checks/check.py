@@ -149,7 +149,7 @@ def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Fin
 
 
 def _is_elsewhere(found: list[Finding]) -> bool:
-    """Tell whether clocks and sensitivities mean nothing: another rig, signs or scales."""
+    """Return whether clocks and sensitivities mean nothing: another rig, signs or scales."""
     return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in found)
 
 

@@ -11,7 +11,7 @@ from rsea_ros.checks.lag import lag_of
 from rsea_ros.checks.motion import is_commanded
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.signals import MEASURED, Channel, Fault, Record
 
 _VISIBLE = 3.0
 """Times the sensor's noise: a smaller signal than that may well be lost in it."""
@@ -31,7 +31,7 @@ def dead_channels(
     """
     if not is_commanded(record):
         return []
-    found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in _SENSORS}
+    found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
@@ -39,9 +39,6 @@ def dead_channels(
         if n in found and not found[n] and n not in frozen and alone:
             found[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
-
-
-_SENSORS = ("ft", "deflection", "position", "velocity", "motor_torque")
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:

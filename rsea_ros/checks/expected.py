@@ -55,7 +55,7 @@ def _inverse(record: Record, rig: Rig) -> Mapping[str, Side]:
 
 
 def is_full_of_gaps(record: Record) -> bool:
-    """Tell whether the record lasts much longer than its samples do: a clock that was set."""
+    """Return whether the record lasts much longer than its samples do: a clock that was set."""
     t = record["command"].t
     period = float(np.median(np.diff(t)))
     return not period > 0.0 or record.stop - record.start > MOST_STEPS * period * len(t)

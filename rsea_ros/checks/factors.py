@@ -13,7 +13,7 @@ _SPEEDS = {"rpm": 60.0 / _TURN, "deg/s": math.degrees(1.0), "rev/s": 1.0 / _TURN
 _TORQUES = {"mN m": 1e3, "N cm": 100.0, "kN m": 1e-3, "lbf in": 8.8507}
 _UNITS = {"position": _ANGLES, "deflection": _ANGLES, "velocity": _SPEEDS}
 SAME_NUMBER = {"mN m": "mN m or N mm"}
-"""Units that a factor cannot tell apart."""
+"""Units that a factor cannot distinguish."""
 
 
 @dataclass(frozen=True)

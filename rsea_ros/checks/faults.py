@@ -26,7 +26,7 @@ _CLIPPED = 8
 _SMALLEST_SHARE = 1e-3
 _SLOW = 0.25
 _COARSE = 5.0
-"""Steps of so many times what the rig's sensor makes are told."""
+"""Steps larger than this multiple of those of the rig's sensor are reported."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def check(record: Record, rig: Rig) -> Checked:
 
 
 def _has_steps(record: Record, name: str) -> bool:
-    """Tell whether a channel's steps are its sensor's: a torque repeats those of a command of few values."""
+    """Return whether the steps of a channel are those of its sensor, not of a command of few values."""
     if name != "motor_torque" or "command" not in record:
         return name in record
     return name in record and len(np.unique(record["command"].y)) > FEW * len(record["command"])
@@ -156,7 +156,7 @@ def clipping(channel: Channel, name: str) -> BoolArray:
 
 
 def _common(y: FloatArray, extreme: float) -> bool:
-    """Tell whether values just inside the extreme are as common as the extreme itself (a coarse quantum)."""
+    """Return whether values just inside the extreme are as common as the extreme (a coarse quantum)."""
     values, counts = np.unique(y[np.isfinite(y)], return_counts=True)
     k = int(np.argmin(np.abs(values - extreme)))
     inside = (

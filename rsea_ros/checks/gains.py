@@ -22,7 +22,7 @@ ALLOWED = 1.1
 _RELATED = 0.8
 """Coherence below which a gain may be that of a limit: a unit changes none."""
 _ALIKE = 0.15
-"""Logarithm: factors that lie so close cannot be told apart."""
+"""Logarithm: factors that lie so close cannot be distinguished."""
 SHAPED = 0.35
 """Largest median of what is left of ln R for a channel to have the rig's shape."""
 _BETTER = 10.0

@@ -1,4 +1,4 @@
-"""How late a channel comes against the rig's simulation, where that is more than phases can tell: seconds.
+"""How late a channel comes against the rig's simulation, if it is too large for phases: seconds.
 
 The lag at which measured and predicted values agree best, by their correlation within +-2 s. It counts only
 where no other lag does nearly as well: a periodic command has many.

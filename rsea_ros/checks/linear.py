@@ -16,11 +16,9 @@ from rsea_ros.checks.shape import Shape
 from rsea_ros.identification.problem import case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import BoolArray, Channel, FloatArray, Record
+from rsea_ros.normal import Z95
+from rsea_ros.signals import SENSED, BoolArray, Channel, FloatArray, Record
 
-TIMED = ("ft", "deflection", "position", "velocity")
-"""Channels whose clocks are sought; the motor torque is held from command to command and shows none."""
-_Z95 = 1.959964
 _ROUNDS = 6
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 """Of a step, tried until the loss falls."""
@@ -44,7 +42,7 @@ class Number:
     @property
     def ci95(self) -> tuple[float, float]:
         """The 95 % interval."""
-        return self.value - _Z95 * self.sd, self.value + _Z95 * self.sd
+        return self.value - Z95 * self.sd, self.value + Z95 * self.sd
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,8 @@ def _setting(
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
-    timed = tuple(n for n in TIMED if n in channels_that_tell(record, rig))
+    told = channels_that_tell(record, rig)
+    timed = tuple(n for n in SENSED if n in told)  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))

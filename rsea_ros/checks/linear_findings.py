@@ -101,7 +101,7 @@ def _beside(linear: Linear, name: str) -> str:
 
 
 def identifiability(linear: Linear, rig: Rig) -> list[Finding]:
-    """Return for each value that a fit may move whether these data tell it."""
+    """Return for each value that a fit may move whether these data determine it."""
     found = []
     for name, brought in linear.values.items():
         percent = 100.0 * brought.relative_sd

@@ -42,12 +42,12 @@ def motion_beside(record: Record, name: str) -> Motion | None:
 
 
 def is_commanded(record: Record) -> bool:
-    """Tell whether the command of a record changes, if there is one."""
+    """Return whether the command of a record changes, if there is one."""
     return "command" not in record or float(np.ptp(np.nan_to_num(record["command"].y))) > 0.0
 
 
 def is_still(record: Record) -> bool:
-    """Tell whether no sensor shows anything but white noise: what fourth differences show is all of it."""
+    """Return whether no sensor shows anything but white noise: what fourth differences show is all of it."""
     return all(_is_noise(record[n]) for n in ("position", "velocity", "ft", "deflection") if n in record)
 
 

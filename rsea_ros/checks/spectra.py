@@ -112,7 +112,7 @@ def _captured(spectra: ComplexArray, values: FloatArray) -> float:
 
 
 def usable(q: Quotient) -> BoolArray:
-    """Return which bands tell something: coherent, and with more than a trace of the predicted power."""
+    """Return the informative bands: coherent, and with more than a trace of the predicted power."""
     keep: BoolArray = (q.coherence > 0.3) & (q.weight > 1e-7 * q.weight.max()) & np.isfinite(q.sd)
     return keep
 

@@ -1,4 +1,4 @@
-"""Findings about messages: channels, rates, gaps, order; and the faults that masking already told."""
+"""Findings about messages: channels, rates, gaps, order; and the faults that masking already reported."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from rsea_ros.cli import demo
 from rsea_ros.cli._processes import Processes
+from rsea_ros.cli._runs import RIG
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig, save_rig
@@ -28,11 +29,11 @@ SESSION = 150.0
 
 def show(out: Path, domain: int, args: argparse.Namespace) -> int:
     """Hide a cause, record slow work, let the experiment node find the cause, and print what was hidden."""
-    rig = load_rig(demo.RIG)
+    rig = load_rig(RIG)
     name, parameters = HIDDEN[int(np.random.default_rng(args.seed).integers(len(HIDDEN)))]
     bench = demo.bench_of(rig, args.seed).with_effect(name, **parameters)
     save_rig(bench, out / "bench.yaml")
-    print(f"{demo.RIG}, with values up to {100.0 * demo.SPREAD:g} % off and a cause known to the plant only")
+    print(f"{RIG}, with values up to {100.0 * demo.SPREAD:g} % off and a cause known to the plant only")
     with Processes(out / "log", domain) as nodes:
         with demo.source(nodes, out, args) as first:
             log = _slow_work(nodes, out, first)
@@ -60,7 +61,7 @@ def _slow_work(nodes: Processes, out: Path, first: str) -> Path:
 def _session(nodes: Processes, out: Path, bag: Path) -> None:
     """Run the experiment node; the demo consents to every run in advance."""
     with demo.stage(f"experiment: runs within {LIMITS}, without asking") as tell:
-        values = {"bag": bag, "out": out, "limits": LIMITS, "ask": False, "rig": demo.RIG}
+        values = {"bag": bag, "out": out, "limits": LIMITS, "ask": False, "rig": RIG}
         nodes.start("experiment", values)
         nodes.wait("experiment", SESSION, tell)
 

@@ -1,4 +1,4 @@
-"""Options of every verb that writes: the destination, and whether existing files may be replaced."""
+"""Options of every verb that writes: destination, whether existing files may be replaced, JSON instead."""
 
 from __future__ import annotations
 
@@ -16,6 +16,22 @@ FOUND = 1
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Declare --force."""
     parser.add_argument("--force", action="store_true", help="replace existing files (never an input)")
+
+
+def add_results(parser: argparse.ArgumentParser, files: str, default: str) -> None:
+    """Declare --out, the directory for the files, and --force. default: where they go without --out."""
+    parser.add_argument("--out", type=Path, help=f"directory for {files} (default {default}, -2, …)")
+    add_force(parser)
+
+
+def add_json(parser: argparse.ArgumentParser, file: str) -> None:
+    """Declare --json: the file of the results on standard output."""
+    parser.add_argument("--json", action="store_true", help=f"print {file} to stdout and nothing else")
+
+
+def print_file(path: Path) -> None:
+    """Print a file as it is."""
+    print(path.read_text(encoding="utf-8"), end="")
 
 
 def add_fail_on(parser: argparse.ArgumentParser, findings: Sequence[str], note: str = "") -> None:

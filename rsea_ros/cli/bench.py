@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
@@ -35,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--port", type=Path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
     add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",
         help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
-    add("--rig", default="paper_high_impedance", help="rig of the plant: a name in config/rigs, or a file")
+    add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")
     add("--ft-rate", type=float, default=1000.0, help="record rate of the F/T sensor, Hz, 1 to 7000")
     add("--torque-constant", type=float, default=0.0, help="N m at the output per A; 0: that of the model")
     add("--return-delay", type=int, default=0, help="delay of each reply, unit 2 µs, 0 to 254")

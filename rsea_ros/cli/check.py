@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topics import AXES
 from rsea_ros.cli._output import FOUND
+from rsea_ros.cli._runs import add_rig, add_runs
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.errors import RseaError
 from rsea_ros.signals import Channel
@@ -21,16 +22,15 @@ if TYPE_CHECKING:
 
 HELP = "check topics, rates, clocks, noise, sign, scale and rig of a record in seconds"
 EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
-RIG = "paper_high_impedance"
 NARROWEST = 140
 """Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
+    add_runs(parser)
+    add_rig(parser)
     add = parser.add_argument
-    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3")
-    add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
     add("--json", action="store_true", help="print the findings as JSON (docs/check.md) and nothing else")
     add(
         "--fail-on",
@@ -81,7 +81,7 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 def _print(checks: list[Findings]) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.check.text import check_table, summary
+    from rsea_ros.report.check.terminal import check_table, summary
 
     console = Console()
     if not console.is_terminal:

@@ -6,9 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
+from rsea_ros.cli._runs import RIG
 from rsea_ros.new_files import NewFiles
+from rsea_ros.report.file_names import CONTROL_JSON, REPORT
 
 if TYPE_CHECKING:
     from rsea_ros.control.study import Motor, Study
@@ -17,13 +19,12 @@ if TYPE_CHECKING:
 HELP = "design the torque controller of a rig: gains, margins, trials in simulation, output impedance"
 EXAMPLE = "rsea control paper_high_impedance --rate 280"
 
-JSON, REPORT = "control.json", "report.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     parser.add_argument(
-        "rig", nargs="?", default="paper_high_impedance", help="rig or model.yaml (default %(default)s)"
+        "rig", nargs="?", default=RIG, help="rig or model.yaml (default %(default)s)"
     )
     parser.add_argument(
         "--free",
@@ -33,13 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate", type=float, nargs="+", default=[280.0, 1000.0], metavar="HZ", help="Hz (default 280 1000)"
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        help="directory for control.json and report.html (default out/control, -2, …)",
-    )
-    add_force(parser)
-    parser.add_argument("--json", action="store_true", help="print control.json to stdout and nothing else")
+    add_results(parser, f"{CONTROL_JSON} and {REPORT}", "out/control")
+    add_json(parser, CONTROL_JSON)
     parser.add_argument("--fail-on", choices=["missed"], help="exit status 1 if a trial misses its limit")
 
 
@@ -52,16 +48,16 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.control.page import control_report
     from rsea_ros.report.json_values import json_text
 
-    place = results_place(args, "out/control", (JSON, REPORT), [args.rig, args.free])
+    place = results_place(args, "out/control", (CONTROL_JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)
     rig = load_rig(args.rig)
     with progress("control") as told:
         found = study(rig, lightest(rig, args.free or ""), args.rate, motors(rig), progress=told)
     with NewFiles(place) as new:
-        path = new.write(JSON, json_text(control_json(found)))
+        path = new.write(CONTROL_JSON, json_text(control_json(found)))
         report = new.write(REPORT, control_report(found))
     if args.json:
-        print(path.read_text(encoding="utf-8"), end="")
+        print_file(path)
     else:
         _print(found, report)
     missed = any(trial.met is False for at in found.rates for trial in at.trials)
@@ -107,7 +103,7 @@ def _print(found: Study, report: Path) -> None:
     blocks = [
         (tables.trial_head(found), tables.trial_rows(found)),
         (["compensated", "sine", *rates], tables.compensation_rows(found)),
-        (["motor", "amplitude", "clamped: not from", "free: not from"], tables.reach_rows(found)),
+        (["motor", "amplitude", "clamped: limit from", "free: limit from"], tables.reach_rows(found)),
     ]
     for head, rows in blocks:
         shown = Table(*head, box=None, pad_edge=False, header_style="dim")

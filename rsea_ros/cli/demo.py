@@ -20,6 +20,7 @@ from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._ros import need_ros
+from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.model.rig import Rig
@@ -29,7 +30,6 @@ from rsea_ros.report.fault_words import fault_lines
 
 HELP = "excite, record, replay and identify a simulated bench on live ROS 2 nodes, and write a report"
 EXAMPLE = "rsea demo --out first_demo"
-RIG = "paper_high_impedance"
 NAMES = (
     "bag", "bag-2", "bench.yaml", "log", "identification.json", "experiment.json", "model.yaml", "report.html"
 )  # fmt: skip

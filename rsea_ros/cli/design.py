@@ -7,71 +7,43 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import add_json, add_results, print_file, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
+from rsea_ros.report.file_names import DESIGN_JSON, REPORT
 
 HELP = "compute spring stiffness and spring rate from torque, bandwidth and inertia by the paper's method"
 EXAMPLE = "rsea design --torque 200 --bandwidth 50 --inertia 0.01"
-JSON, REPORT = "design.json", "report.html"
+SIZES = {
+    "torque": "largest torque, N m",
+    "bandwidth": "bandwidth, Hz",
+    "inertia": "inertia of the spring chassis, kg m^2",
+    "mass": "mass of the chassis, kg",
+    "diameter": "diameter of the chassis, m",
+    "separation": "distance between two springs, m",
+    "spring_radius": "radius r_s of Eq. (9), m",
+}
+TOLERANCES = {
+    "tolerance_db": "tolerance of |T_d/T_p|, dB",
+    "tolerance_deg": "tolerance of its phase, deg; 90: none",
+}
 UNIT, STIFFNESS = "rd85x13-hd_cpl-25a-160", 260.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments; the defaults are the paper's example."""
     default = Requirement()
-    parser.add_argument(
-        "--torque", type=float, default=default.torque, help="largest torque, N m (default %(default)s)"
-    )
-    parser.add_argument(
-        "--bandwidth", type=float, default=default.bandwidth, help="bandwidth, Hz (default %(default)s)"
-    )
-    parser.add_argument(
-        "--inertia",
-        type=float,
-        default=default.inertia,
-        help="inertia of the spring chassis, kg m^2 (default %(default)s)",
-    )
-    parser.add_argument(
-        "--mass", type=float, default=default.mass, help="mass of the chassis, kg (default %(default)s)"
-    )
-    parser.add_argument(
-        "--diameter",
-        type=float,
-        default=default.diameter,
-        help="diameter of the chassis, m (default %(default)s)",
-    )
-    parser.add_argument(
-        "--separation",
-        type=float,
-        default=default.separation,
-        help="distance between two springs, m (default %(default)s)",
-    )
-    parser.add_argument(
-        "--spring-radius",
-        type=float,
-        default=default.spring_radius,
-        help="radius r_s of Eq. (9), m (default %(default)s)",
-    )
+    for name in SIZES:
+        _add_demand(parser, default, name)
     parser.add_argument(
         "--deflection",
         type=float,
         default=math.degrees(default.deflection),
         help="largest deflection, deg (default %(default).3g)",
     )
-    parser.add_argument(
-        "--tolerance-db",
-        type=float,
-        default=default.tolerance_db,
-        help="tolerance of |T_d/T_p|, dB (default %(default)s)",
-    )
-    parser.add_argument(
-        "--tolerance-deg",
-        type=float,
-        default=default.tolerance_deg,
-        help="tolerance of its phase, deg; 90: none (default %(default)s)",
-    )
+    for name in TOLERANCES:
+        _add_demand(parser, default, name)
     parser.add_argument(
         "--stiffness",
         type=float,
@@ -85,14 +57,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="YAML of motor-gear units (default config/design/motor_gear_units.yaml)",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        help="directory for design.json and report.html (default out/design, -2, …)",
-    )
-    add_force(parser)
-    parser.add_argument("--json", action="store_true", help="print design.json to stdout and nothing else")
+    add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")
+    add_json(parser, DESIGN_JSON)
     parser.add_argument("--fail-on", choices=["unmet"], help="exit status 1 if the stiffness misses a demand")
+
+
+def _add_demand(parser: argparse.ArgumentParser, default: Requirement, name: str) -> None:
+    about = {**SIZES, **TOLERANCES}[name]
+    parser.add_argument(
+        f"--{name.replace('_', '-')}",
+        type=float,
+        default=getattr(default, name),
+        help=f"{about} (default %(default)s)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -104,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.report.design.page import design_report
     from rsea_ros.report.json_values import json_text
 
-    place = results_place(args, "out/design", (JSON, REPORT), [args.catalogue])
+    place = results_place(args, "out/design", (DESIGN_JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
     requirement, unit = _requirement(args), unit_named(args.unit, args.catalogue)
     unit = unit.with_train(args.train) if args.train else unit
@@ -113,28 +90,18 @@ def run(args: argparse.Namespace) -> int:
     enough = robust_stiffness(requirement, unit)
     robust = judge(requirement, unit, enough) if math.isfinite(enough) else None
     with NewFiles(place) as new:
-        path = new.write(JSON, json_text(design_json(asked, least, robust)))
+        path = new.write(DESIGN_JSON, json_text(design_json(asked, least, robust)))
         report = new.write(REPORT, design_report(asked, least, robust))
     if args.json:
-        print(path.read_text(encoding="utf-8"), end="")
+        print_file(path)
     else:
         _print(asked, least, robust, report)
     return 1 if args.fail_on and not asked.feasible else 0
 
 
 def _requirement(args: argparse.Namespace) -> Requirement:
-    names = (
-        "torque",
-        "bandwidth",
-        "inertia",
-        "mass",
-        "diameter",
-        "separation",
-        "spring_radius",
-        "tolerance_db",
-        "tolerance_deg",
-    )
-    return Requirement(deflection=math.radians(args.deflection), **{n: getattr(args, n) for n in names})
+    values = {name: getattr(args, name) for name in (*SIZES, *TOLERANCES)}
+    return Requirement(deflection=math.radians(args.deflection), **values)
 
 
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:

@@ -8,17 +8,17 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
-from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
+from rsea_ros.cli._runs import add_rig, add_runs
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
+from rsea_ros.report.file_names import DIAGNOSIS, DIAGNOSIS_JSON, MODEL
 from rsea_ros.signals import Record
 
 HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
-RIG = "paper_high_impedance"
-FILES = ("diagnosis.json", "model.yaml", "report.html", "overlay.mcap")
 FAULTS = "faults"
 _MUCH = 0.2
 """Share of the residual above the noise; if more stays unexplained, the next step is `rsea law`."""
@@ -27,11 +27,10 @@ _MUCH = 0.2
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
-    add("--rig", default=RIG, help="rig file, or the name of one in config/rigs (default %(default)s)")
+    add_runs(parser, "several runs of one bench")
+    add_rig(parser)
     add("--holdout", metavar="BAG", help="a run for testing only (default: every fourth second of the runs)")
-    add("--out", help=f"directory for {', '.join(FILES)} (default out/diagnose-BAG, -2, …)")
-    add_force(parser)
+    add_results(parser, ", ".join(DIAGNOSIS), "out/diagnose-BAG")
     add(
         "--without",
         nargs="+",
@@ -42,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     most = "largest number of causes (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
-    add("--json", action="store_true", help="print diagnosis.json to stdout and nothing else")
+    add_json(parser, DIAGNOSIS_JSON)
     add_fail_on(parser, (*get_args(Verdict), FAULTS), " (of the data)")
     add_topic_options(parser)
     add_window_options(parser)
@@ -53,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
 
     inputs = [*args.bags, args.rig, args.holdout]
-    place = results_place(args, Path("out") / f"diagnose-{Path(args.bags[0]).stem}", FILES, inputs)
+    place = results_place(args, Path("out") / f"diagnose-{Path(args.bags[0]).stem}", DIAGNOSIS, inputs)
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
@@ -76,11 +75,11 @@ def run(args: argparse.Namespace) -> int:
             result, raw, place, write_overlay, provenance("diagnose", args.bags, args.rig)
         )
     if args.json:
-        print((report.parent / "diagnosis.json").read_text(encoding="utf-8"), end="")
+        print_file(report.parent / DIAGNOSIS_JSON)
     else:
         _print(result, report)
         if left_unexplained(result) > _MUCH:
-            model = report.parent / "model.yaml"
+            model = report.parent / MODEL
             print(f"law         of the remaining residual: rsea law {' '.join(args.bags)} --rig {model}")
     findings = {result.verdict, *([FAULTS] if result.faults else [])}
     return FOUND if findings.intersection(args.fail_on) else 0

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._numbers import positive
-from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._topics import add_topic_options, topic_map
 from rsea_ros.errors import FieldError, ParameterError
 from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MODEL, REPORT
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 HELP = "design the run that separates the remaining causes, within the limits of a bench"
 EXAMPLE = "rsea experiment friction/model.yaml play/model.yaml --limits torque=20,velocity=1"
-CSV, JSON, REPORT = FILES = ("run.csv", "experiment.json", "report.html")
 NO_RUN = "no_run"
 
 
@@ -47,9 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of shapes to compare (default %(default)s)",
     )
-    add("--out", help=f"directory for {', '.join(FILES)} (default out/experiment, -2, …)")
-    add_force(parser)
-    add("--json", action="store_true", help="print experiment.json to stdout and nothing else")
+    add_results(parser, ", ".join(EXPERIMENT), "out/experiment")
+    add_json(parser, EXPERIMENT_JSON)
     add_fail_on(parser, (NO_RUN,))
     add_topic_options(parser)
 
@@ -61,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.experiment.proposal import Asked
     from rsea_ros.identification.workers import worker_pools
 
-    place = results_place(args, Path("out") / "experiment", FILES, [*args.models, *args.bag])
+    place = results_place(args, Path("out") / "experiment", EXPERIMENT, [*args.models, *args.bag])
     asked = Asked(
         limits_from(args.limits), args.rate, min(0.5, args.longest), args.longest, refine=args.refine
     )
@@ -72,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         advice = replace(advise(hypotheses, asked, noise, pools.run, tell), excluded=excluded)
     report = written(advice, place, args)
     if args.json:
-        print((report.parent / JSON).read_text(encoding="utf-8"), end="")
+        print_file(report.parent / EXPERIMENT_JSON)
     else:
         _print(advice, report)
     return FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
@@ -87,7 +86,7 @@ def models_in(path: str) -> list[Model]:
 
     if Path(path).suffix != ".json":
         return [model_of(load_rig(path))]
-    extended = load_rig(Path(path).parent / "model.yaml")
+    extended = load_rig(Path(path).parent / MODEL)
     try:
         return models_of(strict_yaml.read(Path(path)).content, extended)
     except FieldError as error:
@@ -131,8 +130,8 @@ def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
     source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])
     with NewFiles(place) as new:
         if advice.proposal is not None:
-            new.write(CSV, run_text(advice.proposal.command, advice.proposal.rate))
-        new.write(JSON, json_text(with_provenance(advice_json(advice), source)))
+            new.write(COMMANDS, run_text(advice.proposal.command, advice.proposal.rate))
+        new.write(EXPERIMENT_JSON, json_text(with_provenance(advice_json(advice), source)))
         return new.write(REPORT, advice_page(advice, source))
 
 
@@ -152,7 +151,7 @@ def _print(advice: Advice, report: Path) -> None:
                     print(f"separates   {plain_name(a)} over {plain_name(b)}: S = {p.table[i, j]:.3g}")
         for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
             print(f"asks        {name} {expected}, at most {level} of {limit} {unit}")
-        print(f"run         {report.parent / CSV}")
+        print(f"run         {report.parent / COMMANDS}")
     for proof in advice.proofs:
         print(f"no run      {proof_words(proof)}")
     print(f"report      {report}")

@@ -8,37 +8,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from msg_adapters import read_record
-from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
+from rsea_ros.cli._runs import add_rig, add_runs
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.identification.result import Verdict
+from rsea_ros.report.file_names import IDENTIFICATION, IDENTIFICATION_JSON
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "identify frequency response and parameters with intervals from recorded runs"
 EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
-FILES = ("identification.json", "model.yaml", "report.html")
 NARROWEST = 100
 """Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3")
-    parser.add_argument(
-        "--rig",
-        default="paper_high_impedance",
-        help="rig file, or the name of one in config/rigs (default %(default)s)",
-    )
-    parser.add_argument(
-        "--out",
-        help="directory for identification.json, model.yaml, report.html (default out/identify-BAG, -2, …)",
-    )
-    add_force(parser)
-    parser.add_argument(
-        "--json", action="store_true", help="print identification.json to stdout and nothing else"
-    )
+    add_runs(parser)
+    add_rig(parser)
+    add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
+    add_json(parser, IDENTIFICATION_JSON)
     add_fail_on(parser, get_args(Verdict))
     add_topic_options(parser)
     add_window_options(parser)
@@ -49,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
 
     default = Path("out") / f"identify-{Path(args.bags[0]).stem}"
-    place = results_place(args, default, FILES, [*args.bags, args.rig])
+    place = results_place(args, default, IDENTIFICATION, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("identify") as tell:
         tell("reading", 0.0)
@@ -66,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         result = replace(identify(records, rig, tell), rig_option=args.rig)
         report = write_results(result, place, provenance("identify", args.bags, args.rig))
     if args.json:
-        print((report.parent / "identification.json").read_text(encoding="utf-8"))
+        print_file(report.parent / IDENTIFICATION_JSON)
     else:
         _print(result, report)
     return FOUND if result.verdict in args.fail_on else 0

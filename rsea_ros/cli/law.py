@@ -5,25 +5,23 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rsea_ros.cli._output import FOUND, add_fail_on, add_force, results_place
+from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
+from rsea_ros.cli._runs import add_rig, add_runs
 from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
+from rsea_ros.report.file_names import LAW, LAW_JSON
 
 HELP = "fit a law to the residual that no known effect explains, and write it as an effect file"
 EXAMPLE = "rsea law run.mcap --rig results/model.yaml --out law"
-RIG = "paper_high_impedance"
-FILES = ("law.json", "base.yaml", "model.yaml", "report.html")
 FINDINGS = ("law", "no_law", "at_noise_floor")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    add = parser.add_argument
-    add("bags", nargs="+", metavar="BAG", help="rosbag2 directory, .mcap or .db3; several runs of one bench")
-    add("--rig", default=RIG, help="model.yaml of a diagnosis, or any rig (default %(default)s)")
-    add("--out", help=f"directory for the effect file, {', '.join(FILES)} (default out/law-BAG, -2, …)")
-    add_force(parser)
-    add("--json", action="store_true", help="print law.json to stdout and nothing else")
+    add_runs(parser, "several runs of one bench")
+    add_rig(parser, "model.yaml of a diagnosis, or any rig")
+    add_results(parser, f"the effect file, {', '.join(LAW)}", "out/law-BAG")
+    add_json(parser, LAW_JSON)
     add_fail_on(parser, FINDINGS)
     add_topic_options(parser)
     add_window_options(parser)
@@ -33,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     """Search for a law and write it."""
     from rsea_ros.model.rig_file import load_rig
 
-    place = results_place(args, Path("out") / f"law-{Path(args.bags[0]).stem}", FILES, [*args.bags, args.rig])
+    place = results_place(args, Path("out") / f"law-{Path(args.bags[0]).stem}", LAW, [*args.bags, args.rig])
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("law") as tell:
         tell("reading", 0.0)
@@ -52,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         result = learn(records, rig, Provenance(where.date, where.version, bags, ""), tell)
         report = write_law(result, place, where)
     if args.json:
-        print((report.parent / "law.json").read_text(encoding="utf-8"), end="")
+        print_file(report.parent / LAW_JSON)
     else:
         from rsea_ros.report.law.words import gain_sentence, headline, law_lines
 

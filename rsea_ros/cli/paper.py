@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._numbers import seed
-from rsea_ros.cli._output import add_force, results_place
+from rsea_ros.cli._output import add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
 from rsea_ros.new_files import NewFiles, Place, check_free
+from rsea_ros.report.file_names import PAPER_JSON, REPORT
 
 if TYPE_CHECKING:
     from rsea_ros.report.paper.page import PaperTests
@@ -25,21 +26,15 @@ MOVING = {
     "separate_stiffnesses": ("ft", "position"),
 }
 """Rigs of the moving-output tests, the paper's first, and the channels of the fit."""
-JSON, REPORT = "paper.json", "report.html"
 CLAMPED = "paper_high_impedance"
 BAGS = (CLAMPED, *(f"{rig}_{end}_end" for rig in MOVING for end in ("spring", "housing")))
-FILES = (JSON, REPORT, *(f"{name}.mcap" for name in BAGS))
+FILES = (PAPER_JSON, REPORT, *(f"{name}.mcap" for name in BAGS))
 SHORTEST = 20.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
-    parser.add_argument(
-        "--out",
-        type=Path,
-        help="directory for paper.json, report.html and the simulated bags (default out/paper, -2, …)",
-    )
-    add_force(parser)
+    add_results(parser, f"{PAPER_JSON}, {REPORT} and the simulated bags", "out/paper")
     parser.add_argument(
         "--duration",
         type=float,
@@ -55,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="only write the figures of docs/derivation.md into this directory",
     )
-    parser.add_argument("--json", action="store_true", help="print paper.json to stdout and nothing else")
+    add_json(parser, PAPER_JSON)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,10 +69,10 @@ def run(args: argparse.Namespace) -> int:
         tests = _tests(args, new, tell)
         tell("page", 0.95)
         results = paper_json(tests)
-        path = new.write(JSON, json_text(results))
+        path = new.write(PAPER_JSON, json_text(results))
         report = new.write(REPORT, paper_report(tests))
     if args.json:
-        print(path.read_text(encoding="utf-8"), end="")
+        print_file(path)
         return 0
     recomputed = [c for c in results["claims"] if c["status"] == "found"]
     agree = sum(c["agrees"] for c in recomputed)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._ros import need_ros
+from rsea_ros.cli._runs import RIG
 
 HELP = "show torques, deflection, flag and health live in a browser; record, identify and diagnose there"
 EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
@@ -17,7 +18,7 @@ EXAMPLE = "rsea watch --rig paper_high_impedance --host 0.0.0.0"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--rig", default="paper_high_impedance", help="rig of the bench: a name in config/rigs, or a file")
+    add("--rig", default=RIG, help="rig of the bench: a name in config/rigs, or a file")
     add("--host", default="localhost", help="address of the server; 0.0.0.0: also for the network (a phone)")
     add("--port", type=int, default=8270, help="port of the page; 0: any free port (default %(default)s)")
     add("--command", action="store_true", help="allow a page to command torque within the driver's limits")

@@ -74,17 +74,20 @@ class Share:
 
 
 class TorqueController:
-    """Makes commands out of readings and desired torques. A command acts one sample after its reading."""
+    """Computes commands from readings and desired torques. A command acts one sample after its reading.
+
+    Method: docs/control.md. Not to be confused with the node `controller`, which runs it on topics.
+    """
 
     def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
                  compensate: Collection[str] | None = None, preview: bool = False, learn: bool = True,
                  corner: float = CORNER) -> None:  # fmt: skip
-        """rate: Hz. gains: by default those of `synthesis.design`, which takes some seconds.
+        """rate: Hz. gains: by default those of `synthesis.design`, which takes 2 to 3 s.
 
-        compensate: names of the rig's effects that are compensated, by default all that have a law for it.
-        preview: desired torques are those of two samples later, known ahead: no prediction. corner: of the
-        prediction, Hz. learn: whether load and drive are learned; not inside an outer loop whose desired
-        torque follows the motion (virtual.py), where what is learned would change its impedance.
+        limits: torque, slew and ramp. compensate: effects of the rig to compensate, by default all that have
+        a law for it. preview: the desired torque is known two samples ahead, so it is not predicted. corner:
+        of the prediction, Hz. learn: learn load and drive; use False inside an outer loop whose desired
+        torque follows the motion (virtual.py), because learning would change its impedance.
         Raises ParameterError for a rig whose torque cannot be controlled.
         """
         gains = gains or design(rig, load_range(rig, lightest(rig)), rate).gains
@@ -97,7 +100,7 @@ class TorqueController:
         self.start(Reading(0.0, 0.0, 0.0))
 
     def start(self, reading: Reading, desired: float = 0.0) -> None:
-        """Begin anew with the bench as it is, from the torque that the motor makes now: nothing jumps."""
+        """Restart without a jump, from the present state of the bench and its motor torque."""
         torque = reading.motor_torque if math.isfinite(reading.motor_torque) else 0.0
         self._reference.start(reading.ft, reading.velocity, desired)
         self.learned.start(reading.ft, reading.velocity)

@@ -61,7 +61,7 @@ class Step:
 
 
 def following(true: Rig, model: Rig, design: Design, *, late: int = 0) -> Following:
-    """Follow sines on a bench without noise and limits; its load is not told to the controller."""
+    """Follow sines on a bench without noise and limits; the controller does not know its load."""
     hz = design.rate * np.array(SHARES)
     found = [_sine(true, locked(model), design, float(f), late) for f in hz]
     return Following(hz, np.array([t for t, _ in found]), np.array([m for _, m in found]))

@@ -29,7 +29,7 @@ class Grid:
         self._at = None
 
     def jumps(self, stamp: int) -> bool:
-        """Tell whether a stamp (ns) is of another run than those before."""
+        """Return whether a stamp (ns) is of another run than those before."""
         return self._at is not None and abs(stamp - self._origin - self._at) > JUMP
 
     def place(self, stamp: int) -> int:

@@ -14,7 +14,7 @@ from rsea_ros.model.simulation import Plant, Sample
 from rsea_ros.signals import FloatArray
 
 PARTS = 10
-"""Of a period, between which the simulation tells instants apart."""
+"""Of a period, between which the simulation distinguishes instants."""
 LONG_AGO = 10**12
 """ns, stamp of the first measurement."""
 

@@ -118,7 +118,7 @@ class Learning:
         return rows
 
     def _stopped(self, seen: FloatArray) -> bool:
-        """Tell whether the gear no longer turns as the torque would have its load turn."""
+        """Return whether the gear no longer turns as the torque would have its load turn."""
         quick = self._period / QUICK
         expected = float(self.load[1:] @ seen[1:3])
         self._expected += quick * (expected**2 - self._expected)

@@ -25,7 +25,7 @@ from rsea_ros.model.rig import EffectSetting, Rig
 HZ, AMPLITUDE = 5.0, 10.0
 SECONDS, SETTLE = 3.0, 1.0
 LONG, LEARNED = 4.0, 3.0
-"""s: how long a bench is followed whose load is not the one that was told, and from when on it counts."""
+"""s: duration of a trial with another load than the stated one, and the time from which it counts."""
 ARCMIN = math.pi / 180.0 / 60.0
 EFFECTS = (
     EffectSetting("coulomb_friction", {"torque": 3.0}),

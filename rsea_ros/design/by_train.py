@@ -68,5 +68,5 @@ def band_range(stiffness: float, chassis: float, spin: float, spread: float) -> 
 
 
 def sense_unknown(rows: Sequence[WithTrain]) -> bool:
-    """Tell whether the trains differ in the sign of the rotor's spin."""
+    """Return whether the trains differ in the sign of the rotor's spin."""
     return len({row.turns > 0.0 for row in rows}) > 1

@@ -9,7 +9,7 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import PAPER_FACTOR, end_over_end, flat_band, pure_torque_bandwidth
+from rsea_ros.model.bandwidth import end_over_end, flat_band, pure_torque_bandwidth, undamped_stiffness
 from rsea_ros.model.rig import Quantity, Rig
 from rsea_ros.model.rig_fields import END_NAMES
 from rsea_ros.model.spring import spring_rate
@@ -103,9 +103,8 @@ def _checks(
 
 def stiffness_bounds(requirement: Requirement, unit: MotorGear) -> dict[str, float]:
     """Return the least K_s, N m/rad, that each demand asks for."""
-    omega_2 = (2.0 * math.pi * requirement.bandwidth) ** 2 / PAPER_FACTOR
     return {
-        "Bandwidth by Eq. (7)": omega_2 * requirement.inertia,
+        "Bandwidth by Eq. (7)": float(undamped_stiffness(requirement.bandwidth, requirement.inertia)),
         "Bandwidth with the rotor's spin": least_for_band(requirement, unit),
         "Torque, K_s/2": 2.0 * requirement.torque,
         "Deflection": mechanism.stiffness_for_deflection(requirement.torque, requirement.deflection),

@@ -1,4 +1,4 @@
-"""Which members of a gear train mesh, in whose frame, with how many teeth: what a multibody engine is told.
+"""Which members of a gear train mesh, in whose frame, with how many teeth: the input of a multibody engine.
 
 Seen from the arm two gears turn about fixed centres, so that one pair of teeth is all the train's law:
 

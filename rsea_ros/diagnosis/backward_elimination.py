@@ -68,7 +68,7 @@ class ReducedModels:
         ]
 
     def is_needed(self, model: Candidate, without: Candidate) -> bool:
-        """Tell whether a model is better than one without a cause of it, or with another in its place."""
+        """Return whether a model is better than one without a cause of it, or with another in its place."""
         extra, rule = model.parameters - without.parameters, self.settings.acceptance
         return preference(model.validation, without.validation, extra, rule).better
 

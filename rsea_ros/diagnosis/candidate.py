@@ -134,7 +134,7 @@ def scored_against(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
 
 
 def leaves_only_noise(model: Candidate, limit: float) -> bool:
-    """Tell whether the residual of every channel is noise, on all blocks but the test blocks.
+    """Return whether the residual of every channel is noise, on all blocks but the test blocks.
 
     limit: RMS of the residual over the noise, below which it is.
     """
@@ -154,7 +154,7 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 
 
 def is_at_bound(solution: Solution, name: str, near: float) -> bool:
-    """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
+    """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
     main = f"{name}.{effect_named(name).main.name}"
     unknown = next(u for u in solution.problem.unknowns if u.name == main)
     span = unknown.high - unknown.low

@@ -57,7 +57,7 @@ class Preference:
 
     @property
     def better(self) -> bool:
-        """Tell whether the model is to be preferred."""
+        """Return whether the model is to be preferred."""
         return self.sure and self.matters
 
 
@@ -81,7 +81,7 @@ def falls(model: Score, other: Score) -> list[float]:
 
 
 def is_acceptable(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether a model may take the place of the present one."""
+    """Return whether a model may take the place of the present one."""
     return refusal(model, present, settings) is None
 
 
@@ -136,7 +136,7 @@ def break_tie(
 
 
 def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether a simpler model does nearly as well as the best, which is far from the floor.
+    """Return whether a simpler model does nearly as well as the best, which is far from the floor.
 
     What the best leaves is no noise, and more parameters always bend a model a little nearer to it.
     """
@@ -147,17 +147,17 @@ def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings =
 
 
 def is_equally_good(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether a model loses no more than another on the validation blocks, within a tenth."""
+    """Return whether a model loses no more than another on the validation blocks, within a tenth."""
     return _loss(model, other) < (1.0 + settings.acceptance.room) * _loss(other, other)
 
 
 def costs_priors_less(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether a model that does as well as another needs clearly less of what is known beforehand."""
+    """Return whether a model that does as well as another needs clearly less of what is known beforehand."""
     return model.prior_cost + loss_excess(model, other) < other.prior_cost - settings.acceptance.prior_gain
 
 
 def is_far_from_floor(model: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether a model is far from the noise floor in its worst channel."""
+    """Return whether a model is far from the noise floor in its worst channel."""
     return worst_ratio(model) >= settings.floor.far
 
 
@@ -198,12 +198,12 @@ def verdict_of(
 
 
 def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
-    """Tell whether every channel is at its noise floor."""
+    """Return whether every channel is at its noise floor."""
     return all(test.ratio(n) <= levels.reached for n in test.sums)
 
 
 def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Tell whether causes take half of the residual in every channel that misfits, or all of one.
+    """Return whether causes take half of the residual in every channel that misfits, or all of one.
 
     The latter counts where that one misfits much and no other gets worse by what matters.
     """

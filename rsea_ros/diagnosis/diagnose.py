@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.stepwise import select_stepwise
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.confidence import torque_scale
-from rsea_ros.identification.fit import CHANNELS, unknowns_of
+from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.machine_scale import scale_of
 from rsea_ros.identification.problem import Problem, case_from
@@ -33,7 +33,7 @@ from rsea_ros.model.extent import bounded
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
-from rsea_ros.signals import Record
+from rsea_ros.signals import MEASURED, Record
 
 
 def diagnose(
@@ -74,7 +74,7 @@ def nominal_problem(checked: Sequence[Checked], rig: Rig) -> Problem:
     """Return the fit of a rig to checked records: the nominal model."""
     cases = tuple(case_from(c.record, rig, c.masked) for c in checked)
     stated = frozenset(e.name for e in rig.effects)
-    return Problem(cases, rig, unknowns_of(rig, cases), CHANNELS, stated=stated)
+    return Problem(cases, rig, unknowns_of(rig, cases), MEASURED, stated=stated)
 
 
 def search(

@@ -107,7 +107,7 @@ class RecordView:
         return self.rig[name]
 
     def is_well_known(self, name: str) -> bool:
-        """Tell whether the rig's prior of a value is narrow."""
+        """Return whether the rig's prior of a value is narrow."""
         return self.rig.spread(name) <= WELL_KNOWN
 
     def travel(self) -> float | None:

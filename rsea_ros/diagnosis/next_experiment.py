@@ -1,4 +1,4 @@
-"""The next experiment: the cheapest run that would tell rivals apart, by simulating them.
+"""The next experiment: the cheapest run that would separate rivals, by simulating them.
 
 Each possible excitation, as large as rig and driver allow, is applied to the accepted model; the rival, with
 all that it may move, is fitted to that (one linearised step), and what it cannot follow is held against the
@@ -56,7 +56,7 @@ EXCITATIONS = tuple(
 def separating(
     accepted: Solution, rivals: Sequence[Solution], rate: float, rule: NextRunSettings = DEFAULT.next_run
 ) -> Experiment:
-    """Return the cheapest allowed run that tells an accepted model from its rivals, or say that none does."""
+    """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
         "other_amplitude", accepted.problem.added[-1], tuple(r.problem.added[-1] for r in rivals)

@@ -10,6 +10,7 @@ from scipy import signal
 
 from rsea_ros.diagnosis.result import Misfit, Spectrum
 from rsea_ros.identification.problem import Case
+from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -91,14 +92,10 @@ def _binned(respect: _Respect, residual: FloatArray, noise: float, channel: str)
     values = respect.values
     if len(values) < 4 * _BINS:
         return []
-    shares = np.linspace(0.0, 1.0, _BINS + 1)
-    even = np.linspace(values.min(), values.max(), _BINS + 1)
-    edges = even if respect.is_even else np.quantile(values, shares)
-    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
-    power = np.bincount(which, residual**2, _BINS) / np.maximum(np.bincount(which, minlength=_BINS), 1)
-    levels = np.sqrt(power)
+    edges = edges_of(values, _BINS, equal=respect.is_even)
+    levels = rms_in(edges, values, residual) / noise
     return [
-        Misfit(respect.what, float(low), float(high), respect.unit, float(level) / noise, channel)
+        Misfit(respect.what, float(low), float(high), respect.unit, float(level), channel)
         for (low, high), level in zip(itertools.pairwise(edges), levels, strict=True)
     ]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, TypeVar
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.identification.result import AT_NOISE
 
 T = TypeVar("T")
 MOST_CAUSES = 4
@@ -82,7 +83,7 @@ class FloorSettings:
         "4 standard deviations of a white residual at 80 s of 280 Hz (noise_level.py)",
     )
     reached: float = number(
-        1.1, "1", "up to it on the test blocks a channel has reached its floor",
+        AT_NOISE, "1", "up to it on the test blocks a channel has reached its floor",
         "at 1.05 a record with nothing wrong is unexplained; no change up to 1.4 (docs/settings.md)",
     )  # fmt: skip
     misfit: float = number(

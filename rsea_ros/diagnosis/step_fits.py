@@ -155,7 +155,7 @@ class StepFits:
         return refit(first, replace(setup, iterations=None, is_quick=is_quick))
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
-        """Tell whether an effect as it was fitted to the pieces does better on the validation blocks."""
+        """Return whether an effect as it was fitted to the pieces does better on the validation blocks."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
         cases, blocks = self.present.cases, self.settings.blocks
@@ -174,7 +174,7 @@ class StepFits:
         return [theta, np.array(mixed)]
 
     def _has_moved(self, model: Candidate) -> bool:
-        """Tell whether a model leaves much more or less of a channel than the present one, its weight."""
+        """Return whether a model leaves much more or less of a channel than the present one, its weight."""
         scores, channels = (model.validation, self.present.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))

@@ -98,6 +98,6 @@ def _fitted_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Can
 
 
 def _is_finished(model: Candidate) -> bool:
-    """Tell whether only noise is left; coloured noise may hide a cause that a fit still finds."""
+    """Return whether only noise is left; coloured noise may hide a cause that a fit still finds."""
     is_coloured = any(case.coloured for case in model.cases)
     return leaves_only_noise(model, model.settings.floor.only_noise) and not is_coloured

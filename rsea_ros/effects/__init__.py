@@ -1,7 +1,7 @@
 """The catalogue of physical effects: one file each, see effect.py.
 
-The package is also a mapping for its readers: `rsea_ros.effects["backlash"]` shows equation, parameters and
-source, and iterating gives the names.
+The package is also a mapping: `rsea_ros.effects["backlash"]` shows equation, parameters and source, and
+iteration gives the names.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class _Catalogue(ModuleType):
         return name in list(self)
 
     def __repr__(self) -> str:
-        """Return name and meaning of every effect, a line each."""
+        """Return name and meaning of every effect, one per line."""
         width = max(map(len, self))
         return "\n".join(f"{name:<{width}}  {self[name].about}" for name in self)
 

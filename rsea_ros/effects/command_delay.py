@@ -3,7 +3,7 @@
     T_motor(t) = T_command(t - delay)
 
 A position loop's target is late: r(t) = target(t - delay). Commands are kept on the grid of the step; a delay
-that is no whole number of steps mixes two of them, which is the exact mean over the step of the held command.
+between two steps mixes two of them, which is the exact mean over the step of the held command.
 Source: Astrom, Wittenmark, Computer-Controlled Systems, 1997, ch. 2 (systems with a time delay).
 """
 

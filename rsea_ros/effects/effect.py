@@ -48,7 +48,7 @@ class RigLike(Protocol):
 
 @dataclass(frozen=True)
 class Claims:
-    """What the effect does, told so that a test can check it in simulation.
+    """The action of the effect, in a form that a test can check in simulation.
 
     channel: where it shows most. parity: odd when turning the command's sign turns the sign of the
     change, even when it keeps it. amplitude_exponent: the change grows with the command's amplitude to

@@ -43,7 +43,7 @@ class ResidualView(Protocol):
         """Return a value of the rig as fitted so far."""
 
     def is_well_known(self, name: str) -> bool:
-        """Tell whether a value of the rig is known well beforehand."""
+        """Return whether a value of the rig is known well beforehand."""
 
     def travel(self) -> float | None:
         """Return how far the measured position goes, rad; None without that channel."""

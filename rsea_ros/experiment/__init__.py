@@ -1,4 +1,4 @@
-"""Design of experiments: the run that tells the causes apart that are still possible, within a bench's
+"""Design of experiments: the run that separates the remaining causes, within a bench's
 limits.
 
 weighing.py holds causes against all records, design.py finds the next run, bound.py proves where none would

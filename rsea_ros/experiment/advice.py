@@ -51,7 +51,7 @@ def advise(
     run: Map = serial,
     tell: Progress | None = None,
 ) -> Advice:
-    """Return the run that tells hypotheses apart, and for pairs that no run separates the proof.
+    """Return the run that separates hypotheses, and for pairs that no run separates the proof.
 
     measured: noise by channel. Raises ParameterError as propose does.
     """

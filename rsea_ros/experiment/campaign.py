@@ -189,7 +189,7 @@ class Campaign:
         return "nothing_wrong" if weighing.best == NOTHING else "confirmed"
 
     def _widens(self, proposal: Proposal, rounds: Sequence[Round]) -> bool:
-        """Tell whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
+        """Return whether a run is the largest so far and only doubt holds it back: it lessens the doubt."""
         before = [r.proposal.peaks.at_level["torque"] for r in rounds if r.proposal is not None]
         now = proposal.peaks
         is_larger = now.at_level["torque"] > self.rules.larger * max(before, default=0.0)

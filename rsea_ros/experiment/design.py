@@ -68,7 +68,7 @@ def propose(
     run: Map = serial,
     tell: Progress | None = None,
 ) -> Proposal:
-    """Return the run that tells hypotheses apart best, or where one is left narrows its parameters most.
+    """Return the run that separates hypotheses best, or where one is left narrows its parameters most.
 
     measured: noise by channel as records show it. Raises ParameterError where the rig has no torque command.
     """

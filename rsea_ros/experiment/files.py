@@ -13,10 +13,10 @@ from rsea_ros.experiment.prior import problem_of, vector_at, weights_of
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.rig import Quantity, Rig
+from rsea_ros.normal import Z95
 
 SPREAD = 0.2
 """Relative, one sigma: the doubt of a cause's parameter whose file states no interval."""
-_Z95 = 1.959964
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _sd(unknown: Unknown, coordinate: float, rig: Rig, model: Model) -> float:
     pair = quantity.ci95 or model.intervals.get(unknown.name)
     if pair is not None:
         ends = [unknown.inner(min(max(v, unknown.low), unknown.high) or 1e-12) for v in pair]
-        return max((ends[1] - ends[0]) / (2.0 * _Z95), 1e-6 * unknown.scale)
+        return max((ends[1] - ends[0]) / (2.0 * Z95), 1e-6 * unknown.scale)
     if unknown.name.startswith(f"{model.name}."):
         return SPREAD if unknown.logarithmic else SPREAD * (abs(coordinate) or unknown.scale)
     return unknown.reach

@@ -13,13 +13,12 @@ from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.drive import coarser, drive_from
 from rsea_ros.model.rig import Rig, Sensor
 from rsea_ros.model.simulation import simulate_drive
-from rsea_ros.signals import Channel, FloatArray, Record
+from rsea_ros.signals import SENSED, Channel, FloatArray, Record
 
 NOTHING = "nothing"
 """Name of the hypothesis that the rig, its values fitted, is all that there is."""
 _SEEN = 3.0
 """Standard deviations from none at all, from which the size of a cause counts as known."""
-SEEN = ("ft", "deflection", "position", "velocity")
 
 
 @dataclass(frozen=True)
@@ -133,5 +132,5 @@ def response(hypothesis: Hypothesis, case: Case, run: Map = serial) -> Response:
 
 def motion(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
     """Return the noise-free torque and motion of a run from rest, whether or not the bench measures them."""
-    case = run_case(command, rate, {n: 1.0 for n in SEEN if rig.measures(n)})
+    case = run_case(command, rate, {n: 1.0 for n in SENSED if rig.measures(n)})
     return simulate_drive(rig, case.drive)  # type: ignore[arg-type]

@@ -12,10 +12,9 @@ from rsea_ros.experiment.hypothesis import Hypothesis, Response, motion, noise_o
 from rsea_ros.experiment.limits import of_command, of_response, used
 from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.shape import Shape, command_of
-from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.solver import Map
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import MEASURED, FloatArray
 
 INSIDE = 0.9
 """Share of the limits that shapes use during the search, where only the likeliest values are simulated."""
@@ -69,5 +68,5 @@ class Judge:
 def noise_by_channel(hypotheses: Sequence[Hypothesis], measured: Mapping[str, float]) -> dict[str, float]:
     """Return the noise of every channel that the bench measures."""
     rig = hypotheses[0].problem.rig
-    listed = [n for n in CHANNELS if n in (measured or rig.sensors) and rig.measures(n)]
+    listed = [n for n in MEASURED if n in (measured or rig.sensors) and rig.measures(n)]
     return {n: noise_of(rig, n, measured) for n in listed or ["ft", "position"]}

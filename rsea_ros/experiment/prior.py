@@ -11,11 +11,11 @@ import numpy as np
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Parameter
 from rsea_ros.experiment.hypothesis import NOTHING
-from rsea_ros.identification.fit import CHANNELS, unknowns_of
+from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.unknowns import Unknown, unknowns_of_effect
 from rsea_ros.model.rig import EffectSetting, Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import MEASURED, FloatArray
 
 _SIZES = 1.0
 """One sigma of the size of a cause around none at all, in what its catalogue calls typical."""
@@ -28,13 +28,13 @@ def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
     nominal = unknowns_of(rig, cases)
     stated = frozenset(e.name for e in rig.effects)
     if name == NOTHING:
-        return Problem(tuple(cases), rig, nominal, CHANNELS, stated=stated)
+        return Problem(tuple(cases), rig, nominal, MEASURED, stated=stated)
     effect = effect_named(name)
     with_it = rig.with_effects(*rig.effects, EffectSetting(name, effect.complete(effect.null)))
     free = unknowns_of_effect(effect, effect.typical, rig.known)
     parameters = {f"{name}.{p.name}": p for p in effect.parameters}
     own = tuple(_doubted(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
-    return Problem(tuple(cases), with_it, (*nominal, *own), CHANNELS, stated=stated)
+    return Problem(tuple(cases), with_it, (*nominal, *own), MEASURED, stated=stated)
 
 
 def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:

@@ -1,4 +1,4 @@
-"""Alarms as files, one each, never twice: the store remembers what it has told.
+"""Alarms as files, one each, never twice: the store remembers reported alarms.
 
 A file is what Prometheus' Alertmanager sends to a webhook, so that whatever takes that takes these.
 """
@@ -28,14 +28,14 @@ FOLDER = "alarms"
 
 @dataclass(frozen=True)
 class Told:
-    """An alarm that was told now. file: where it stands. text: what happened, in a sentence."""
+    """A new alarm. file: its path. text: what happened, in a sentence."""
 
     file: Path
     text: str
 
 
 def tell_alarms(store: Store) -> list[Told]:
-    """Write a file for each alarm that the store has not told before, and return those.
+    """Write a file for each alarm that the store has not reported before, and return those.
 
     Two at once write each alarm once. Raises OSError where the store cannot be written.
     """

@@ -27,8 +27,9 @@ from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
+from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, MODEL
 from rsea_ros.report.identification.json import identification_json
-from rsea_ros.report.json_values import json_text
+from rsea_ros.report.json_values import finite, json_text
 from rsea_ros.signals import UNITS, Fault, Record
 
 _MAIN = ("ft", "deflection", "position", "velocity")
@@ -51,8 +52,8 @@ def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
     result = identify([with_faults(_fit_for_fit(run, rig), found, masks=False)], rig)
     row |= identified(result)
     files = {
-        "identification.json": json_text(identification_json(result)),
-        "model.yaml": rig_text(result.rig),
+        IDENTIFICATION_JSON: json_text(identification_json(result)),
+        MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
         files |= _diagnosed(row, with_faults(record, found, masks=True), rig)
@@ -90,7 +91,7 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     causes = [_cause(c) for c in result.causes]
     row |= {"diagnosis": result.verdict, "causes": causes, "parameters": parameters}
     return {
-        "diagnosis.json": json_text(diagnosis_json(result)),
+        DIAGNOSIS_JSON: json_text(diagnosis_json(result)),
         "extended.yaml": rig_text(result.extended_rig),
     }
 
@@ -101,26 +102,26 @@ def identified(result: Identification) -> dict[str, Any]:
     main = next((n for n in _MAIN if n in times), next(iter(times), ""))
     return {
         "verdict": result.verdict,
-        "residual": _finite(times.get(main, math.nan)),
+        "residual": finite(times.get(main, math.nan)),
         "parameters": [_parameter(p) for p in result.parameters],
     }
 
 
 def _parameter(p: ParameterEstimate) -> dict[str, Any]:
-    low, high = map(_finite, p.ci95)
+    low, high = map(finite, p.ci95)
     identifiable = p.is_told
-    return {"name": p.name, "value": _finite(p.value), "low": low, "high": high, "unit": p.unit,
+    return {"name": p.name, "value": finite(p.value), "low": low, "high": high, "unit": p.unit,
             "identifiable": identifiable}  # fmt: skip
 
 
 def _cause(cause: Any) -> dict[str, Any]:
     sizes = [
-        {"name": name, "value": _finite(e.value), "low": _finite(e.ci95[0]), "high": _finite(e.ci95[1]),
+        {"name": name, "value": finite(e.value), "low": finite(e.ci95[0]), "high": finite(e.ci95[1]),
          "unit": e.unit}
         for name, e in cause.parameters.items()
     ]  # fmt: skip
-    return {"name": cause.name, "status": cause.status, "probability": _finite(cause.probability),
-            "gain": _finite(cause.gain_holdout), "sizes": sizes}  # fmt: skip
+    return {"name": cause.name, "status": cause.status, "probability": finite(cause.probability),
+            "gain": finite(cause.gain_holdout), "sizes": sizes}  # fmt: skip
 
 
 def excitation(record: Record) -> list[dict[str, Any]]:
@@ -139,7 +140,7 @@ def excitation(record: Record) -> list[dict[str, Any]]:
         if channel in record and np.isfinite(record[channel].y).any():
             span = float(np.nanmax(record[channel].y) - np.nanmin(record[channel].y))
             figures.append((f"{channel}_span", span, unit))
-    return [{"name": n, "value": _finite(v), "unit": u} for n, v, u in figures]
+    return [{"name": n, "value": finite(v), "unit": u} for n, v, u in figures]
 
 
 def faults(found: Iterable[Fault]) -> list[dict[str, Any]]:
@@ -154,7 +155,3 @@ def _place(fault: Fault) -> str:
     share = f"{100.0 * fault.share:.3g} %" if math.isfinite(fault.share) else ""
     size = f"{fault.size:.4g} {fault.unit}".strip() if fault.size is not None else ""
     return ": ".join(filter(None, (fault.channel, ", ".join(filter(None, (share, size, fault.detail))))))
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -135,7 +135,7 @@ class Engine:
         return f"{size}, a worker may have {limit / 1e9:.3g} GB: fewer workers or --memory, then --again"
 
     def _take(self, done: Done) -> None:
-        """Write what a task has left, plan what a fingerprint tells, or try again."""
+        """Write what a task has left, plan the task of a fingerprint, or try again."""
         job = done.job
         if isinstance(done.error, WorkerLost) and job.attempt + 1 < ATTEMPTS:
             due = time.monotonic() + self._limits.back_off * 2.0**job.attempt

@@ -32,7 +32,7 @@ class Joint:
     """A joint as its map states it, with all that a worker on another machine needs.
 
     rig: the text of the rig's file. bags: patterns of paths, none for every bag. temperature: a topic, or
-    empty. date: a pattern of strptime, or empty. table: the import map where the sources are no bags.
+    empty. date: a pattern of strptime, or empty. table: the import map where the sources are not bags.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Joint:
     diagnose: Diagnose = "misfit"
 
     def is_in(self, path: str) -> bool:
-        """Tell whether a recording holds this joint, by its path."""
+        """Return whether a recording holds this joint, by its path."""
         return not self.bags or any(fnmatchcase(path, p) or fnmatchcase(path, f"*/{p}") for p in self.bags)
 
     @property

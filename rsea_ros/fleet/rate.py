@@ -9,7 +9,7 @@ from rsea_ros.progress import Progress
 
 
 class Rate:
-    """Counts what is over of a known total, and tells rate and time left."""
+    """Counts the finished part of a known total, with rate and time left."""
 
     def __init__(self, total: int, tell: Progress, clock: Callable[[], float] = time.monotonic) -> None:
         self._total, self._tell, self._clock = total, tell, clock

@@ -139,7 +139,7 @@ def _parts(url: str) -> dict[str, Mapping[str, Any]]:
 
 
 def _is_hidden(path: str) -> bool:
-    """Tell whether a name says that the file lasts only while something is written."""
+    """Return whether a name says that the file lasts only while something is written."""
     return PurePosixPath(path).name.startswith(".")
 
 
@@ -173,7 +173,7 @@ def _bag(url: str, files: Mapping[str, Mapping[str, Any]]) -> Bag:
 
 
 def _stamp(info: Mapping[str, Any]) -> str:
-    """Return what the file system has to tell contents apart: size, and time or tag."""
+    """Return what the file system offers to distinguish contents: size, and time or tag."""
     return " ".join(str(info.get(name)) for name in _MARKS)
 
 

@@ -123,7 +123,7 @@ def _forget_peak() -> None:
 
 
 def _peak() -> int:
-    """Return the peak of this process's memory, bytes, since _forget_peak where the system can tell."""
+    """Return the peak of this process's memory, bytes, since _forget_peak if the system provides it."""
     with suppress(OSError):
         lines = Path("/proc/self/status").read_text(encoding="ascii", errors="replace").splitlines()
         return next(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM"))

@@ -63,7 +63,7 @@ class Guarded:
         return cycle([self], [(wanted, age)])[0]
 
     def measures_deflection(self) -> bool:
-        """Tell whether a reading has the spring's deflection; False also where the device does not answer."""
+        """Return whether a reading has the spring's deflection; False also if the device does not answer."""
         try:
             return math.isfinite(self.device.read().deflection)
         except DeviceError:
@@ -132,7 +132,7 @@ class Guarded:
             self._taring = False
 
     def clear(self) -> bool:
-        """Connect again if need be and forget the fault; tell whether there was one.
+        """Connect again if need be and forget the fault; return whether there was one.
 
         Raises DeviceError while its cause is there: a reading is asked.
         """

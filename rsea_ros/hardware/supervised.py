@@ -39,7 +39,7 @@ class _End(Protocol):
         """Send a beat. Raises OSError when nobody is there."""
 
     def alive(self) -> bool:
-        """Tell whether the supervisor runs."""
+        """Return whether the supervisor runs."""
 
     def close(self) -> None:
         """End the connection."""
@@ -123,7 +123,7 @@ class Supervisor:
         )
 
     def alive(self) -> bool:
-        """Tell whether it runs."""
+        """Return whether it runs."""
         return self._end.alive()
 
     def beat(self, armed: bool | None = None) -> None:

@@ -24,7 +24,7 @@ from rsea_ros.signals import FloatArray
 
 CHANNELS = ("position", "ft", "motor_torque")
 HEAVY = 8.0
-"""Standard deviations beyond which an innovation counts for less: an outlier tells no more than the rest."""
+"""Standard deviations beyond which an innovation counts for less: an outlier counts no more than the rest."""
 
 
 class Evidence(NamedTuple):

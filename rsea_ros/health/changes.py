@@ -190,7 +190,7 @@ class Changes:
 
 
 def _is_change(hypothesis: Hypothesis, size: float) -> bool:
-    """Tell whether a parameter that is so far off the last model is beyond that model's doubt."""
+    """Return whether a parameter that is so far off the last model is beyond that model's doubt."""
     return abs(size) > hypothesis.inner + 0.5 * hypothesis.least
 
 

@@ -50,7 +50,7 @@ class Cusum:
         self.looks = np.zeros((2, len(self._linear)), dtype=np.int64)
 
     def take(self, score: FloatArray, information: FloatArray, phi: FloatArray) -> bool:
-        """Take in a look: scores, informations and dispersions of the changes, (p,); tell of an alarm."""
+        """Take in a look: scores, informations and dispersions of the changes, (p,); report an alarm."""
         gains = np.array([self._linear * sign * score - self._square * information for sign in (1.0, -1.0)])
         self.sums = np.maximum(0.0, self.sums + np.minimum(gains / phi, SHARE * self.h))
         self.looks = np.where(self.sums > 0.0, self.looks + 1, 0)

@@ -1,4 +1,4 @@
-"""Recursive estimates of each parameter: forgetting where a look tells something, a hold where not.
+"""Recursive estimates of each parameter: forgetting after an informative look, a hold otherwise.
 
     F <- l F + A / phi,   r <- l r + c / phi,   change = r / (F + F_0)
 

@@ -13,7 +13,7 @@ SURE = 1.96
 """Standard deviations on either side of a 95 % interval."""
 FACTOR = "friction.factor"
 GAINS = ("torque_constant_error.gain", "ft_gain_error.gain")
-"""Calibrations, which no record of the joint alone can tell from its stiffness and inertia."""
+"""Calibrations, which no record of the joint alone can separate from its stiffness and inertia."""
 GAIN_DOUBT = 0.01
 """Relative one-sigma doubt of the calibration of F/T sensor and torque constant, for which a model stands."""
 EFFECT_DOUBT = 0.1

@@ -27,9 +27,9 @@ from rsea_ros.signals import FloatArray, IntArray
 JUMP = 1.0
 """s. Stamps that jump so far, either way, are of another run or of a clock that was set: looks begin anew."""
 USUAL = 1e-3
-"""s between measurements where a look has too few to tell."""
+"""s between measurements with which a look has too few."""
 STILL = 30.0
-"""Standard deviations of the position within which a look moved nothing that could tell of the joint."""
+"""Standard deviations of the position within which a look has too little motion."""
 
 
 class Monitor:

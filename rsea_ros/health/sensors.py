@@ -1,4 +1,4 @@
-"""Sensors that have stopped, are missing or send what is no number; stamps that go back or jump."""
+"""Sensors that have stopped, are missing or send what is not a number; stamps that go back or jump."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class _Sensor:
 
 @dataclass
 class Sensors:
-    """What is wrong with the sensors of a rig just now. bad_values: samples that were no numbers."""
+    """What is wrong with the sensors of a rig just now. bad_values: samples that were not numbers."""
 
     rig: Rig
     bad_values: int = 0
@@ -107,7 +107,7 @@ class Sensors:
             sensor.frozen = sensor.since
 
     def _others_moved(self, name: str, since: float) -> bool:
-        """Tell whether something else moved by more than its noise since an instant, s."""
+        """Return whether something else moved by more than its noise since an instant, s."""
         for other in WITNESSES[name]:
             later = [span for span in self._spans.get(other, []) if span[0] >= since]
             moved = max((s[2] for s in later), default=0.0) - min((s[1] for s in later), default=0.0)

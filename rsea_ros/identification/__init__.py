@@ -1,1 +1,1 @@
-"""From records to parameters with their confidence, and what the data cannot tell."""
+"""From records to parameters with their confidence, and what the data cannot determine."""

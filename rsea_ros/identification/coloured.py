@@ -19,7 +19,7 @@ from rsea_ros.identification.witnesses import witnesses
 from rsea_ros.signals import ComplexArray, FloatArray
 
 FEWEST = 1500
-"""Samples: of fewer, noise and misfit cannot be told apart."""
+"""Samples: of fewer, noise and misfit cannot be distinguished."""
 SHAPE = 5.0
 """Standard deviations by which a band may lie off a falling spectrum; noise reaches 3.5 in 300 records."""
 UNSTEADY = 4.0
@@ -40,7 +40,7 @@ _TOP = 0.96
 
 
 def is_noise(case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio: float = 1.0) -> bool:
-    """Tell whether the residual of a channel is noise of its sensor, coloured or not.
+    """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
     False where the record is too short to tell.

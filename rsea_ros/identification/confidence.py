@@ -1,4 +1,4 @@
-"""How sure a fit is, and what its data cannot tell.
+"""How sure a fit is, and what its data cannot determine.
 
 The covariance is the sandwich H^-1 (sum_b g_b g_b' + W^2) H^-1 with H = J'J + W^2, W the inverse prior
 doubts, and g_b = J_b' r_b the scores of blocks of one second: right also where the residual is coloured or
@@ -20,13 +20,13 @@ from rsea_ros.identification.unknowns import Unknown
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.inverse import CUT_OFF
 from rsea_ros.model.rig_fields import FIELDS
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray, IntArray
 
 BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
 _MOST_CORRECTED = 4.0
 """Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
-_Z95 = 1.959964
 _NULL = 1e-9
 """Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
 _WEAK = 100.0
@@ -39,7 +39,7 @@ _ALIKE = 0.8
 
 @dataclass(frozen=True)
 class Confidence:
-    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share that the data told.
+    """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
     told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
     unknowns free: 0 where only a ratio with others is told. information: J'J, shape (n, n).
@@ -93,7 +93,7 @@ def _inverse(matrix: FloatArray) -> FloatArray:
 
 
 def _alike(case: Case) -> float:
-    """Return how many samples of a case tell what one independent one would: a filter makes them alike."""
+    """Return how many samples of a case are worth one independent sample: a filter makes them alike."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
 
@@ -128,7 +128,7 @@ def sample_blocks(problem: Problem, length: float) -> IntArray:
 
 def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, float]:
     """Return the 95 % interval in SI."""
-    return unknown.outer(coordinate - _Z95 * sd), unknown.outer(coordinate + _Z95 * sd)
+    return unknown.outer(coordinate - Z95 * sd), unknown.outer(coordinate + Z95 * sd)
 
 
 def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:

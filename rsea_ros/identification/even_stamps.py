@@ -62,7 +62,7 @@ def evened(records: Sequence[Record], rig: Rig, solution: Solution) -> Evened:
 
 
 def may_be_even(record: Record) -> bool:
-    """Tell whether the stamps of any channel scatter about an even clock."""
+    """Return whether the stamps of any channel scatter about an even clock."""
     return bool(_on_even_clocks(record)[1])
 
 

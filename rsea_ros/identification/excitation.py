@@ -104,7 +104,7 @@ def multisine(settings: Settings) -> FloatArray:
         u(t) = sqrt(2 / K) A sum_k cos(2 pi k t / period + phi_k),   k in odd_lines(settings)
 
     The lines left out tell odd distortion, the even ones even distortion (Pintelon, Schoukens, System
-    Identification, 2nd ed., section 4.3). Raises ParameterError for a period that is no whole number of
+    Identification, 2nd ed., section 4.3). Raises ParameterError for a period that is not a whole number of
     samples or does not fit the duration.
     """
     size = _period_samples(settings)

@@ -24,9 +24,8 @@ from rsea_ros.identification.unknowns import (
 )
 from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import FloatArray
+from rsea_ros.signals import MEASURED, FloatArray
 
-CHANNELS = ("ft", "deflection", "position", "velocity", "motor_torque")
 _MISFIT = 1.3
 _REWEIGHTINGS = 3
 _OTHER_NOISE = 1.1
@@ -45,7 +44,7 @@ def fit(
     should the records fit it better than `rig`.
     """
     unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
-    problem = Problem(tuple(cases), rig, unknowns, CHANNELS)
+    problem = Problem(tuple(cases), rig, unknowns, MEASURED)
     solution = solve(problem, _better_start(problem, start, run), run=run)
     outputs = problem.outputs(solution.theta)
     known = _with_noise_of(problem, outputs)

@@ -90,7 +90,7 @@ def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> 
 
 
 def _misfits(solution: Solution, cases: Sequence[Case]) -> bool:
-    """Tell whether a solution leaves more than the noise of its cases."""
+    """Return whether a solution leaves more than the noise of its cases."""
     outputs = solution.problem.outputs(solution.theta)
     return max(ratios_of(solution.problem, cases, outputs).values()) > AT_NOISE
 

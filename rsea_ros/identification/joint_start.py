@@ -19,9 +19,9 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
 _SLOW = 0.05
-"""Of the RMS speed: below it the sign of the speed is not told."""
+"""Of the RMS speed: below it the sign of the speed is not determined."""
 _TURNS = 2.0
-"""rad of travel from which gravity is told from a constant torque."""
+"""rad of travel from which gravity is distinguished from a constant torque."""
 _LEAST = 1e-3
 """Of its stated value: an inertia or damping that comes out smaller begins there."""
 GRAVITY, ANGLE = "spring_end.gravity", "spring_end.gravity_angle"

@@ -21,7 +21,7 @@ from rsea_ros.signals import BoolArray, ComplexArray, FloatArray
 _UNKNOWNS = 6
 _TINY = 1e-300
 _ROUNDING = 1e-14
-"""Of the output's power: less noise than this cannot be told from rounding."""
+"""Of the output's power: less noise than this cannot be distinguished from rounding."""
 _NARROWEST = 8
 _RELATIVE_BAND = 0.03
 """Half the band as a share of its frequency, where that is wider than _NARROWEST lines."""

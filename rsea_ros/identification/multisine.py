@@ -1,4 +1,4 @@
-"""Periodic excitation: every period is a repetition, so noise and distortion can be told apart.
+"""Periodic excitation: every period is a repetition, so noise and distortion can be distinguished.
 
 The spread between periods is noise. What the mean period has at lines that were not excited, beyond that
 noise, is nonlinear distortion: even at even lines, odd at odd ones.
@@ -35,7 +35,7 @@ class Distortion:
 
     @property
     def total(self) -> FloatArray | None:
-        """Even and odd together, None where neither can be told."""
+        """Even and odd together, None if neither can be determined."""
         known = [part**2 for part in (self.even, self.odd) if part is not None]
         return np.sqrt(np.sum(known, axis=0)) if known else None
 

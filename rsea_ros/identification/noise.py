@@ -78,7 +78,7 @@ def _unlike(command: Channel, t: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _is_flat(power: FloatArray) -> bool:
-    """Tell whether the two halves of the top of the band have about the same power; one line cannot tell."""
+    """Return whether both halves of the top of the band have about the same power; one line is not enough."""
     top = power[_top(power)]
     if len(top) < 2:
         return False

@@ -10,7 +10,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from rsea_ros.signals import FloatArray
 
 FEWEST_PERIODS = 3
-"""One settles, two tell noise from signal."""
+"""One settles, two separate noise from signal."""
 _SAME = 0.02
 _MOVES = 0.5
 """Of a command's standard deviation: a period moves more; a slow command is alike from sample to sample."""

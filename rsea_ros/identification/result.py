@@ -10,14 +10,12 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import ComplexArray, Fault, FloatArray
+from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
-"""Whether the model fits down to the noise, and if so, whether the data tell any of its values."""
+"""Whether the model fits down to the noise, and if so, whether the data determine any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_JUDGED = ("ft", "deflection", "position", "velocity")
-"""Channels that judge a model; the motor torque only echoes the command, and judges where no other can."""
 _TOLD = 0.5
 """Share of what is known of a value that the data must have brought for it to be identified."""
 
@@ -81,7 +79,7 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters with confidence, how well they explain the record, and what the data cannot tell.
+    """Parameters with confidence, how well they explain the record, and what the data cannot determine.
 
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
@@ -118,7 +116,7 @@ class Identification:
         """Return by channel the RMS of the residual over the noise, of the channels that judge."""
         noise = self.noise_rms
         ratios = {n: v / noise[n] for n, v in self.residual_rms.items() if noise.get(n, 0.0) > 0.0}
-        return {n: r for n, r in ratios.items() if n in _JUDGED} or ratios
+        return {n: r for n, r in ratios.items() if n in SENSED} or ratios
 
     @property
     def at_noise(self) -> bool:
@@ -132,7 +130,7 @@ class Identification:
 
     @property
     def verdict(self) -> Verdict:
-        """Return whether the model fits what the sensors measured, and whether that tells any value.
+        """Return whether the model fits what the sensors measured, and whether that determines any value.
 
         A sensor that measures nothing is a misfit: the model says what it should have measured.
         """

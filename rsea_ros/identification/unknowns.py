@@ -100,7 +100,7 @@ class Unknown:
         return wide if math.isfinite(wide) else 1e6 * self.scale
 
     def at_bound(self, coordinate: float) -> bool:
-        """Tell whether the fit ended at a bound that is not where it vanishes."""
+        """Return whether the fit ended at a bound that is not where it vanishes."""
         ends = [
             self.inner(b)
             for b in (self.low, self.high)

@@ -27,7 +27,7 @@ _TINY = 1e-300
 
 
 def suits(aligned: Aligned) -> bool:
-    """Tell whether a record is long enough for this method, and its command alike in all segments.
+    """Return whether a record is long enough for this method, and its command alike in all segments.
 
     A sweep has its low frequencies in few segments: (sum |U|^2)^2 / sum |U|^4 counts them.
     """

@@ -80,7 +80,7 @@ def _read(law: Law, letter: str) -> str:
 
 
 def is_limited(law: Law, letter: str) -> bool:
-    """Tell whether a law keeps its value beyond the range of a variable: no wave and no gain does."""
+    """Return whether a law keeps its value beyond the range of a variable: no wave and no gain does."""
     return letter not in ("theta", "q") and not (
         letter in ("T", "u") and law.place in ("ft", "command", "motor")
     )

@@ -97,7 +97,7 @@ def _curve(
 def surely_helps(
     gram: Gram, before: FloatArray, after: FloatArray, columns: Sequence[int], given: Sequence[int]
 ) -> bool:
-    """Tell whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
+    """Return whether columns gain beyond doubt where they were chosen, and on the test blocks too."""
     weight = gram.weights(before, SELECTION)
     gain = (before - after)[SELECTION] @ weight
     if not _is_sure(gain, _SURE, _WORSE):
@@ -109,7 +109,7 @@ def surely_helps(
 
 
 def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
-    """Tell whether the gains of groups are more than chance: beyond their error, or hardly any is a loss.
+    """Return whether the gains of groups are more than chance: beyond their error, or hardly any is a loss.
 
     What an excitation shows once, such as a mode that a chirp passes, gains in one group alone.
     """

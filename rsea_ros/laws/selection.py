@@ -104,14 +104,14 @@ def _path(
 
 
 def _same_form(a: Candidate, b: Candidate) -> bool:
-    """Tell whether two candidates are one term with other shapes; waves and pasts of others are others."""
+    """Return whether two candidates are one term with other shapes; waves and pasts of others are others."""
     assert a.term is not None and b.term is not None
     is_many = a.term.shape == "cycles_per_revolution" or a.term.memory in ("lag", "delay", "ring")
     return a.term.name == b.term.name and (a.shape == b.shape or not is_many)
 
 
 def _acts_right(gram: Gram, candidates: Sequence[Candidate], columns: Sequence[int]) -> bool:
-    """Tell whether all terms that only can take energy do."""
+    """Return whether all terms that only can take energy do."""
     first = len(gram.prior)
     beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]
     terms = [candidates[k - first].term for k in columns]

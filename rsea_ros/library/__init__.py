@@ -1,4 +1,4 @@
-"""What `import rsea_ros` offers: records from arrays, identification and diagnosis as plain calls.
+"""The functions of `import rsea_ros`: check, identify, diagnose, simulate, read_bag.
 
-Each name of the door is imported when it is first used (rsea_ros/__init__.py). Nothing here needs ROS.
+Each name is imported on first use (rsea_ros/__init__.py). Nothing here needs ROS.
 """

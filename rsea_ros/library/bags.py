@@ -19,9 +19,10 @@ def read_bag(
 ) -> Record:
     """Return the record of a rosbag2 directory, an .mcap or a .db3 file, or of several files of one run.
 
-    namespace: of the topics. joint: which one, where the messages hold several. axis: of the wrench that the
-    actuator turns about; `-` in front turns its sign. strict: refuse values that are not finite and missing
-    commands; otherwise all samples come as they are, as rsea.diagnose takes them.
-    Raises BagError with file, topic, field, value and what was expected.
+    namespace: of the topics. joint: its name, if the messages hold several. axis: axis of the actuator in the
+    wrench; a leading `-` reverses it. strict: refuse values that are not finite and missing commands; with
+    False all samples are kept, as rsea.diagnose accepts them.
+    Raises BagError with file, topic, field, value and expected value.
+    Not to be confused with `rsea import`, which converts tables to bags.
     """
     return read_record(path, topics=TopicMap(namespace=namespace, joint=joint, axis=axis), strict=strict)

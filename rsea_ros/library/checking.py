@@ -1,4 +1,4 @@
-"""`rsea.check`: what a record is worth for a rig, before physics is fitted to it."""
+"""`rsea.check`: the data checks of a record against a rig."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rsea_ros.signals import Record
 
 @dataclass(frozen=True)
 class Checks:
-    """Findings of a check, one traffic light each. `result` holds them with the faults of the data."""
+    """Findings of a check with a traffic light each. `result` also holds the faults of the data."""
 
     result: Findings
 
@@ -24,17 +24,17 @@ class Checks:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """What was looked at, each with light, value, unit, what was expected and what would help."""
+        """The findings, each with light, value, unit, expected value and remedy."""
         return self.result.findings
 
     def summary(self) -> str:
         """Return the findings as a table in plain text."""
-        from rsea_ros.report.check.text import check_table
+        from rsea_ros.report.check.terminal import check_table
 
         return plain(check_table(self.result))
 
     def __repr__(self) -> str:
-        """Return rig, worst light and what is not green in one line."""
+        """Return the rig, the worst light and the findings that are not green in one line."""
         marked = [f"{f.kind} {f.channel}".strip() for f in self.findings if f.light != "green"]
         return f"Checks({self.result.rig_name}: {self.light}{': ' if marked else ''}{', '.join(marked)})"
 
@@ -42,7 +42,8 @@ class Checks:
 def check(data: Record, rig: Rig | str) -> Checks:
     """Check a record against a rig: gaps, clocks, noise, dead channels, sign, scale, excitation.
 
-    Nothing is changed by it. Raises RigError for the rig, and nothing for data that are merely bad.
+    rig: a Rig, a file, or the name of a rig in config/rigs. The record is not changed. Bad data are findings,
+    not errors; raises RigError for the rig. Takes seconds, and fits no physics beyond a linear response.
     """
     from rsea_ros.checks.check import check_record
 

@@ -1,4 +1,4 @@
-"""`rsea.diagnose`: what a rig's simulation gets wrong, the causes, and the extended rig."""
+"""`rsea.diagnose`: the causes of the simulation error of a rig, and the extended rig."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ class Diagnosed:
 
     @property
     def alternatives(self) -> tuple[Alternative, ...]:
-        """What may be right in a cause's place: `name`, `instead_of`, `parameters`, gains, `probability`."""
+        """Possible rivals of a cause: `name`, `instead_of`, `parameters`, gains, `probability`."""
         return self.result.alternatives
 
     def summary(self) -> str:
-        """Return the verdict and what it rests on, as plain text."""
+        """Return the verdict and the evidence as plain text."""
         from rsea_ros.report.diagnosis.terminal import terminal_lines
 
         return "\n".join(line.plain for line in terminal_lines(self.result))
@@ -69,7 +69,7 @@ class Diagnosed:
         return parameter_frame(self.result.baseline)
 
     def plot(self) -> Figure:
-        """Return each channel as measured, as simulated before, and with the causes, by plotly."""
+        """Return a plotly figure: each channel measured, simulated without the causes, and with them."""
         from rsea_ros.library.figures import overlay_figure
 
         return overlay_figure(self.result.before, self.result.after)
@@ -77,7 +77,7 @@ class Diagnosed:
     def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
         """Write diagnosis.json, model.yaml, overlay.mcap and report.html; return the report's path.
 
-        force: results that lie there may be replaced; without it they raise OutputError.
+        force: replace existing results; without it they raise OutputError.
         """
         from msg_adapters.overlay import write_overlay
         from rsea_ros.new_files import Place
@@ -104,11 +104,13 @@ def diagnose(
     settings: DiagnosisSettings | None = None,
     progress: Progress | None = None,
 ) -> Diagnosed:
-    """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
+    """Find the causes of the simulation error of a rig in records, and measure the gain of each cause.
 
-    holdout: a record that takes part in no fit and no choice; without it, every fourth second of the records.
-    progress: hears a step's name and the share done. Raises IdentificationError for records that cannot be
-    diagnosed, RigError for the rig. Not to be confused with identify, which trusts the rig's structure.
+    data: one record, or several of the same bench. rig: a Rig, a file, or the name of a rig in config/rigs.
+    holdout: a record for testing only; without it, every fourth second of the records. progress: called with
+    the name of a step and the share done, 0 to 1. Raises IdentificationError for records that cannot be
+    diagnosed, RigError for the rig. Method: docs/diagnosis.md.
+    Not to be confused with identify, which trusts the structure of the rig and fits only its values.
     """
     from rsea_ros.checks.carried import held_against
     from rsea_ros.checks.usable import check_diagnosable

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def fit_figure(result: Identification, response: int) -> Figure:
-    """Return the Bode figure of a response, or measured and simulated channels where there is none.
+    """Return the Bode figure of a response, or measured and simulated channels if there is no response.
 
     Raises ParameterError for a response that the identification does not have.
     """

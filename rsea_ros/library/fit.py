@@ -1,4 +1,4 @@
-"""`rsea.identify`: parameters with confidence from records, as an object that prints, tabulates and plots."""
+"""`rsea.identify`: parameters with intervals from records, as an object with summary, table and plot."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Fit:
         return parameter_frame(self.result.parameters)
 
     def plot(self, response: int = 0) -> Figure:
-        """Return the measured and fitted frequency response, or the record where there is none, by plotly."""
+        """Return a plotly figure of the measured and fitted frequency response, or of the record."""
         from rsea_ros.library.figures import fit_figure
 
         return fit_figure(self.result, response)
@@ -67,7 +67,7 @@ class Fit:
     def write_report(self, directory: str | Path, *, force: bool = False) -> Path:
         """Write identification.json, model.yaml and report.html; return the report's path.
 
-        force: results that lie there may be replaced; without it they raise OutputError.
+        force: replace existing results; without it they raise OutputError.
         """
         from rsea_ros.new_files import Place
         from rsea_ros.report.identification.files import write_results
@@ -91,10 +91,12 @@ class Fit:
 
 
 def identify(data: Record | Sequence[Record], rig: Rig | str, *, progress: Progress | None = None) -> Fit:
-    """Fit a rig's free values to one record, or to several of the same bench.
+    """Fit the free values of a rig to one record, or to several of the same bench.
 
-    rig: a rig, its file, or the name of one in config/rigs. progress: hears a step's name and the share done.
-    Raises IdentificationError for records from which the rig cannot be identified, RigError for the rig.
+    rig: a Rig, a file, or the name of a rig in config/rigs; its values with a spread are free. progress:
+    called with the name of a step and the share done, 0 to 1. Raises IdentificationError for records from
+    which the rig cannot be identified, RigError for the rig. Method: output error, docs/architecture.md.
+    Not to be confused with diagnose, which also searches for effects that the rig lacks.
     """
     from rsea_ros.checks.carried import held_against
     from rsea_ros.identification.identify import identify as identify_records

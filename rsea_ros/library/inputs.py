@@ -1,4 +1,4 @@
-"""Arguments as people pass them: one record or several."""
+"""Arguments of the library: one record or several."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def records_of(data: Record | Sequence[Record]) -> list[Record]:
         kind = next(type(item).__name__ for item in items if not isinstance(item, Record))
         raise ParameterError(f"data: {kind}, expected a Record (Record.from_arrays, rsea.read_bag)")
     if len({id(record) for record in records}) < len(records):
-        raise ParameterError("data: a record is given twice, expected each once")
+        raise ParameterError("data: a record is given twice, expected each record once")
     if not records:
         raise ParameterError("data: no record, expected one or more")
     return records

@@ -1,4 +1,4 @@
-"""`rsea.simulate`: the record that a bench would log, from commands held at a rate."""
+"""`rsea.simulate`: the simulated record of a bench, from commands at a fixed rate."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from rsea_ros.signals import Channel, Record
 def simulate(
     rig: Rig | str, command: npt.ArrayLike, rate: float = 280.0, *, seed: int = 0, noise: bool = True
 ) -> Record:
-    """Return the record that a bench would have logged while it held each command for 1 / rate.
+    """Return the simulated record of a bench that holds each command for 1 / rate.
 
-    command: motor torque at the gear output, N m, shape (n,). rate: Hz. seed: of the sensors' noise; noise:
-    False for perfect sensors. Raises ParameterError for commands or a rate that make no sense.
+    command: motor torque at the gear output, N m, shape (n,); for a rig with a position loop the target, rad.
+    rate: Hz. seed: of the sensor noise. noise: False for perfect sensors. Measurements are stamped at the end
+    of each hold, commands at its beginning. Raises ParameterError for an invalid command or rate.
+    Not to be confused with predict, which simulates the commands of a record and compares the result.
     """
     given = np.asarray(command)
     if given.dtype.kind not in "iuf" or given.ndim != 1 or len(given) < 2 or not np.isfinite(given).all():

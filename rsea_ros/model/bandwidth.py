@@ -53,9 +53,18 @@ def undamped_band(stiffness: float | FloatArray, inertia: float | FloatArray) ->
     +3 dB, Eq. (7); below zero it falls without one and passes -3 dB; at zero it has no edge.
     """
     inertia = np.asarray(inertia, dtype=np.float64)
-    factor = np.where(inertia > 0.0, PAPER_FACTOR, FALL_FACTOR)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.sqrt(factor * stiffness / np.abs(inertia)) / (2.0 * np.pi))
+        return np.asarray(np.sqrt(_factor(inertia) * stiffness / np.abs(inertia)) / (2.0 * np.pi))
+
+
+def undamped_stiffness(band: float, inertia: float | FloatArray) -> FloatArray:
+    """Return the K_s, N m/rad, whose undamped band is `band`, Hz: the inverse of undamped_band."""
+    inertia = np.asarray(inertia, dtype=np.float64)
+    return np.asarray((2.0 * np.pi * band) ** 2 / _factor(inertia) * np.abs(inertia))
+
+
+def _factor(inertia: FloatArray) -> FloatArray:
+    return np.where(inertia > 0.0, PAPER_FACTOR, FALL_FACTOR)
 
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:

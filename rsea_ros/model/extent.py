@@ -8,9 +8,9 @@ from rsea_ros.errors import IdentificationError
 from rsea_ros.signals import Channel, FloatArray, Record
 
 LARGEST = 1e30
-"""In any unit: a larger number is no measurement, and squares and sums of it overflow."""
+"""In any unit: a larger number is not a measurement, and squares and sums of it overflow."""
 SMALLEST = 1e-30
-"""In any unit: smaller is no measurement either but zero; squares of it underflow."""
+"""In any unit: smaller is not a measurement either but zero; squares of it underflow."""
 LONGEST_PAUSE = 60.0
 """s without samples that are simulated through, whatever the length of the record."""
 MOST_EMPTY = 2.0

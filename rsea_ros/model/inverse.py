@@ -65,7 +65,7 @@ class Motion:
 
 
 def is_inverse(rig: Rig) -> bool:
-    """Tell whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
+    """Return whether a rig is judged by torque: neither spring nor position loop holds it, so it drifts."""
     return rig.rigid_spring and rig.loop is None
 
 
@@ -97,7 +97,7 @@ def motion_from(record: Record) -> Motion:
 
 
 def _finite(record: Record) -> Record:
-    """Return the record without the samples of motion and torque that are no numbers: one spoils a filter."""
+    """Return the record without the samples of motion and torque that are NaN: one spoils a filter."""
     kept = {n: (c, np.isfinite(c.y)) for n, c in record.channels.items() if n in ("position", "motor_torque")}
     held = {n: Channel(c.t[good], c.y[good]) for n, (c, good) in kept.items() if not good.all()}
     empty = {n for n, c in held.items() if not len(c)} - {"position"}

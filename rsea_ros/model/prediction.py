@@ -1,4 +1,4 @@
-"""How well a model predicts a record that it has never seen."""
+"""The errors of a model on a new record."""
 
 from __future__ import annotations
 
@@ -20,12 +20,15 @@ from rsea_ros.model.step import OUTPUTS
 from rsea_ros.signals import FloatArray, Record
 
 SETTLE = 0.3
-"""s at the start of a record that no comparison and no fit looks at: the bench may not have been at rest."""
+"""s at the start of a record that no comparison or fit uses, because the bench may not have been at rest."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A channel at its stamps t (s): measured and predicted, in its unit, and which samples count."""
+    """A channel at its stamps t (s): measured and predicted values in its unit, and the compared samples.
+
+    All arrays have shape (n,).
+    """
 
     t: FloatArray
     measured: FloatArray
@@ -34,14 +37,14 @@ class Comparison:
 
     @property
     def rms_error(self) -> float:
-        """RMS of predicted - measured, in the channel's unit; NaN where no sample counts."""
+        """RMS of predicted - measured, in the unit of the channel; NaN if no sample is compared."""
         if not self.counts.any():
             return math.nan
         return float(np.sqrt(np.mean((self.predicted - self.measured)[self.counts] ** 2)))
 
     @property
     def fit_percent(self) -> float:
-        """The fit of the samples that count, %; NaN where none does."""
+        """The fit of the compared samples, %; NaN if no sample is compared."""
         if not self.counts.any():
             return math.nan
         return fit_percent((self.predicted - self.measured)[self.counts], self.measured[self.counts])
@@ -54,10 +57,11 @@ def fit_percent(error: FloatArray, measured: FloatArray) -> float:
 
 
 def predict(rig: Rig, record: Record) -> Mapping[str, Comparison]:
-    """Simulate a rig on the commands of a record and hold it against every channel that was measured.
+    """Simulate a rig on the commands of a record and compare it with every measured channel.
 
-    A rig without a spring is judged by the torque that the measured motion takes (see inverse.py), a sensor
-    whose zero is unknown by its changes. Raises IdentificationError for a record with nothing to compare.
+    Returns a Comparison for each channel by name. For a rig without a spring it compares the torque of the
+    measured motion (see inverse.py); for a sensor with an unknown zero it compares changes.
+    Raises IdentificationError for a record with nothing to compare. Nothing is fitted.
     """
     record = bounded(commanded(record, rig))
     check_command(record)

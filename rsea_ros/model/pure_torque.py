@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from scipy.special import chdtri  # chi2.isf, without the 0.3 s of scipy.stats
 
-from rsea_ros.errors import ParameterError, RigError
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end, flat_band
 from rsea_ros.model.observer import ErrorModel, Estimate
 from rsea_ros.model.pure_torque_filter import (
@@ -37,6 +37,7 @@ from rsea_ros.model.pure_torque_filter import (
 )
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_structure import check_two_torques
 from rsea_ros.model.structure import structured
 
 Verdict = Literal["no torque", "pure", "beyond"]
@@ -96,10 +97,7 @@ class PureTorque:
 
     def __init__(self, rig: Rig, settings: Settings | None = None) -> None:
         """Raises RigError for a rig without a spring: there is one torque, not two."""
-        if rig.rigid_spring:
-            raise RigError(
-                f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
-            )
+        check_two_torques(rig)
         s = settings or Settings()
         self._function = end_over_end(structured(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
@@ -123,7 +121,7 @@ class PureTorque:
     def calibrate(self, error: ErrorModel, dt: float) -> None:
         """Take in what the sensors' noise makes of the estimates at a sample period of dt s.
 
-        Noise that is no finite number, such as of an observer that does not settle, makes the flag deaf.
+        Noise that is not a finite number, such as of an observer that does not settle, makes the flag deaf.
         """
         corner = self._limits[CORNER]
         floor = np.array([0.0, error.sigma**2])

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial import polynomial
 
-from rsea_ros.errors import ParameterError, RigError
+from rsea_ros.errors import ParameterError
 from rsea_ros.model.bandwidth import end_over_end
 from rsea_ros.model.observer import Estimate
 from rsea_ros.model.pure_torque_window import (
@@ -42,6 +42,7 @@ from rsea_ros.model.pure_torque_window import (
     judge_error,
 )
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_structure import check_two_torques
 from rsea_ros.model.structure import structured
 from rsea_ros.model.transfer import Fraction
 from rsea_ros.signals import FloatArray
@@ -90,10 +91,7 @@ class ErrorFlag:
 
     def __init__(self, rig: Rig, settings: ErrorSettings | None = None) -> None:
         """Raises RigError for a rig without a spring: there is one torque, not two."""
-        if rig.rigid_spring:
-            raise RigError(
-                f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side"
-            )
+        check_two_torques(rig)
         s = settings or ErrorSettings()
         self.settings = s
         self.edge = edge_of(structured(rig), s.tolerance)
@@ -119,7 +117,7 @@ class ErrorFlag:
 
     @property
     def share(self) -> float:
-        """RMS(T_p - T_d) / RMS(T_d) over the window; nan where the torque is too small to tell."""
+        """RMS(T_p - T_d) / RMS(T_d) over the window; nan if the torque is too small."""
         return float(self._state[SHARE])
 
 

@@ -83,7 +83,7 @@ FLUTTER, CALM = 2, 0.5
 time: a slow torque beside a fast one crosses zero twice a period, and is beyond the edge for a moment."""
 
 DECIDED = 3.0
-"""Sigmas by which the powers must tell on which side of the edge the torque is."""
+"""Sigmas by which the powers must lie on one side of the edge."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

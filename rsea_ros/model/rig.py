@@ -1,7 +1,7 @@
-"""Rig: what the bench is. Values in SI with their prior spread, which ends are clamped, which effects act.
+"""Rig: the description of a bench. Values in SI with their prior spread, clamped ends, active effects.
 
-The model calls everything by the dotted name of the YAML file (`rotor.reflected_inertia`); `rig_fields.py`
-lists them. Reading and writing of files is in `rig_file.py`.
+The model uses the dotted names of the YAML file (`rotor.reflected_inertia`); `rig_fields.py` lists them.
+`rig_file.py` reads and writes files.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from rsea_ros.model.train import Train
 from rsea_ros.signals import FloatArray
 
 CLOCK_DOUBT = 1e-4
-"""s, one sigma. How far the stamps of a sensor may lie from its instants where the rig does not say."""
+"""s, one sigma of the time offset of a sensor if the rig states none."""
 Hold = Literal["zero", "first", "band"]
 HOLDS: tuple[Hold, ...] = ("zero", "first", "band")
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value in SI, the relative one-sigma spread of what is known of it, and where it comes from."""
+    """A value in SI, its relative prior uncertainty (one sigma), and its source."""
 
     value: float
     spread: float = 0.0
@@ -39,10 +39,10 @@ class Quantity:
 class Sensor:
     """Noise (one sigma) and quantum of a channel, in the channel's unit (see signals.UNITS).
 
-    zero_unknown: the sensor's zero is another one in every record (an encoder that counts from switch-on),
-    so only changes of its values tell something. clock: s, how much later than its stamps it reads at the
-    start of a record; clock_rate: ppm, by how much more with time. clock_doubt: s, one sigma of `clock`: a
-    fit looks for the rest.
+    zero_unknown: the zero differs from record to record (an encoder that counts from power-on), so only
+    changes of its values count. clock: s, delay of the reading after its stamp at the start of a record;
+    clock_rate: ppm, growth of that delay with time. clock_doubt: s, one sigma of `clock`, which a fit
+    estimates.
     """
 
     noise: float = 0.0
@@ -55,9 +55,9 @@ class Sensor:
 
 @dataclass(frozen=True)
 class EffectSetting:
-    """An effect of the catalogue that acts on this rig, with its parameters in SI.
+    """An active effect of the catalogue, with its parameters in SI.
 
-    guess: it is where a fit may begin, not what is known of the bench: a diagnosis has to find it by itself.
+    guess: the effect is an initial guess of a fit, not a known property; a diagnosis has to find it.
     """
 
     name: str
@@ -70,7 +70,7 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class Controller:
-    """Position loop that ran while the record was made: command = k_v (k_p (reference - q) - dq/dt).
+    """Position loop that was active during the record: command = k_v (k_p (reference - q) - dq/dt).
 
     k_p: 1/s; k_v: N m s/rad; limit: N m on the command.
     """
@@ -82,17 +82,16 @@ class Controller:
 
 @dataclass(frozen=True)
 class Rig:
-    """A bench. See the module docstring.
+    """A description of a bench. See the module docstring.
 
-    linear: it moves along a line: m, N and kg stand for rad, N m and kg m^2.
-    other_trains: that the gear may have instead, where its sources leave it open. known: names that no fit
-    may move. proximal: which end the paper's *proximal* is. ft_end: which end the
-    F/T sensor is on; at the housing's it reads the proximal spring, between housing and that end.
-    encoder_end: what the encoder reads against the housing: the gear output, or the spring end behind play
-    and spring. loop: kind of the position loop whose targets command the bench, a key of LOOP_FIELDS, its
-    gains among the quantities. controller: a loop that added its torque to the record's command. hold: what
-    acts between two commands: the first of them, a line to the other, or the curve without a frequency above
-    half the rate, as where an analogue command was sampled behind a filter.
+    linear: linear motion; m, N and kg replace rad, N m and kg m^2.
+    other_trains: other possible gear trains. known: names that no fit may change. proximal: the end that the
+    paper calls *proximal*. ft_end: the end with the F/T sensor; at the housing end it measures the proximal
+    spring, between housing and that end. encoder_end: the part that the encoder measures against the housing:
+    the gear output, or the spring end behind backlash and spring. loop: kind of the position loop whose
+    targets command the bench, a key of LOOP_FIELDS; its gains are among the quantities. controller: a loop
+    that added its torque to the command of the record. hold: the command between two samples: the first of
+    them, a line between them, or the band-limited curve of an analogue command sampled behind a filter.
     """
 
     name: str
@@ -135,19 +134,19 @@ class Rig:
         return {name: q.value for name, q in self.quantities.items()}
 
     def with_values(self, values: Mapping[str, float]) -> Rig:
-        """Return the rig with some values replaced; their spread and source stay."""
+        """Return the rig with some values replaced (SI, by name as in FIELDS); spread and source stay."""
         changed = {n: replace(self.quantities.get(n, Quantity(v)), value=float(v)) for n, v in values.items()}
         return replace(self, quantities={**self.quantities, **changed})
 
     def with_effects(self, *effects: EffectSetting) -> Rig:
-        """Return the rig with exactly these effects acting."""
+        """Return the rig with exactly these active effects."""
         return replace(self, effects=effects)
 
     def with_effect(self, name: str, **parameters: float) -> Rig:
-        """Return the rig with one more effect of the catalogue acting, parameters in SI (see its file).
+        """Return the rig with one more active effect of the catalogue, parameters in SI (docs/effects.md).
 
-        Parameters that are left out have their typical size. Raises ParameterError for an unknown one, and
-        for a value out of its bounds.
+        Other parameters have their typical size. Raises ParameterError for an unknown parameter, and for a
+        value outside its bounds.
         """
         effect = effect_named(name)
         setting = EffectSetting(name, {**effect.typical, **parameters})
@@ -155,7 +154,7 @@ class Rig:
         return self.with_effects(*self.effects, setting)
 
     def free(self) -> tuple[str, ...]:
-        """Return the names that a fit may move: stated with a spread, and not listed as known."""
+        """Return the names that a fit may change: those with a spread, except the known ones."""
         return tuple(n for n, q in self.quantities.items() if q.spread > 0.0 and n not in self.known)
 
     def spread(self, name: str) -> float:
@@ -167,11 +166,11 @@ class Rig:
         return unit_of(name)
 
     def measures(self, channel: str) -> bool:
-        """Tell whether a bench of this rig can have a channel: without a spring nothing shows its torque."""
+        """Return whether a bench of this rig can have a channel; a rigid spring has no ft or deflection."""
         return not (self.rigid_spring and channel in ("ft", "deflection"))
 
     def zero_unknown(self, channel: str) -> bool:
-        """Tell whether a channel's sensor counts from another zero in every record."""
+        """Return whether a channel's sensor counts from another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
@@ -184,5 +183,5 @@ class Rig:
         return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
 
     def end_is_free(self, end: str) -> bool:
-        """Tell whether an end can move (it has an inertia of its own)."""
+        """Return whether an end can move (it has an inertia of its own)."""
         return end not in self.clamped

@@ -10,13 +10,13 @@ from types import MappingProxyType
 from rsea_ros.errors import RigError
 
 LEAST_SIZE, GREATEST_SIZE = 1e-12, 1e12
-"""Sizes of a value other than zero: beyond them the equations are no longer solved to any digit."""
+"""Limits of the size of a nonzero value; beyond them the equations have no accurate digit."""
 END_NAMES = ("housing_end", "spring_end")
 
 
 @dataclass(frozen=True)
 class Field:
-    """A value that a rig may have: unit, smallest value, whether that is allowed itself, default."""
+    """A possible value of a rig: unit, lower bound, whether the bound is allowed, default."""
 
     unit: str
     low: float = 0.0

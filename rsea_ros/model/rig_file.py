@@ -22,7 +22,7 @@ from rsea_ros.wording import did_you_mean, shown
 def rig_path(name_or_path: str | Path) -> Path:
     """Return the file of a rig given by path or by the bare name of a file in config/rigs.
 
-    Raises RigError for a name that no rig has, and for what is no name of a file.
+    Raises RigError for a name that no rig has, and for what is not a name of a file.
     """
     if not isinstance(name_or_path, (str, os.PathLike)) or "\0" in str(name_or_path):
         raise RigError(f"rig {shown(name_or_path)}: expected the name of a rig, or of a YAML file")
@@ -56,9 +56,9 @@ def rig_folders() -> list[Path]:
 
 
 def load_rig(name_or_path: str | Path | Rig) -> Rig:
-    """Read a rig; one that is a Rig already is returned as it is.
+    """Return the rig of a YAML file, or of a name in config/rigs; a Rig is returned unchanged.
 
-    Raises RigError naming file, field, value and what was expected.
+    Raises RigError with file, field, value and expected value. Format: docs/rig.md.
     """
     if isinstance(name_or_path, Rig):
         return name_or_path

@@ -45,10 +45,7 @@ def _clock(fields: Mapping[str, Any], name: str) -> tuple[float, float]:
     field = f"sensors.{name}.clock"
     item = mapping(fields.get("clock", {"value": 0.0, "unit": "s"}), field)
     only_keys(item, names(CLOCK), field)
-    unit(item.get("unit"), f"{field}.unit", "s")
-    value = number(item.get("value"), f"{field}.value", "s")
-    if not abs(value) < _LATEST:
-        raise RigError(f"{field}.value = {value:g} s, expected less than {_LATEST:g} s either way", field)
+    value = _small(item, field, "s", _LATEST)
     doubt = number(item.get("doubt", CLOCK_DOUBT), f"{field}.doubt", "s")
     if not 0.0 < doubt < _LATEST:
         raise RigError(f"{field}.doubt = {doubt:g} s, expected more than 0, less than {_LATEST:g} s", field)
@@ -60,8 +57,14 @@ def _clock_rate(fields: Mapping[str, Any], name: str) -> float:
     field = f"sensors.{name}.clock_rate"
     item = mapping(fields.get("clock_rate", {"value": 0.0, "unit": "ppm"}), field)
     only_keys(item, names(CLOCK_RATE), field)
-    unit(item.get("unit"), f"{field}.unit", "ppm")
-    value = number(item.get("value"), f"{field}.value", "ppm")
-    if not abs(value) < _FASTEST:
-        raise RigError(f"{field}.value = {value:g} ppm, expected less than {_FASTEST:g} either way", field)
+    return _small(item, field, "ppm", _FASTEST)
+
+
+def _small(item: Mapping[str, Any], field: str, unit_name: str, limit: float) -> float:
+    """Return the value of `{value: …, unit: …}`. Raises RigError where it is not within the limit."""
+    unit(item.get("unit"), f"{field}.unit", unit_name)
+    value = number(item.get("value"), f"{field}.value", unit_name)
+    if not abs(value) < limit:
+        expected = f"expected less than {limit:g} {unit_name} either way"
+        raise RigError(f"{field}.value = {value:g} {unit_name}, {expected}", field)
     return value

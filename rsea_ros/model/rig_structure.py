@@ -28,6 +28,12 @@ def check_structure(rig: Rig) -> None:
             rig[f"{end}.inertia"]
 
 
+def check_two_torques(rig: Rig) -> None:
+    """Raise RigError for a rig without a spring: it has one torque, not one on either side."""
+    if rig.rigid_spring:
+        raise RigError(f"rig {rig.name}: spring.rigid = True, expected a spring with a torque on either side")
+
+
 def _check_clamped(rig: Rig) -> None:
     for end in set(rig.clamped) - set(END_NAMES):
         raise RigError(f"rig {rig.name}: clamped end {end!r}, expected one of {', '.join(END_NAMES)}")

@@ -138,7 +138,7 @@ def run(machine: Machine, command: FloatArray, out: FloatArray, *, start: float 
 
 
 def build(rig: Rig, step: float, duration: float, *, in_loop: bool = False) -> Machine:
-    """Make a rig ready for steps of `step` s. duration: what drifts are told of, s."""
+    """Make a rig ready for steps of `step` s. duration: time in which drifts reach their full size, s."""
     settings = [(effect_named(e.name), e.parameters) for e in rig.effects]
     rig = structured(rig)
     active = [(e, p) for e, p in settings if e.port != st.Port.STRUCTURE]

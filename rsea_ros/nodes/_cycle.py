@@ -76,7 +76,7 @@ class Cycle:
         self._over.wait(2.0 / self._rate)
 
     def running(self) -> bool:
-        """Tell whether it is still at it. Raises what `work` has raised."""
+        """Return whether it is still at it. Raises what `work` has raised."""
         if self.error is not None:
             raise self.error
         return self.thread.is_alive()

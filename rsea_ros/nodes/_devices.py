@@ -85,7 +85,7 @@ def device_of(values: Values, known: Mapping[str, Callable[[Values], Device]]) -
 
 
 def _feels(values: Values, rig: Rig) -> bool:
-    """Tell whether the torque of the spring's distal side is measured."""
+    """Return whether the torque of the spring's distal side is measured."""
     if rig.rigid_spring:
         return False
     if values["device"] in DEVICES:

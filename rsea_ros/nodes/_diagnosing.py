@@ -15,6 +15,7 @@ from rsea_ros.new_files import Place
 from rsea_ros.nodes._health import OK, WARN, Report
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.file_names import REPORT
 from rsea_ros.signals import Record
 
 _POLL = 0.02
@@ -29,7 +30,7 @@ class Diagnosing:
         self._pool = ThreadPoolExecutor(1, "diagnosis")
         self._work: Future[Diagnosis] | None = None
         self._step, self._stopped = "", False
-        self._report = out / "report.html"
+        self._report = out / REPORT
 
     @property
     def busy(self) -> bool:

@@ -23,7 +23,7 @@ class Frozen:
         self.frozen = False
 
     def take(self, stamp: int, values: Sequence[float]) -> bool:
-        """Take in a sample (stamp in ns); tell whether the sensor has stopped."""
+        """Take in a sample (stamp in ns); return whether the sensor has stopped."""
         if values != self._last or stamp < self._since:
             self._last, self._since, self._count, self.frozen = values, stamp, 0, False
             self._low, self._high = math.inf, -math.inf

@@ -77,7 +77,7 @@ class Inputs:
         return (self.epoch or 0) + round(t * SECOND)
 
     def _placed(self, row: tuple[int, int, float, float]) -> tuple[int, int, float, float] | None:
-        """Return a command at the instant from which it counts; None for one that is no number."""
+        """Return a command at the instant from which it counts; None for one that is not a number."""
         stamp, kind, torque, _ = row
         if not math.isfinite(torque):
             self._refuse()

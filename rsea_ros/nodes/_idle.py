@@ -14,7 +14,7 @@ from rsea_ros.nodes._cycle import SECOND
 
 
 def anything_to_do(node: Node, executor: Executor, timeout: float) -> bool:
-    """Wait (s) until a subscription, timer, client or service of an executor's node is ready; tell whether.
+    """Wait (s) until a subscription, timer, client or service of an executor's node is ready; return whether.
 
     Events of publishers and subscriptions wake nobody; the executor sees to them when it runs next.
     """

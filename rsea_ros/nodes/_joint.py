@@ -60,7 +60,7 @@ class Joint:
         self.drive = Drive(self.guarded, self.bench, anchor, values["rate"])
 
     def runs_in(self, cycle: Cycle) -> None:
-        """Note the cycle, whose times are told with this joint's health."""
+        """Note the cycle, whose times are reported with this joint's health."""
         self._cycle = cycle
 
     def enable(self) -> None:

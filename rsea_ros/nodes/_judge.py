@@ -28,7 +28,7 @@ class Judge:
         self._off = self._idle = 0
 
     def idle(self, commanded: float, made: float) -> bool:
-        """Tell whether the motor makes no torque although one is commanded (N m): its driver has a fault.
+        """Return whether the motor makes no torque although one is commanded (N m): its driver has a fault.
 
         What is commanded then must not be there when the driver's fault is cleared.
         """

@@ -22,7 +22,7 @@ CHANGED = 0.1
 
 
 class ModelHealth:
-    """Assesses the node once a second, and keeps the flag told of the noise of the estimates."""
+    """Assesses the node once a second, and passes the noise of the estimates to the flag."""
 
     def __init__(
         self, rig: Rig, observer: Observer, flag: PureTorque, error: ErrorFlag, inputs: Inputs

@@ -65,7 +65,7 @@ class Player:
         return self._stopped_at >= 0
 
     def over(self) -> bool:
-        """Tell whether all is out. Raises what has gone wrong in the thread."""
+        """Return whether all is out. Raises what has gone wrong in the thread."""
         if self.started:
             self.cycle.running()
         soft = self._stopped_at + round(SOFT * self.rate) if self.stopped else len(self.command)

@@ -14,7 +14,7 @@ class Obeyed:
         self.ignored = 0
 
     def admit(self, who: object, now: int) -> bool:
-        """Tell whether a message of a publisher (its identity) counts. now: ns, of a clock without steps."""
+        """Return whether a message of a publisher (by identity) counts. now: ns, of a clock without steps."""
         if who != self._who and self._who is not None and now - self._heard < HORIZON:
             self.ignored += 1
             return False

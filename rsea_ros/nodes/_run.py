@@ -35,7 +35,7 @@ class Program(Protocol):
     """What a node's file makes: its work beside the callbacks."""
 
     def finished(self) -> bool:
-        """Tell whether the work is done; raises what has gone wrong in a thread."""
+        """Return whether the work is done; raises what has gone wrong in a thread."""
 
     def conclude(self) -> None:
         """Do what is left once the work is done or was stopped; Ctrl-C interrupts this one."""

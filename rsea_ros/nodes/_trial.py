@@ -43,7 +43,7 @@ class Ears:
         self._health = node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
     def begin(self, alarm: Callable[[str], None]) -> None:
-        """Forget what was heard before. alarm: is told when a node of the bench has failed."""
+        """Forget what was heard before. alarm: called when a node of the bench has failed."""
         self._contents, self._alarm, self.last = Contents(), alarm, time.monotonic()
 
     def record(self) -> Record:
@@ -90,7 +90,7 @@ class Trial:
         self._player.stop()
 
     def over(self) -> bool:
-        """Tell whether the run is over and its end is heard; stops it where the bench fell silent."""
+        """Return whether the run is over and its end is heard; stops it where the bench fell silent."""
         silent = time.monotonic() - self._ears.last
         if self._player.started and silent > SILENT:
             self.stop(f"no measurement for {silent:.2f} s")

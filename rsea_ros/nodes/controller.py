@@ -146,7 +146,7 @@ class Controller:
         return response
 
     def finished(self) -> bool:
-        """Run until stopped; tell of a new fault."""
+        """Run until stopped; report a new fault."""
         before, self._told_fault = self._told_fault, self._fault
         if self._told_fault not in ("", before):
             self._node.get_logger().error(f"{self._told_fault}; torque zero until clear_fault")

@@ -52,7 +52,7 @@ class Excite:
         node.create_timer(1.0, self._tell, clock=STEADY)
 
     def finished(self) -> bool:
-        """Tell whether the whole excitation is out."""
+        """Return whether the whole excitation is out."""
         return self._player.over()
 
     def conclude(self) -> None:

@@ -1,4 +1,4 @@
-"""experiment: tells the causes apart that a bench may have, run by run, each with a person's consent.
+"""experiment: separates the possible causes of a bench, run by run, each with a person's consent.
 
 It begins with what was recorded before (`bag`). ~/approve plays the run that is proposed,
 ~/decline ends the session, ~/cancel stops a run softly at any sample. What is known stands in /diagnostics.
@@ -31,10 +31,10 @@ from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, Trial
+from rsea_ros.report.campaign.files import write_campaign
+from rsea_ros.report.campaign.words import end_sentence, known
 from rsea_ros.report.diagnosis.files import write_diagnosis
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
-from rsea_ros.report.experiment.campaign_files import write_campaign
-from rsea_ros.report.experiment.campaign_words import end_sentence, known
 from rsea_ros.report.experiment.words import shape_words
 from rsea_ros.signals import Record
 
@@ -170,7 +170,7 @@ class Experiment:
         return response
 
     def finished(self) -> bool:
-        """Tell whether the loop has ended."""
+        """Return whether the loop has ended."""
         return self._work.done()
 
     def conclude(self) -> None:

@@ -29,11 +29,11 @@ from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.file_names import IDENTIFICATION
 from rsea_ros.report.identification.words import verdict_sentence
 from rsea_ros.signals import Record
 
 DEFAULT = "out/identify"
-NAMES = ("identification.json", "model.yaml", "report.html")
 TABLE = (
     Parameter("rig", "paper_high_impedance", "where the fit starts: a name of config/rigs, or a file"),
     Parameter("out", DEFAULT, "directory of the results; the default: the first of -2, -3, … that is new"),
@@ -65,7 +65,7 @@ class Identify:
         self._commanded, self._asked, self._done = 0.0, False, False
         self._service = node.create_service(Trigger, "~/finish", self._on_finish)
         self._out = unused(Path(DEFAULT)) if values["out"] == DEFAULT else Path(values["out"])
-        check_free(self._out / name for name in NAMES)
+        check_free(self._out / name for name in IDENTIFICATION)
         self._diagnosing = Diagnosing(self._rig, self._out / "diagnosis")
         self._answering = 0
         self._identified: Report | None = None
@@ -108,7 +108,7 @@ class Identify:
         return response
 
     def finished(self) -> bool:
-        """Tell whether the commands are over and every diagnosis has been answered."""
+        """Return whether the commands are over and every diagnosis has been answered."""
         waited = self._commanded > 0.0 and time.monotonic() - self._commanded > self._values["quiet"]
         over = waited and not self._node.count_publishers(self._topics.topic("torque_command"))
         self._done = (self._asked or (over and not self._values["stay"])) and not self._answering

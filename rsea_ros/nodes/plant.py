@@ -79,7 +79,7 @@ class Plant:
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Stop the simulation, at zero torque; warn when a bag of it would not tell the truth."""
+        """Stop the simulation, at zero torque; warn if a bag of it would have wrong stamps."""
         self._cycle.stop()
         self._device.close()
         if mistimed := self._bench.commands.late + self._bench.commands.unstamped:

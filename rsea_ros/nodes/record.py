@@ -72,7 +72,7 @@ class Record:
         self._bag.write(self._taps[name].topic, kind, received, raw)
 
     def finished(self) -> bool:
-        """Tell whether the duration is over, or the commands have ceased."""
+        """Return whether the duration is over, or the commands have ceased."""
         self._bag.keep_up()
         now = time.monotonic()
         ceased = self._commanded > 0.0 and now - self._commanded > self._quiet > 0.0

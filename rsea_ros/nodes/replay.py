@@ -77,7 +77,7 @@ class Replay:
         return publishers
 
     def _awaited(self) -> bool:
-        """Tell whether subscribers are still missing."""
+        """Return whether subscribers are still missing."""
         return any(
             publisher.get_subscription_count() < self._wanted
             for topic, publisher in self._publishers.items()
@@ -104,7 +104,7 @@ class Replay:
         self._done.set()
 
     def finished(self) -> bool:
-        """Tell whether everything is out and has arrived."""
+        """Return whether everything is out and has arrived."""
         return self._done.is_set()
 
     def conclude(self) -> None:

@@ -75,7 +75,7 @@ class Watch:
 
 
 def _runs(node: Node, values: dict[str, Any]) -> Runs:
-    """Return where recordings go, told which bench it is."""
+    """Return the folder of the recordings of this bench."""
     namespace = node.get_namespace()
     axis = f"--axis={values['axis']}"
     verbs = ["--rig", values["rig"], "--namespace", namespace, "--joint", values["joint"], axis]

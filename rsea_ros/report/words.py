@@ -1,4 +1,4 @@
-"""Names, units and numbers as people read them."""
+"""Names, units and numbers for readers."""
 
 from __future__ import annotations
 
@@ -57,13 +57,28 @@ def channel(name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """Return a unit with its signs, `kg m^2` as `kg·m²`; the unit of a bare number is empty."""
-    return "" if name == "1" else name.replace("^2", "²").replace(" ", "·")
+    """Return a unit with its signs, `kg m^2` as `kg·m²`, `deg` as `°`; the unit of a bare number is empty."""
+    return "" if name == "1" else "°" if name == "deg" else name.replace("^2", "²").replace(" ", "·")
 
 
 def sentence(text: str) -> str:
     """Return text that begins with a capital."""
     return text[:1].upper() + text[1:]
+
+
+def minus(text: str) -> str:
+    """Return a number's text with a minus sign instead of a hyphen."""
+    return text.replace("-", "−")
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a value with its sign and so many decimal places."""
+    return minus(f"{value:+.{digits}f}")
+
+
+def hertz(value: float) -> str:
+    """Return a frequency, or that it has no limit."""
+    return "no limit" if math.isinf(value) else f"{value:.1f}"
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -75,8 +90,8 @@ def number(value: float, digits: int = 3) -> str:
     exponent = math.floor(math.log10(abs(value)))
     if -4 <= exponent < 6:
         text = f"{value:.{max(0, digits - 1 - exponent)}f}"
-        return text.replace("-", "−")
-    return f"{value:.{digits - 1}e}".replace("-", "−")
+        return minus(text)
+    return minus(f"{value:.{digits - 1}e}")
 
 
 def quantity(value: float, of: str, digits: int = 3) -> str:
@@ -124,4 +139,4 @@ def with_interval(value: float, low: float, high: float) -> tuple[str, str]:
     if not -3 < decimals < 9:
         return number(value, 6), number(half, 2)
     shown = max(0, decimals)
-    return f"{round(value, decimals):.{shown}f}".replace("-", "−"), f"{round(half, decimals):.{shown}f}"
+    return minus(f"{round(value, decimals):.{shown}f}"), f"{round(half, decimals):.{shown}f}"

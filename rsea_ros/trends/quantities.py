@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.course import Course, Term, date_range
 from rsea_ros.trends.regression import Regression, term
 from rsea_ros.trends.result import Interval
 
-_Z = 1.959964
 _SURE_SLOPE = 3.0
 """|z| of a slope from which it is a trend: one in 370, of a series that is more than noise."""
 Quantity = Callable[[Course], Interval]
@@ -52,7 +52,7 @@ def _moved(course: Course, i: int, index: int) -> Course:
 def combined(r: Regression, row: FloatArray) -> Interval:
     """Return a linear combination of the coefficients with its interval."""
     variance = float(row @ r.covariance @ row)
-    value, half = float(row @ r.coefficients), _Z * float(np.sqrt(max(0.0, variance)))
+    value, half = float(row @ r.coefficients), Z95 * float(np.sqrt(max(0.0, variance)))
     return Interval(value, value - half, value + half)
 
 
@@ -120,4 +120,4 @@ def last_slope(whole: Dated) -> Interval:
 def is_sure(slope: Interval) -> bool:
     """Return whether a slope is surely none of noise."""
     near = slope.value - slope.low if slope.value > 0.0 else slope.high - slope.value
-    return abs(slope.value) > _SURE_SLOPE / _Z * near
+    return abs(slope.value) > _SURE_SLOPE / Z95 * near

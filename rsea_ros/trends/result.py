@@ -92,7 +92,7 @@ class Trend:
 
     @property
     def silent_since_s(self) -> float:
-        """Return since when many recordings could not tell the parameter, POSIX s; NaN where they can."""
+        """Return since when many recordings could not determine the parameter, POSIX s; NaN if they can."""
         determined = self.series.time_s[self.series.identifiable]
         last = float(determined[-1]) if len(determined) else -np.inf
         later = self.series.time_s[self.series.time_s > last]

@@ -1,4 +1,4 @@
-"""One parameter of one joint over time, as the recordings tell it."""
+"""One parameter of one joint over time, from the recordings."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 Table = Mapping[str, npt.NDArray[Any]]
@@ -19,8 +20,6 @@ BoolArray = npt.NDArray[np.bool_]
 
 CLOCKS = ("clock.", "clock_rate.")
 """What the names of the sensors' clocks begin with: another in every recording, no property of a joint."""
-_HALF = 1.959964
-"""Standard deviations from the middle of a 95 % interval to its end."""
 HISTORY = (
     "joint", "parameter", "unit", "time_s", "value", "low", "high", "identifiable", "temperature",
     "recording", "artefacts",
@@ -96,7 +95,7 @@ def all_series(history: Table) -> Iterator[Series]:
 
 def _series(joint: str, parameter: str, part: Table) -> Series:
     value = part["value"].astype(float)
-    sd = (part["high"].astype(float) - part["low"].astype(float)) / (2.0 * _HALF)
+    sd = (part["high"].astype(float) - part["low"].astype(float)) / (2.0 * Z95)
     usable = np.isfinite(value) & np.isfinite(sd) & (sd >= 0.0)
     return Series(
         joint,

@@ -1,4 +1,4 @@
-"""What a kelvin does to a parameter: the joints of a fleet tell each other."""
+"""The change of a parameter per kelvin, estimated across the joints of a fleet."""
 
 from __future__ import annotations
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.trends.course import Course
 from rsea_ros.trends.quantities import Dated, level_row, slope_row
 from rsea_ros.trends.result import Interval
 from rsea_ros.trends.settings import DAY
-
-_Z = 1.959964
 
 
 def time_to_limit(whole: Dated, limit: float) -> Interval | None:
@@ -33,9 +32,9 @@ def _ahead(course: Course, limit: float) -> Interval | None:
     r, c = course.regression(), course.regression().covariance
     a, b = level_row(course, float(course.t[-1])), slope_row(course, len(course.terms) - 1)
     level, slope = float(a @ r.coefficients) - limit, float(b @ r.coefficients)
-    square = slope**2 - _Z**2 * float(b @ c @ b)
-    half = level * slope - _Z**2 * float(a @ c @ b)
-    rest = level**2 - _Z**2 * float(a @ c @ a)
+    square = slope**2 - Z95**2 * float(b @ c @ b)
+    half = level * slope - Z95**2 * float(a @ c @ b)
+    rest = level**2 - Z95**2 * float(a @ c @ a)
     room = half**2 - square * rest
     if square <= 0.0 or room < 0.0 or level * slope > 0.0:
         return None

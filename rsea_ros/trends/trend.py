@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.trends.course import Course
 from rsea_ros.trends.quantities import (
     Dated,
@@ -28,7 +29,6 @@ from rsea_ros.trends.settings import DAY, YEAR, TrendSettings
 from rsea_ros.trends.significance import scan_threshold
 from rsea_ros.trends.time_to_limit import time_to_limit
 
-_Z = 1.959964
 _POINTS = 24
 """Places at which a course is drawn, beside its steps."""
 
@@ -114,7 +114,7 @@ def _curve(course: Course) -> Curve:
 
 def _by_day(course: Course) -> Curve:
     days, value = course.days, course.at_mean_temperature() * course.days.scale
-    half = _Z * np.sqrt(days.variance) * days.scale
+    half = Z95 * np.sqrt(days.variance) * days.scale
     return Curve(days.t * DAY, value, value - half, value + half)
 
 

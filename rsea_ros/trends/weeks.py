@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.result import Trend
 from rsea_ros.trends.series import BoolArray
 from rsea_ros.trends.settings import DAY
 
-_Z = 1.959964
 _WEEK, _SHORT, _MOST = 7.0, 70.0, 110
 """Days of a week; days up to which a step is a day; steps of a picture: more are no longer distinguished."""
 
@@ -86,10 +86,10 @@ def binned(trend: Trend, steps: Steps) -> Binned:
     if trend.by_day is None or not len(trend.by_day.time_s):
         return Binned(empty, empty, empty, identifiable, recorded)
     d, place = trend.by_day, steps.place(trend.by_day.time_s)
-    w = 1.0 / (((d.high - d.low) / (2.0 * _Z)) ** 2 + trend.day_sd**2)
+    w = 1.0 / (((d.high - d.low) / (2.0 * Z95)) ** 2 + trend.day_sd**2)
     total = np.bincount(place, w, n)
     some: BoolArray = total > 0.0
     safe = np.where(some, total, 1.0)
     value = np.where(some, np.bincount(place, w * d.value, n) / safe, np.nan)
-    half = np.where(some, _Z / np.sqrt(safe), np.nan)
+    half = np.where(some, Z95 / np.sqrt(safe), np.nan)
     return Binned(value, value - half, value + half, identifiable, recorded)

@@ -34,12 +34,12 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(_BYTES))
 
     def is_token(self, given: str | None) -> bool:
-        """Tell whether something given is the token, in a time that says nothing of it."""
+        """Return whether something given is the token, in a time that says nothing of it."""
         return hmac.compare_digest((given or "").encode(), self.token.encode())
 
 
 def same_origin(origin: str | None, host: str) -> bool:
-    """Tell whether a request comes from a page of this server. host: what the request was sent to."""
+    """Return whether a request comes from a page of this server. host: what the request was sent to."""
     if not origin:
         return False
     parts = urlsplit(origin)

@@ -65,7 +65,7 @@ class Desk:
             self.leave(page)
 
     def act(self, page: Page, message: str | bytes) -> None:
-        """Do what a page asks for; what cannot be done it is told."""
+        """Execute the request of a page, and report if it cannot be done."""
         try:
             words = json.loads(message)
             if not isinstance(words, dict) or words.get("do") not in self._acts:

@@ -67,7 +67,7 @@ class Server:
         self._runs.close()
 
     def running(self) -> bool:
-        """Tell whether it serves. Raises what went wrong."""
+        """Return whether it serves. Raises what went wrong."""
         if self.error is not None:
             raise self.error
         return self.thread.is_alive()

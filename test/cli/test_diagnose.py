@@ -93,7 +93,7 @@ def quick(known, monkeypatch):
 def test_the_verb_finds_the_friction_and_leaves_four_files(played):
     assert (played.status, played.errors) == (0, "")
     lines = played.printed.splitlines()
-    assert lines[0].startswith("Coulomb friction (3.00 N·m) is what the simulation lacks")
+    assert lines[0].startswith("Coulomb friction (3.00 N·m) explains the misfit")
     assert lines[-1] == f"report      {played.out / 'report.html'}"
     assert sorted(p.name for p in played.out.iterdir()) == NAMES
     model = load_rig(played.out / "model.yaml")

@@ -31,7 +31,7 @@ def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
     command, rate = read_run(out / "run.csv")
     assert rate == pytest.approx(280.0, rel=1e-6) and np.max(np.abs(command)) <= 5.0
     assert np.max(np.abs(np.diff(command))) * rate <= 4000.0 * (1.0 + 1e-6)
-    assert "What the run separates" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Causes that the run separates" in (out / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.report import file_names
 from rsea_ros.report.control import json as control_json
 from rsea_ros.report.control import page as control_page
 from rsea_ros.report.design import json as design_json
@@ -122,8 +123,8 @@ WRITERS = {
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
     "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
-    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(results.NAMES)),
-    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(diagnosis_files.NAMES)),
+    "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(file_names.IDENTIFICATION)),
+    "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(file_names.DIAGNOSIS)),
     "control": (["control", "--json", "--out", "out"], ["control.json", "report.html"]),
     "paper": (["paper", "--json", "--out", "out"], ["one.mcap", "paper.json", "report.html"]),
 }
@@ -205,7 +206,7 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
     (folder / "out" / names[0]).symlink_to(folder / "precious")
     assert main(words) == 2
     assert main([*words, "--force"]) == 2
-    assert "is no regular file, expected a new name" in capsys.readouterr().err
+    assert "is not a regular file, expected a new name" in capsys.readouterr().err
     assert (folder / "precious").read_bytes() == OLD
     assert [p.name for p in (folder / "out").iterdir()] == [names[0]]
 
@@ -218,9 +219,9 @@ def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
     os.mkfifo(folder / "out" / names[0])
     assert main([*words, "--force"]) == 2
     line = capsys.readouterr().err
-    assert "is no regular file, expected a new name" in line and line.count("\n") == 1
+    assert "is not a regular file, expected a new name" in line and line.count("\n") == 1
     assert (folder / "out" / names[0]).is_fifo()
-    with pytest.raises(OutputError, match="is no regular file"):
+    with pytest.raises(OutputError, match="is not a regular file"):
         files.give_names([(folder / "run.csv", folder / "out" / names[0])], force=True)
 
 

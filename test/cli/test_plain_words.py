@@ -19,8 +19,8 @@ PACKED = gzip.compress(b"u\n1\n2\n", mtime=0)
     ("content", "said"),
     [
         (b"", "holds nothing, expected a mapping"),
-        (b"name: caf\xe9\n", "byte 9 is 0xe9, which is no UTF-8"),
-        (b"\xff\xfe\x00", "byte 0 is 0xff, which is no UTF-8"),
+        (b"name: caf\xe9\n", "byte 9 is 0xe9, which is not UTF-8"),
+        (b"\xff\xfe\x00", "byte 0 is 0xff, which is not UTF-8"),
     ],
 )
 def test_of_a_rig(content, said, tmp_path, capsys):
@@ -58,7 +58,7 @@ def test_of_a_table(name, content, said, tmp_path, capsys):
         (b"rosbag2_bagfile_information: null", "no mapping rosbag2_bagfile_information"),
         (b"rosbag2_bagfile_information: {}", "no relative_file_paths"),
         (b"rosbag2_bagfile_information: {relative_file_paths: null}", "'null', expected a list"),
-        (b"\xff\xfe", "byte 0 is 0xff, which is no UTF-8"),
+        (b"\xff\xfe", "byte 0 is 0xff, which is not UTF-8"),
         (
             b"rosbag2_bagfile_information: {relative_file_paths: [], topics_with_message_count: "
             b"[{topic_metadata: {name: /a}, message_count: null}]}",

@@ -8,11 +8,10 @@ import pytest
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.identification.excitation import Settings, excitation
-from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.signals import Channel
+from rsea_ros.signals import MEASURED, Channel
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +21,7 @@ def view():
     command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / 280.0, command), seed=3)
     case, wrong = case_from(record, rig), rig.with_values({n: 1.1 * rig[n] for n in rig.free()})
-    (outputs,) = Problem((case,), wrong, (), CHANNELS).outputs(np.zeros(0))
+    (outputs,) = Problem((case,), wrong, (), MEASURED).outputs(np.zeros(0))
     return RecordView(case, wrong, outputs)
 
 

@@ -11,11 +11,10 @@ import pytest
 from rsea_ros.diagnosis.data_split import short_pieces_of
 from rsea_ros.diagnosis.problem_variants import with_doubled_step
 from rsea_ros.identification.excitation import Settings, excitation
-from rsea_ros.identification.fit import CHANNELS
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate, synthesize
-from rsea_ros.signals import Channel, Record
+from rsea_ros.signals import MEASURED, Channel, Record
 
 RATE = 280.0
 
@@ -33,11 +32,11 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
     command = excitation(kind, Settings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
     case = case_from(record, rig)
-    problem = Problem((case,), rig, (), CHANNELS)
+    problem = Problem((case,), rig, (), MEASURED)
     pieces = short_pieces_of(case, problem.outputs(np.zeros(0))[0])
     assert len(pieces) > 5
     for piece in pieces:
-        (out,) = Problem((piece,), rig, (), CHANNELS).outputs(np.zeros(0))
+        (out,) = Problem((piece,), rig, (), MEASURED).outputs(np.zeros(0))
         for name, values in out.items():
             mask = piece.mask[name]
             left = (piece.measured[name] - values)[mask] / piece.noise[name]
@@ -55,11 +54,11 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
     stamps += jitter / rate * np.random.default_rng(5).uniform(-0.5, 0.5, len(stamps))
     record = synthesize(rig, Channel(stamps, command), seed=5)
     case = with_stated_noise(case_from(record, rig), rig)
-    pieces = short_pieces_of(case, Problem((case,), rig, (), CHANNELS).outputs(np.zeros(0))[0])
+    pieces = short_pieces_of(case, Problem((case,), rig, (), MEASURED).outputs(np.zeros(0))[0])
     assert len(pieces) > 5
     for problem in (
-        Problem(pieces, rig, (), CHANNELS),
-        with_doubled_step(Problem(pieces, rig, (), CHANNELS)),
+        Problem(pieces, rig, (), MEASURED),
+        with_doubled_step(Problem(pieces, rig, (), MEASURED)),
     ):
         residual = problem.residual(np.zeros(0))
         assert float(residual @ residual) == pytest.approx(len(residual), rel=0.1)
@@ -80,8 +79,8 @@ def test_pieces_hold_a_channel_no_more_than_about_as_often_as_commands(times, ke
     measured = {n: measure(rig, n, y, rng) for n, y in simulate(rig, asked).items()}
     record = asked.with_channels(**{n: Channel(asked[n].t, y) for n, y in measured.items()})
     case = with_stated_noise(case_from(record, rig), rig)
-    problem = Problem((case,), rig, (), CHANNELS)
-    pieces = Problem(short_pieces_of(case, problem.outputs(np.zeros(0))[0]), rig, (), CHANNELS)
+    problem = Problem((case,), rig, (), MEASURED)
+    pieces = Problem(short_pieces_of(case, problem.outputs(np.zeros(0))[0]), rig, (), MEASURED)
     counts = {n: sum(np.count_nonzero(p.mask[n]) for p in pieces.cases) for n in ("ft", "position")}
     assert counts["position"] == pytest.approx(kept * counts["ft"], rel=0.02)
     residual = pieces.residual(np.zeros(0))

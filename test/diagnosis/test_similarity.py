@@ -21,11 +21,12 @@ from rsea_ros.diagnosis.diagnose import searched_effects
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.screening import screen
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.identification.identify import CHANNELS, unknowns_of
+from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.signals import MEASURED
 
 RIG = load_rig("paper_high_impedance")
 SHOWN = ("torque_saturation", "coulomb_friction", "lugre_friction", "spring_hysteresis", "base_compliance")
@@ -36,7 +37,7 @@ def screened(name: str, times: float):
     """Return what screening makes of an effect on a machine with so many times the torque."""
     record, rig = record_with(RIG, effect_named(name), times, duration=5.0), similar(RIG, times)
     case = case_from(record, rig)
-    present = solve(Problem((case,), rig, unknowns_of(rig, (case,)), CHANNELS), iterations=3)
+    present = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=3)
     (effect,) = (e for e in searched_effects(present.problem, ()) if e.name == name)
     fitted, _ = apply(present.problem.rig, present.problem.unknowns, present.theta)
     view = RecordView(case, fitted, present.problem.outputs(present.theta)[0])

@@ -17,14 +17,15 @@ from rsea_ros.control.compensation import compensation
 from rsea_ros.control.lags import lagging
 from rsea_ros.control.sampled import responses, sampled
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming.causes import play_not_told
+from rsea_ros.diagnosis.naming.causes import undetermined_play
 from rsea_ros.diagnosis.problem_variants import with_common_clock_in_delay
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.exports.bam import export_bam
 from rsea_ros.exports.mjcf import export_mjcf
 from rsea_ros.exports.urdf import export_urdf
-from rsea_ros.identification.identify import CHANNELS, identify, unknowns_of
+from rsea_ros.identification.fit import unknowns_of
+from rsea_ros.identification.identify import identify
 from rsea_ros.identification.problem import Problem, case_from
 from rsea_ros.identification.solver import solve
 from rsea_ros.identification.unknowns import start_vector, unknowns_of_effect
@@ -34,6 +35,7 @@ from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report.diagnosis.sketch import part_of
+from rsea_ros.signals import MEASURED
 
 PADDLE = '''
 """Torque of a paddle in oil: between dry and viscous friction.
@@ -168,9 +170,9 @@ def test_a_joint_is_told_of_play_of_another_name_that_its_data_do_not_show():
     problem = SimpleNamespace(unknowns=(gap,))
     trial = SimpleNamespace(name="worn_key", problem=problem, theta=start_vector((gap,)))
     rejected = SimpleNamespace(name="worn_key", gain_holdout=0.004)
-    joint = SimpleNamespace(baseline_rig=SimpleNamespace(loop="pd"), causes=(), rejected=(rejected,))
-    (sentence,) = play_not_told(SimpleNamespace(trials=(trial,)), joint)
-    assert "with 2 mrad" in sentence and "changes by -0.4 %" in sentence
+    last = SimpleNamespace(problem=SimpleNamespace(rig=SimpleNamespace(loop="pd")))
+    (remark,) = undetermined_play(SimpleNamespace(trials=(trial,), last=last), (), (rejected,))
+    assert remark.code == "play_undetermined" and remark.values == pytest.approx((2e-3, 0.004))
 
 
 def test_a_delay_of_another_name_is_a_delay():
@@ -181,5 +183,5 @@ def test_a_delay_of_another_name_is_a_delay():
     assert path[0] == pytest.approx(np.exp(-2j * math.pi * 10.0 * 4e-3))
     np.testing.assert_array_equal(response, responses(plant, hz))
     case = case_from(record_with(RIG, effect_named("late_bus"), 1.0, duration=5.0), rig)
-    solution = solve(Problem((case,), rig, unknowns_of(rig, (case,)), CHANNELS), iterations=0)
+    solution = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=0)
     assert with_common_clock_in_delay(solution) is not None

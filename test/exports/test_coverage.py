@@ -140,7 +140,7 @@ def test_bams_budget_is_our_friction_at_speed(motor, load):
 
 @pytest.mark.parametrize("target", EXPORTS)
 def test_an_effect_without_a_size_is_nothing_to_say(target):
-    """A model.yaml may hold effects at their null values, and an infinite limit is no number in any file."""
+    """A model.yaml may hold effects at their null values, and no file holds an infinite limit."""
     rig = load_rig("paper_high_impedance")
     idle = rig.with_effects(*(EffectSetting(n, e.null) for n, e in catalogue().items()))
     assert EXPORTS[target](idle).content == EXPORTS[target](rig).content

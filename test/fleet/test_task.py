@@ -36,7 +36,7 @@ joints:
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give a folder with a map, two good recordings, one where nothing moves and one that is no bag."""
+    """Give a folder with a map, two good recordings, one where nothing moves and one that is not a bag."""
     folder = tmp_path_factory.mktemp("lab")
     (folder / "joints.yaml").write_text(MAP, encoding="utf-8")
     u = excitation("chirp", Settings(duration=5.0))

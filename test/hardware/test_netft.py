@@ -1,4 +1,4 @@
-"""RDT and the calibration page: what is lost is counted exactly, what is no record is refused."""
+"""RDT and the calibration page: what is lost is counted exactly, what is not a record is refused."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""Figures of the model never end a node, and what is no number never says pure."""
+"""Figures of the model never end a node, and what is not a number never says pure."""
 
 import math
 from itertools import pairwise

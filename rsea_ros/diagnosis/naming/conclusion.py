@@ -117,7 +117,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
 def _next_experiment(
     selection: Selection, outcome: Outcome, record: Record, settings: DiagnosisSettings
 ) -> Experiment | None:
-    """Return the run that would decide what these data cannot; None where nothing is left to decide."""
+    """Return the run that would decide what these data cannot; None if nothing is open."""
     rate, last = record["command"].rate, outcome.stages[-1]
     for stage in outcome.stages[1:]:
         rivals = selection.rivals_of(stage.added)

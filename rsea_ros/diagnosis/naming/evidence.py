@@ -90,7 +90,7 @@ def evidence_for(
 
 
 def is_at_edge(problem: Problem, theta: FloatArray, name: str, near: float) -> bool:
-    """Tell whether a parameter of an effect, optional ones apart, lies within a share `near` of a bound."""
+    """Return whether a parameter of an effect, optional ones apart, lies within a share `near` of a bound."""
     parameters = {f"{name}.{p.name}" for p in effect_named(name).parameters if not p.optional}
     for unknown, t in zip(problem.unknowns, theta, strict=True):
         margin = near * (unknown.high - unknown.low)

@@ -16,9 +16,7 @@ from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.errors import IdentificationError
-
-PRIMARY = ("ft", "deflection", "position", "velocity", "motor_torque")
-"""The channel that gains and verdicts speak of: the first of these that is measured."""
+from rsea_ros.signals import MEASURED
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ class Outcome:
 def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettings) -> Outcome:
     """Return the verdict on weighed causes, those that are named, and those that may not be."""
     selection, stages, levels = weighing.selection, weighing.stages, settings.floor
-    channel = next((n for n in PRIMARY if n in stages[0].test.sums), None)
+    channel = next((n for n in MEASURED if n in stages[0].test.sums), None)
     if channel is None:
         source = examined.records[0].source
         raise IdentificationError(f"{source}: no sample is left to test on, expected a longer record")

@@ -69,7 +69,7 @@ def probabilities_and_status(
 
 
 def _helps(mass: float, evidence: Evidence, settings: DiagnosisSettings) -> bool:
-    """Tell whether a cause surely helps, enough for the probability of it and its rivals.
+    """Return whether a cause surely helps, enough for the probability of it and its rivals.
 
     One of whose parameters has run to a bound may bend to something else: it must be likely.
     """

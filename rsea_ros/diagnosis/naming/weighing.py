@@ -108,6 +108,6 @@ def promoted(
 
 
 def _helps(trial: Trial, score: Score, cases: tuple[Case, ...]) -> bool:
-    """Tell whether a trial surely does better than the model that it was tried beside."""
+    """Return whether a trial surely does better than the model that it was tried beside."""
     extra, rule = len(trial.theta) - trial.beside.parameters, trial.beside.settings.acceptance
     return preference(score, beside_score(trial, cases), extra, rule).better

@@ -82,7 +82,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return baudrate if baudrate in BAUD_RATES else -1
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open the port anew at another rate; tell whether it is one of BAUD_RATES."""
+        """Open the port anew at another rate; return whether it is one of BAUD_RATES."""
         if self.getCFlagBaud(baudrate) < 0:
             return False
         self.close()
@@ -119,7 +119,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return max(0.0, self._deadline - time.monotonic())
 
     def isPacketTimeout(self) -> bool:
-        """Tell whether the wait is over."""
+        """Return whether the wait is over."""
         return time.monotonic() > self._deadline
 
     def receive(self) -> bytes:
@@ -127,7 +127,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return self._take() if self._arrived(self.left) else b""
 
     def _arrived(self, wait: float) -> bool:
-        """Tell whether something has come in since it was last looked at, within a time (s).
+        """Return whether something has come in since it was last looked at, within a time (s).
 
         Edges, not levels: to look into an empty terminal, as select and read do, is to wait for the kernel's
         thread that fills it, whatever the time-out, on a busy machine for a cycle.

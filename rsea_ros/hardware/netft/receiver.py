@@ -39,7 +39,7 @@ class Arrival(NamedTuple):
 class Receiver:
     """Ask a sensor for its stream and keep what comes.
 
-    sequence: counts of what came and what is gone. refused: datagrams that were no records.
+    sequence: counts of what came and what is gone. refused: datagrams that were not records.
     """
 
     def __init__(self, host: str, port: int) -> None:

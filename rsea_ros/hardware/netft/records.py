@@ -1,4 +1,4 @@
-"""RDT: requests, records of 36 bytes, and what their counters tell of records that are gone."""
+"""RDT: requests, records of 36 bytes, and what their counters show about lost records."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Sequence:
         self._rdt = self._ft = None
 
     def accept(self, record: Record) -> bool:
-        """Count a record; tell whether it is newer than all before and may be used."""
+        """Count a record; return whether it is newer than all before and may be used."""
         step = 1 if self._rdt is None else (record.sequence - self._rdt) % _WORD
         ft_step = 1 if self._ft is None else (record.ft_sequence - self._ft) % _WORD
         kind = _kind(step) or _ft_kind(ft_step, record.ft_sequence)
@@ -98,7 +98,7 @@ class Sequence:
         return True
 
     def _another_stream(self, record: Record) -> bool:
-        """Tell whether the last few records that did not fit follow each other."""
+        """Return whether the last few records that did not fit follow each other."""
         follows = False
         if self._stray is not None:
             step, ft_step = ((new - old) % _WORD for new, old in zip(record[:2], self._stray, strict=True))

@@ -137,7 +137,7 @@ class Sensor:
         return time.monotonic_ns() - newest.instant if newest else 0
 
     def _jump(self) -> str:
-        """Tell whether the sensor's own counter stood still or went back since it was last looked at."""
+        """Return whether the sensor's own counter stood still or went back since it was last looked at."""
         counts = self._receiver.sequence.counts
         for kind, words in JUMPS.items():
             if counts[kind] > self._seen.get(kind, 0):

@@ -72,7 +72,7 @@ class ForceSensor:
             self.status = 0 if self.status == 0x8001_0000 else self.status
 
     def tick(self, now: int) -> bool:
-        """Send all records that are due; tell whether there were any, the plant then being up to date."""
+        """Send all records that are due; return whether there were any, the plant then being up to date."""
         due = self._client is not None and self._due <= now
         while self._client and self._due <= now:
             self._due += self._period

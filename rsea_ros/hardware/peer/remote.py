@@ -40,7 +40,7 @@ class RemoteBench:
         self.close()
 
     def parameters(self) -> dict[str, object]:
-        """Return what a driver node must be told to find it."""
+        """Return the parameters that a driver node needs to find it."""
         return {
             "device": "dynamixel_netft", "port": self.port, "ft_host": "127.0.0.1",
             "ft_port": self.ft_port, "ft_page_port": self.page_port,

@@ -197,7 +197,7 @@ def doubt(model, state):  # type: ignore[no-untyped-def]
 
 @inner
 def update(model, state, channel, value):  # type: ignore[no-untyped-def]
-    """Correct the state by a measured position (rad) or ft (N m); one that is not finite tells nothing."""
+    """Correct the state by a measured position (rad) or ft (N m); a value that is not finite is ignored."""
     if not (np.isfinite(value) and np.isfinite(model.noise[channel])):
         return
     p, h, r, n = state.p, model.measured[channel], model.noise[channel], len(state.p)

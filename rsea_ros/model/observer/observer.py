@@ -1,4 +1,4 @@
-"""The observer as its users see it: samples in, torques on both ends out."""
+"""The observer: samples in, torques on both ends out."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray, Record
 
 GAP = 1.0
-"""s. Stamps that jump so far, either way, are of another run: the observer begins anew."""
+"""s. A larger jump of the stamps, in either direction, restarts the observer."""
 
 
 class Estimate(NamedTuple):
@@ -34,7 +34,7 @@ class Estimate(NamedTuple):
 
 
 class ErrorModel(NamedTuple):
-    """How noise of the sensors comes into T_d: e = A e + K v, T_d error = c e, v of variances r.
+    """Propagation of the sensor noise to T_d: e = A e + K v, error of T_d = c e, variances r of v.
 
     a: shape (n, n), k: (n, 2), r: (2,) of position (rad^2) and ft (N^2 m^2), c: (n,). sigma: of T_d, N m.
     """
@@ -47,10 +47,12 @@ class ErrorModel(NamedTuple):
 
 
 class Observer:
-    """A Kalman filter on a rig's unlumped model, by sample. Stamps are s since any epoch.
+    """A Kalman filter on the unlumped model of a rig, one sample at a time. Stamps are s since any epoch.
 
-    noise: of the sensors, from the rig when it is not given. hold: how long a command stays in force, s.
-    duration: over which drifts come to their full size, s.
+    noise: of the sensors, by default from the rig. hold: time that a command stays in force, s. duration:
+    time in which drifts reach their full size, s. Estimates are torques on both ends, N m, with one sigma.
+    `observe` runs it over a record. Method: docs/observer.md.
+    Not to be confused with the disturbance observer inside TorqueController.
     """
 
     _score: FloatArray
@@ -66,36 +68,36 @@ class Observer:
         self._begin()
 
     def command(self, t: float, torque: float) -> None:
-        """Take in a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
+        """Add a command (N m) that takes effect at its stamp, which may be ahead of the measurements."""
         self._take(t, COMMAND, torque, 0.0)
 
     def state(self, t: float, position: float, motor_torque: float = math.nan) -> Estimate | None:
-        """Take in position (rad) and motor torque (N m), nan where it is missing; None when too late."""
+        """Add position (rad) and motor torque (N m, nan if missing); return None for a sample too late."""
         return self._take(t, STATE, position, motor_torque)
 
     def ft(self, t: float, torque: float) -> Estimate | None:
-        """Take in a torque of the F/T sensor (N m); None when it is too late."""
+        """Add a torque of the F/T sensor (N m); return None for a sample that is too late."""
         return self._take(t, FT, torque, 0.0)
 
     @property
     def late(self) -> int:
-        """Samples that came after others with later stamps, and were put in their place."""
+        """Number of late samples that were inserted at their stamps."""
         return int(self._log.place[LATE])
 
     @property
     def refused(self) -> int:
-        """Samples that came too late for that."""
+        """Number of samples that came too late."""
         return int(self._log.place[REFUSED])
 
     def consistency(self) -> dict[str, Consistency]:
-        """Return for each channel how its innovations since the last call compare to what they should be."""
+        """Return for each channel the innovations since the last call over their expected size."""
         now = self._state.score.reshape(3, 3).copy()
         change = now - self._score
         self._score = now
         return consistency(change)
 
     def error_model(self, dt: float) -> ErrorModel:
-        """Return the error's dynamics at a period of dt s, with the gain K = P h' / r of this moment."""
+        """Return the error dynamics at a period of dt s, with the present gain K = P h' / r."""
         m, p, size = self._model, self._state.p, len(self._state.p)
         f, q = np.empty((size, size)), np.empty((size, size))
         transition(m.a, m.walk, m.scale, dt, f, q)
@@ -126,8 +128,8 @@ class Observer:
 def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]:
     """Run an observer over a record; return stamps and the estimates there.
 
-    Stamps: those of the F/T samples, without a sensor those of the positions, s, shape (n,). Estimates: N m,
-    shape (n, 6), in the order of Estimate.
+    Stamps: those of the F/T samples, or of the positions if there is no sensor, s, shape (n,). Estimates:
+    N m, shape (n, 6), in the order of Estimate.
     """
     wanted, t, rows = ("ft" if "ft" in record else "position"), [], []
     for stamp, channel, a, b in _events(record):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from rsea_ros.control.large_signal import Reach
+from rsea_ros.control.margins import Margins
 from rsea_ros.control.study import AtRate, Study
+from rsea_ros.control.trials import Compensated, Trial
+from rsea_ros.report.json_values import finite, numbers
 
 
 def control_json(study: Study) -> dict[str, Any]:
@@ -22,8 +24,8 @@ def control_json(study: Study) -> dict[str, Any]:
         "large_signal": [
             {
                 "motor": motor.name,
-                "torque": _finite(motor.torque),
-                "speed": _finite(motor.speed),
+                "torque": finite(motor.torque),
+                "speed": finite(motor.speed),
                 "source": motor.source,
                 "limits": [
                     {
@@ -44,38 +46,17 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
     return {
         "rate_hz": at.design.rate,
         "gains": asdict(at.design.gains),
-        "margins": {n: {k: _finite(v) for k, v in asdict(m).items()} for n, m in at.design.margins.items()},
+        "margins": {name: _margins(m) for name, m in at.design.margins.items()},
         "friction_left": at.design.friction_left,
         "set": {
             "cases": at.swept.cases,
             "unstable": at.swept.unstable,
             "sensitivity": at.swept.sensitivity,
             "where": str(at.swept.where),
-            "margins": {k: _finite(v) for k, v in asdict(at.swept.margins).items()},
+            "margins": _margins(at.swept.margins),
         },
-        "trials": [
-            {
-                "what": t.what,
-                "value": _finite(t.value),
-                "unit": t.unit,
-                "asked": t.asked,
-                "worst": _finite(t.worst),
-                "asked_worst": t.allowed,
-                "met": t.met,
-            }
-            for t in at.trials
-        ],
-        "compensation": [
-            {
-                "effect": c.effect.name,
-                "parameters": dict(c.effect.parameters),
-                "sine_hz": c.hz,
-                "error_without": c.without,
-                "error_with": c.with_model,
-                "gain": c.gain,
-            }
-            for c in at.compensations
-        ],
+        "trials": [_trial(t) for t in at.trials],
+        "compensation": [_compensation(c) for c in at.compensations],
         "output_impedance": {
             "hz": z.hz.tolist(),
             "controlled": np.abs(z.controlled).tolist(),
@@ -85,9 +66,32 @@ def _at_rate(at: AtRate) -> dict[str, Any]:
     }
 
 
+def _margins(margins: Margins) -> dict[str, float | None]:
+    return numbers(asdict(margins))
+
+
+def _trial(t: Trial) -> dict[str, Any]:
+    return {
+        "what": t.what,
+        "value": finite(t.value),
+        "unit": t.unit,
+        "asked": t.asked,
+        "worst": finite(t.worst),
+        "asked_worst": t.allowed,
+        "met": t.met,
+    }
+
+
+def _compensation(c: Compensated) -> dict[str, Any]:
+    return {
+        "effect": c.effect.name,
+        "parameters": dict(c.effect.parameters),
+        "sine_hz": c.hz,
+        "error_without": c.without,
+        "error_with": c.with_model,
+        "gain": c.gain,
+    }
+
+
 def _reach(reach: Reach) -> dict[str, Any]:
-    return {"torque_hz": _finite(reach.torque), "speed_hz": _finite(reach.speed)}
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return {"torque_hz": finite(reach.torque), "speed_hz": finite(reach.speed)}

@@ -1,4 +1,4 @@
-"""The report of a controlled actuator: how well torque follows, and how it feels from outside."""
+"""The report of a controlled actuator: torque tracking and output impedance."""
 
 from __future__ import annotations
 
@@ -53,20 +53,20 @@ def _keys(study: Study) -> list[tuple[str, str]]:
         (f"{study.resonance:.1f} Hz", "resonance of the open loop"),
         (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz, one sample of delay"),
         (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "least of the whole set"),
+        (f"{at.swept.margins.phase:.0f}°", "smallest of the whole set"),
         *errors,
     ]
 
 
 def _following(study: Study) -> Figure:
-    """Return T_d over desired torque, locked and free apart, the hardest of the set, and the open loop."""
+    """Return T_d over desired torque, locked and free apart, the worst case of the set, and the open loop."""
     curves = []
     for at, colour in zip(study.rates, _COLOURS, strict=False):
         rate = f"{at.design.rate:g} Hz"
         for name, seen, width, dash in (
             ("locked", at.locked, 2.4, "solid"),
             ("free", at.free, 1.6, "dot"),
-            ("hardest of the set", at.hard, 1.0, "dash"),
+            ("worst case of the set", at.hard, 1.0, "dash"),
         ):
             curves.append(Response(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
     hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)
@@ -80,7 +80,7 @@ def _following(study: Study) -> Figure:
         "samples late. Hardest of the set: stiffer spring, less drag, one sample more, 2 ms of lag, a "
         "mode of 33 Hz at the sensor."
     )
-    title = "The torque follows alike with the actuator clamped and free"
+    title = "The torque tracks equally well with the actuator clamped and free"
     return response_figure(
         title, curves, [Mark(3.0 * study.resonance, "3 × resonance")], caption, (-60.0, 20.0)
     )
@@ -105,7 +105,7 @@ def _feeling(study: Study) -> Figure:
     softer = abs(first.spring[one]) / abs(first.controlled[one])
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)
     return Figure(
-        title=f"At 1 Hz a moved output feels {softer:.0f} times softer than the spring alone",
+        title=f"At 1 Hz the moved output is {softer:.0f} times softer than the spring alone",
         caption="Torque error for each rad/s of the distal side, housing clamped. Spring alone: K_s/s + b_s.",
         data=data,
         layout=layout(

@@ -121,15 +121,15 @@ def control_tables(study: Study) -> list[str]:
     return [
         section("Trials", table(trial_head(study), trial_rows(study), columns)),
         section(
-            "What each compensation gains",
+            "Gain of each compensation",
             table(["effect", "sine of 10 N·m", *rates], compensation_rows(study), columns),
             caption="RMS error of a sine over its own RMS, without and with the effect in the model.",
         ),
         section("Gains and margins", table(margin_head, margin_rows(study), range(2, 8))),
         section(
             "Large signals",
-            table(["motor", "amplitude", "clamped: not from", "free: not from"], reach_rows(study)),
-            caption="From here on a sine takes more torque or speed than the motor has.",
+            table(["motor", "amplitude", "clamped: limit from", "free: limit from"], reach_rows(study)),
+            caption="From this frequency on, a sine needs more torque or speed than the motor has.",
         ),
     ]
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from rsea_ros.design.by_train import WithTrain, by_train
 from rsea_ros.design.judge import Design, stiffness_bounds
 from rsea_ros.design.margins import margins
+from rsea_ros.report.json_values import finite
 
 
 def design_json(asked: Design, least: Design, robust: Design | None) -> dict[str, Any]:
@@ -32,23 +32,23 @@ def _design(d: Design) -> dict[str, Any]:
         "spring_rate": d.rate,
         "arm": d.requirement.arm,
         "largest_torque": 0.5 * d.stiffness,
-        "deflection": _finite(d.deflection),
+        "deflection": finite(d.deflection),
         "linear_deflection": d.linear,
         "linearity_error_at_limit": d.error,
         "inner_inertia": d.inner,
-        "resonance_hz": _finite(d.resonance),
+        "resonance_hz": finite(d.resonance),
         "bandwidth_eq_7_hz": d.band_eq_7,
-        "bandwidth_exact_hz": _finite(d.band_exact),
+        "bandwidth_exact_hz": finite(d.band_exact),
         "feasible": d.feasible,
         "checks": [
-            {"name": c.name, "value": _finite(c.value), "limit": c.limit, "unit": c.unit, "met": c.met}
+            {"name": c.name, "value": finite(c.value), "limit": c.limit, "unit": c.unit, "met": c.met}
             for c in d.checks
         ],
         "margins": [
             {
                 "name": m.name,
-                "percentiles_5_50_95": [_finite(v) for v in m.percentiles],
-                "limit": _finite(m.limit),
+                "percentiles_5_50_95": [finite(v) for v in m.percentiles],
+                "limit": finite(m.limit),
                 "share": m.share,
             }
             for m in margins(d)
@@ -61,12 +61,8 @@ def _by_train(row: WithTrain) -> dict[str, Any]:
         "train": row.train,
         "turns": row.turns,
         "inner_inertia": row.inner,
-        "bandwidth_exact_hz": _finite(row.band),
-        "bandwidth_hz_90_percent_of_rotor_inertia": [_finite(v) for v in row.band_range],
+        "bandwidth_exact_hz": finite(row.band),
+        "bandwidth_hz_90_percent_of_rotor_inertia": [finite(v) for v in row.band_range],
         "least_stiffness_for_bandwidth": row.for_band,
         "least_stiffness": row.least,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

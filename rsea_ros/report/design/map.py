@@ -1,4 +1,4 @@
-"""The map of what is feasible: stiffness over chassis inertia, with a line for every demand."""
+"""The map of feasible designs: stiffness over chassis inertia, with a line for every demand."""
 
 from __future__ import annotations
 

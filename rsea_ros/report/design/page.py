@@ -1,4 +1,4 @@
-"""The report of a design: what the paper's method gives, what it does not say, and what meets all demands."""
+"""The report of a design: the result of the method, its gaps, and the designs that meet all demands."""
 
 from __future__ import annotations
 
@@ -12,16 +12,14 @@ import numpy as np
 from rsea_ros.design.by_train import by_train
 from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import FALL_FACTOR, PAPER_FACTOR, end_to_end
+from rsea_ros.model.bandwidth import end_to_end, undamped_stiffness
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.design.map import Demand, feasible_map
 from rsea_ros.report.design.surface import Point, bandwidth_surface
 from rsea_ros.report.design.tables import (
     checks_table,
-    hertz,
     margins_table,
-    signed,
     springs_table,
     trains_table,
 )
@@ -76,7 +74,7 @@ def _keys(d: Design) -> list[tuple[str, str]]:
     return [
         (f"{d.band_eq_7:.1f} Hz", "bandwidth by Eq. (7)"),
         (_hz(d.band_exact), "with the rotor's spin"),
-        (f"{d.stiffness / 2:.0f} N·m", "most that Eq. (8) carries"),
+        (f"{d.stiffness / 2:.0f} N·m", "largest torque by Eq. (8)"),
         (turned, f"at {d.requirement.torque:.0f} N·m by Eq. (8)"),
         (f"{math.degrees(d.linear):.0f}°", "as if linear"),
     ]
@@ -84,9 +82,9 @@ def _keys(d: Design) -> list[tuple[str, str]]:
 
 def _sentences(asked: Design, least: Design) -> str:
     r = asked.requirement
-    spin = asked.unit.spin
+    spin, turns = asked.unit.spin, words.signed(asked.unit.turns, 0)
     return section(
-        "What the method gives, and what it does not say",
+        "Result of the method, and its gaps",
         equation(
             f"Eq. (7)   K_s = {asked.stiffness:.0f} N·m/rad, f = √(0.292 K_s / J_sc) / 2π = "
             f"{asked.band_eq_7:.1f} Hz\n"
@@ -94,7 +92,7 @@ def _sentences(asked: Design, least: Design) -> str:
             f"linear    T / K_s = {asked.linear:.2f} rad = {math.degrees(asked.linear):.0f}°, "
             f"{math.degrees(r.deflection):.0f}° allowed\n"
             f"spin      J_sc + n J_r = {1e3 * r.inertia:.3f} {_term(1e3 * spin)} g·m²  →  "
-            f"{_hz(asked.band_exact)}   ({words.train(asked.unit.train)}, n = {signed(asked.unit.turns, 0)})"
+            f"{_hz(asked.band_exact)}   ({words.train(asked.unit.train)}, n = {turns})"
         ),
         f"<p>The least stiffness that meets all demands on the spring is <b>{least.stiffness:.0f} N·m/rad</b>"
         f" with this motor and gear: {escape(_why(least))}.</p>",
@@ -102,7 +100,7 @@ def _sentences(asked: Design, least: Design) -> str:
 
 
 def _hz(value: float) -> str:
-    return hertz(value) + (" Hz" if math.isfinite(value) else "")
+    return words.hertz(value) + (" Hz" if math.isfinite(value) else "")
 
 
 def _term(value: float) -> str:
@@ -118,7 +116,6 @@ def _why(least: Design) -> str:
 def _map(designs: Sequence[Design]) -> Figure:
     r, unit = designs[0].requirement, designs[0].unit
     j = np.geomspace(2e-4, 2e-2, 25)
-    omega_2 = (2.0 * math.pi * r.bandwidth) ** 2 / PAPER_FACTOR
     bounds = stiffness_bounds(r, unit)
     spin = np.array([least_for_band(replace(r, inertia=float(v)), unit) for v in j])
     flat = np.ones(len(j))
@@ -126,7 +123,7 @@ def _map(designs: Sequence[Design]) -> Figure:
         Demand(f"{r.bandwidth:g} Hz, with spin", BEFORE, j, spin),
         Demand(f"{math.degrees(r.deflection):g}° at {r.torque:g} N·m", INK, j, bounds["Deflection"] * flat),
         Demand(f"K_s/2 = {r.torque:g} N·m", QUIET, j, bounds["Torque, K_s/2"] * flat),
-        Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, omega_2 * j),
+        Demand(f"{r.bandwidth:g} Hz, Eq. (7)", AFTER, j, undamped_stiffness(r.bandwidth, j)),
     ]
     points = [
         Point(f"{d.stiffness:.0f}", d.stiffness, r.inertia, c)
@@ -138,11 +135,11 @@ def _map(designs: Sequence[Design]) -> Figure:
 
 def _map_title(d: Design) -> str:
     r, spin = d.requirement, d.unit.spin
-    alone = abs(spin) * (2.0 * math.pi * r.bandwidth) ** 2 / (PAPER_FACTOR if spin > 0.0 else FALL_FACTOR)
+    alone = float(undamped_stiffness(r.bandwidth, spin))
     if spin > 0.0:
         return (
             f"However light the chassis, {r.bandwidth:g} Hz need {alone:.0f} N·m/rad with this rotor: "
-            "Eq. (7) sees only the chassis"
+            "Eq. (7) considers only the chassis"
         )
     return (
         f"A chassis without mass needs {alone:.0f} N·m/rad for {r.bandwidth:g} Hz; a heavier one less, "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.model.bandwidth import PAPER_FACTOR, undamped_band
+from rsea_ros.model.bandwidth import undamped_band
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers
 from rsea_ros.report.figures.palette import INK, QUIET, faint
 from rsea_ros.signals import FloatArray
@@ -34,7 +34,7 @@ def bandwidth_surface(title: str, points: Sequence[Point], caption: str = "") ->
         "type": "surface",
         "x": numbers(k),
         "y": numbers(1e3 * j),
-        "z": [numbers(row) for row in _band(k[None, :], j[:, None])],
+        "z": [numbers(row) for row in undamped_band(k[None, :], j[:, None])],
         "colorscale": _SHADES,
         "showscale": False,
         "opacity": 0.92,
@@ -89,11 +89,11 @@ def slices(title: str, points: Sequence[Point], caption: str = "") -> Figure:
     names: list[Json] = []
     shades = ["#9db9d6", "#5f8fbf", "#1864ab"]
     for value, shade in zip((200.0, 600.0, 1800.0), shades, strict=True):
-        y = _band(np.array(value), j)
+        y = undamped_band(value, j)
         data.append(line(1e3 * j, y, f"{value:.0f} N·m/rad", shade))
         names.append(_end(f"{value:.0f} N·m/rad", 1e3 * j[-1], y[-1], shade, ""))
     for value, shade in zip((1e-2, 3e-3, 1e-3), shades, strict=True):
-        y = _band(k, np.array(value))
+        y = undamped_band(k, value)
         data.append(line(k, y, f"{1e3 * value:g} g·m²", shade, xaxis="x2", yaxis="y2"))
         names.append(_end(f"{1e3 * value:g} g·m²", k[-1], y[-1], shade, "2"))
     for p in points:
@@ -139,7 +139,3 @@ def _grid(points: Sequence[Point]) -> tuple[FloatArray, FloatArray]:
     stiffness: FloatArray = np.geomspace(min(100.0, k.min() / 2), max(4000.0, 1.5 * k.max()), 40)
     inertia: FloatArray = np.geomspace(min(3e-4, j.min() / 2), max(2e-2, 1.5 * j.max()), 40)
     return stiffness, inertia
-
-
-def _band(k_s: FloatArray, inertia: FloatArray) -> FloatArray:
-    return np.asarray(np.sqrt(PAPER_FACTOR * k_s / inertia) / (2.0 * np.pi))

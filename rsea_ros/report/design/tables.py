@@ -19,7 +19,7 @@ def checks_table(designs: Sequence[Design]) -> str:
     rows = []
     for i, check in enumerate(designs[0].checks):
         sign = "≥" if check.least else "≤"
-        limit = f"{sign} {words.number(check.limit)} {_unit(check)}"
+        limit = f"{sign} {words.number(check.limit)} {words.unit(check.unit)}"
         rows.append([check.name, limit, *(_cell(d.checks[i]) for d in designs)])
     met = [d for d in designs if d.feasible]
     finding = (
@@ -31,12 +31,9 @@ def checks_table(designs: Sequence[Design]) -> str:
 
 
 def _cell(check: Check) -> str:
-    value = "not possible" if math.isnan(check.value) else f"{words.number(check.value)} {_unit(check)}"
+    number = f"{words.number(check.value)} {words.unit(check.unit)}"
+    value = "not possible" if math.isnan(check.value) else number
     return f"{'✓' if check.met else '✗'} {value}"
-
-
-def _unit(check: Check) -> str:
-    return "°" if check.unit == "deg" else words.unit(check.unit)
 
 
 def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
@@ -54,10 +51,10 @@ def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
     body = [
         [
             words.train(row.train),
-            signed(row.turns, 0),
-            signed(1e3 * row.inner, 2),
-            hertz(row.band),
-            " to ".join(hertz(v) for v in row.band_range),
+            words.signed(row.turns, 0),
+            words.signed(1e3 * row.inner, 2),
+            words.hertz(row.band),
+            " to ".join(words.hertz(v) for v in row.band_range),
             f"{row.for_band:.0f}",
             f"{row.least:.0f}",
         ]
@@ -71,21 +68,11 @@ def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
         f"widens the band. Train: {d.unit.sources['train']}."
     )
     title = (
-        "Which way the rotor turns is not known: both senses side by side"
+        "The sense of rotation is not known: both are shown"
         if sense_unknown(rows)
-        else "What the rotor's spin makes of the band"
+        else "Effect of the rotor's spin on the band"
     )
     return section(title, table(head, body, numbers=range(1, 7)), caption=caption)
-
-
-def signed(value: float, digits: int) -> str:
-    """Return a number with its sign."""
-    return f"{value:+.{digits}f}".replace("-", "−")
-
-
-def hertz(value: float) -> str:
-    """Return a frequency, or that it has no limit."""
-    return "no limit" if math.isinf(value) else f"{value:.1f}"
 
 
 def springs_table(designs: Sequence[Design]) -> str:
@@ -107,7 +94,7 @@ def springs_table(designs: Sequence[Design]) -> str:
         )
     short = 100.0 * designs[0].error
     caption = (
-        f"Eq. (9) turned round, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
+        f"Eq. (9) inverted, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
         f"{math.degrees(r.deflection):g}°, where the sin·cos "
         f"law of Eq. (8) falls {short:.2f} % short of linear."
     )
@@ -136,7 +123,7 @@ def margins_table(d: Design) -> str:
 
 
 def _margin_row(m: Margin) -> list[str]:
-    sign = "°" if m.unit == "deg" else words.unit(m.unit)
+    sign = words.unit(m.unit)
     if math.isnan(m.limit):
         return [m.name, "", "", "", "", f"{100 * m.share:.1f} %"]
     values = ["not possible" if math.isinf(v) else f"{words.number(v)} {sign}" for v in m.percentiles]

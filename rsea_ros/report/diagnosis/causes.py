@@ -18,11 +18,11 @@ from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.wording import listed
 
 _WIDTH, _HEIGHT = 180.0, 18.0
-_GAIN = "Gain: share of the residual that is gone, on data that took no part in any fit or choice."
+_GAIN = "Gain: share of the residual that the cause removes, on held-out data."
 
 
 def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
-    """Return what a cause of a diagnosis is, how large, how sure, and why it was accepted."""
+    """Return a cause with its size, its certainty, and the evidence for it."""
     share = f"{num.percent(cause.gain_holdout)} of the {words.channel(cause.channel)} residual"
     how_sure = standing(cause, diagnosis.alternatives, diagnosis.at_noise_floor)
     body = [_sizes(cause), paragraph(words.sentence(f"{say.prose(how_sure)}."))]
@@ -34,7 +34,7 @@ def cause_section(cause: Cause, diagnosis: Diagnosis) -> str:
 def _gain(cause: Cause) -> str:
     interval = num.percent_range(cause.gain_holdout_ci95)
     train = num.percent(cause.gain_train)
-    return f"95 % interval of that gain: {interval}; on the data of the fit it is {train}."
+    return f"95 % interval of that gain: {interval}; on the training data it is {train}."
 
 
 def _sizes(cause: Cause) -> str:
@@ -63,7 +63,7 @@ def _rivals(cause: Cause) -> str:
 
 
 def tried_section(diagnosis: Diagnosis) -> str:
-    """Return all that was tried: causes and fitted rivals with their gains, then the others by reason."""
+    """Return all effects tried: causes and fitted rivals with their gains, then the others by reason."""
     if not (diagnosis.causes or diagnosis.rejected):
         return ""
     rows = [_row(c.name, c.gain_holdout, STATUS[c.status], strong=True) for c in diagnosis.causes]

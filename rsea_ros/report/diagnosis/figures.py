@@ -14,11 +14,10 @@ from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.figures.figure import Figure, band
 from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
-from rsea_ros.report.figures.spectrum import Curve, finding, in_bands, residual_figure
+from rsea_ros.report.figures.spectrum import ABOVE_FLOOR, Curve, finding, in_bands, residual_figure
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import listed
 
-_ABOVE = 2.0
 _FIRST_VIEW = 3.0
 """s of the record that the figure over time opens with."""
 
@@ -37,7 +36,7 @@ def spectrum_figure(diagnosis: Diagnosis, spectrum: Spectrum) -> Figure:
 
 
 def _gained(spectrum: Spectrum) -> dict[str, object]:
-    """Return the area between before and after: what was gained."""
+    """Return the area between before and after, the improvement."""
     frequency, before = in_bands(spectrum.frequency, spectrum.before)
     _, after = in_bands(spectrum.frequency, spectrum.after)
     return band(frequency, np.minimum(after, before), before, faint(BEFORE, 0.10), name="gained")
@@ -48,11 +47,11 @@ def _before_and_after(diagnosis: Diagnosis, s: Spectrum) -> str:
     f, before = in_bands(s.frequency, s.before / s.noise)
     _, after = in_bands(s.frequency, s.after / s.noise)
     k, left = int(np.argmax(before)), int(np.argmax(after))
-    peak = f"{words.number(before[k], 2)} times above the noise floor at {words.number(f[k], 2)} Hz"
+    peak = f"{words.number(before[k], 2)} times the noise floor at {words.number(f[k], 2)} Hz"
     rest = f"at most {words.number(after[left], 2)} times at {words.number(f[left], 2)} Hz"
-    end = "it lies on the floor" if after[left] < _ABOVE else rest
+    end = "it is at the floor" if after[left] < ABOVE_FLOOR else rest
     them = "it" if len(diagnosis.causes) == 1 else "them"
-    return f"Without {causes} the residual stands up to {peak}; with {them}, {end}"
+    return f"Without {causes} the residual is up to {peak}; with {them}, {end}"
 
 
 def time_figure(diagnosis: Diagnosis, channel: str) -> Figure:

@@ -11,13 +11,13 @@ from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.overlay import overlay_records
 from rsea_ros.report.diagnosis.page import diagnosis_report
+from rsea_ros.report.file_names import DIAGNOSIS_JSON, MODEL, OVERLAY, REPORT
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import Record
 
 OverlayWriter = Callable[[Mapping[str, Record], Path], None]
 """Writes records by namespace into one bag file: msg_adapters.overlay.write_overlay."""
-JSON, MODEL, OVERLAY, REPORT = NAMES = ("diagnosis.json", "model.yaml", "overlay.mcap", "report.html")
 
 
 def write_diagnosis(
@@ -33,7 +33,7 @@ def write_diagnosis(
     BagError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(JSON, json_text(with_provenance(diagnosis_json(diagnosis), provenance)))
+        new.write(DIAGNOSIS_JSON, json_text(with_provenance(diagnosis_json(diagnosis), provenance)))
         new.write(MODEL, rig_text(diagnosis.extended_rig))
         write(overlay_records(diagnosis, record), new.staged(OVERLAY))
         return new.write(REPORT, diagnosis_report(diagnosis, provenance))

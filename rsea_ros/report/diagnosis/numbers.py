@@ -24,12 +24,12 @@ def gain(diagnosis: Diagnosis, channel: str) -> float:
 
 def percent(share: float, digits: int = 1) -> str:
     """Return a share as `97.3 %`, with a minus sign that is one."""
-    return f"{100.0 * share:.{digits}f} %".replace("-", "−") if np.isfinite(share) else "–"
+    return words.minus(f"{100.0 * share:.{digits}f} %") if np.isfinite(share) else "–"
 
 
 def percent_range(interval: tuple[float, float]) -> str:
     """Return an interval of shares as `97.1 to 97.5 %`."""
-    low, high = (f"{100.0 * side:.1f}".replace("-", "−") for side in interval)
+    low, high = (words.minus(f"{100.0 * side:.1f}") for side in interval)
     return f"{low} to {high} %"
 
 

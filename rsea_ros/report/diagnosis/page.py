@@ -28,7 +28,7 @@ from rsea_ros.report.remark_words import remark_sentences
 
 
 def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
-    """Return the report as HTML that opens without a network."""
+    """Return the report as HTML that opens offline."""
     d = diagnosis
     footer = [f"Data: {', '.join(d.sources)}", "rsea diagnose. All values in SI."]
     footer += provenance.lines if provenance else ()
@@ -36,7 +36,7 @@ def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None)
 
 
 def _blocks(d: Diagnosis) -> Iterator[Block]:
-    """Yield the page from top to bottom: the verdict first, then what it rests on."""
+    """Yield the page from top to bottom: the verdict first, then the evidence."""
     main = d.channel
     yield key_numbers(_keys(d, main))
     if d.faults:
@@ -64,7 +64,7 @@ def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
     """Return the numbers of the first screen."""
     channel = words.channel(main)
     if d.causes:
-        gone = (num.percent(num.gain(d, main)), f"of the {channel} residual gone, on data that took no part")
+        gone = (num.percent(num.gain(d, main)), f"of the {channel} residual removed, on held-out data")
         return [gone, (num.residual_change(d, main), "times the noise, before and after")]
     keys = [(num.residual_change(d, main), f"times the noise is the {channel} residual")]
     if d.rejected:
@@ -78,7 +78,7 @@ def _kicker(d: Diagnosis) -> str:
 
 def _untold(d: Diagnosis) -> str:
     told = [*say.confusions(d), *remark_sentences(d.remarks)]
-    body = bullets(told) if told else paragraph("Nothing that was asked for.")
+    body = bullets(told) if told else paragraph("The data determine every free value.")
     return section("What these data cannot determine", body)
 
 
@@ -88,19 +88,19 @@ def _faults(d: Diagnosis) -> str:
             "No fault was found in the data", paragraph("No sample is missing, frozen or clipped.")
         )
     items = bullets([words.sentence(f"{line}.") for line in fault_lines(d.faults)])
-    caption = "Found before any fit. Faulty samples are masked, never explained by physics."
+    caption = "These faults were found before any fit. Faulty samples are masked, never explained by physics."
     return section("Faults of the data", items, caption=caption)
 
 
 def _baseline(d: Diagnosis) -> str:
-    """Return the values before the causes, folded: each of them has taken over what the causes do."""
-    title = "The rig's values as fitted before any cause was looked for"
+    """Return the values fitted before the causes, folded: they compensate the missing causes."""
+    title = "Values of the rig, fitted before the search for causes"
     return folded(title, parameter_table(d.baseline)) if d.causes else ""
 
 
 def _final(d: Diagnosis) -> str:
     """Return the rig's values at the end: beside all causes, where there are any."""
-    title = "The rig's values beside the causes" if d.causes else "The rig's values"
+    title = "Values of the rig together with the causes" if d.causes else "Values of the rig"
     return section(title, parameter_table(final_values(d)))
 
 

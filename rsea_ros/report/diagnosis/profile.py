@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.identification.residual_bins import edges_of, rms_in
 from rsea_ros.identification.result import Overlay
 from rsea_ros.model.prediction import SETTLE
 from rsea_ros.signals import UNITS, FloatArray
@@ -47,8 +48,8 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
         return ()
     found = []
     for what, unit, values, equal in _respects(diagnosis, before, here):
-        edges = _edges(values[counted], equal)
-        found.append(Profile(what, unit, edges, *(_rms_in(edges, values[counted], r) for r in residuals)))
+        edges = edges_of(values[counted], BINS, equal=equal)
+        found.append(Profile(what, unit, edges, *(rms_in(edges, values[counted], r) for r in residuals)))
     return tuple(found)
 
 
@@ -76,20 +77,3 @@ def _respects(
 
 def _at(t: FloatArray, overlay: Overlay) -> FloatArray:
     return np.interp(t, overlay.t, overlay.measured)
-
-
-def _edges(values: FloatArray, equal: bool) -> FloatArray:
-    shares = np.linspace(0.0, 1.0, BINS + 1)
-    edges = values.min() + shares * np.ptp(values) if equal else np.quantile(values, shares)
-    distinct: FloatArray = np.unique(edges)
-    return distinct if len(distinct) > 1 else np.array([distinct[0], distinct[0] + 1e-12])
-
-
-def _rms_in(edges: FloatArray, values: FloatArray, residual: FloatArray) -> FloatArray:
-    """Return the RMS of the residual in each bin; NaN where a bin is empty."""
-    count = len(edges) - 1
-    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
-    number = np.bincount(which, minlength=count).astype(float)
-    power = np.bincount(which, residual**2, count) / np.where(number > 0.0, number, np.nan)
-    rms: FloatArray = np.sqrt(power)
-    return rms

@@ -9,7 +9,7 @@ from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.signal_table import Port
 
-_PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "what holds it")
+_PARTS = ("command", "motor", "gear", "encoder", "spring", "F/T sensor", "support")
 _OF_PORT = {
     Port.COMMAND: "motor",
     Port.MOTOR: "motor",

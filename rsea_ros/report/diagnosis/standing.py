@@ -1,4 +1,4 @@
-"""How sure a diagnosis is of each cause, in sentences: status, size, interval, probability, rivals."""
+"""The certainty of each cause in sentences: status, size, interval, probability, rivals."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from rsea_ros.wording import listed
 
 STATUS = {"confirmed": "confirmed", "leading": "leading", "one_of": "one of"}
 _REASON = {
-    "confirmed": "it is surely part of what the simulation lacks",
-    "leading": "it surely helps on held-out data, and more is missing",
-    "one_of": "these data do not say which",
+    "confirmed": "the simulation certainly lacks it",
+    "leading": "it certainly helps on held-out data, but part of the misfit remains",
+    "one_of": "these data do not distinguish them",
 }
 
 
@@ -26,7 +26,7 @@ def standing(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: b
     said = [f"{sized(item)}, probability {item.probability:.2f}" for item in items]
     reason = _REASON[cause.status]
     if at_floor and cause.status == "leading":
-        reason = "it takes the residual to the noise, but another law may do the same"
+        reason = "it reduces the residual to the noise, but another law may do the same"
     if cause.status == "one_of" and rivals:
         return f"one of: {listed(said, 'or')}; {reason}"
     text = f"{STATUS[cause.status]}: {said[0]}; {reason}"
@@ -40,7 +40,7 @@ def standings(diagnosis: Diagnosis) -> list[str]:
 
 
 def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternative]:
-    """Return what stands against a cause, the likeliest first."""
+    """Return the rivals of a cause, the likeliest first."""
     return sorted((a for a in alternatives if a.instead_of == cause.name), key=lambda a: -a.probability)
 
 

@@ -18,7 +18,7 @@ _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "r
 
 
 def channel_section(diagnosis: Diagnosis) -> str:
-    """Return every channel with its residual before and after, held out."""
+    """Return every channel with its held-out residual before and after."""
     changed = ("#Residual before", "#after", "#Times the noise before", "#after")
     head = (
         "Channel",
@@ -27,7 +27,7 @@ def channel_section(diagnosis: Diagnosis) -> str:
     )
     reached = "All channels are" if diagnosis.at_noise_floor else "Not all channels are"
     rows = [_channel(diagnosis, name) for name in diagnosis.residual_rms]
-    caption = "On data that took no part in any fit or choice."
+    caption = "On held-out data."
     return section(f"{reached} at their noise", table_of_rows(head, rows), caption=caption)
 
 
@@ -41,7 +41,7 @@ def _channel(d: Diagnosis, name: str) -> str:
 
 
 def experiment_section(experiment: Experiment) -> str:
-    """Return what the next run would tell, its settings, and the command that plays it."""
+    """Return the purpose of the next run, its settings, and the command that plays it."""
     settings = words.sentence(say.excitation(experiment.excitation))
     run = paragraph(f"{settings}.") if settings else ""
     title = "The run that would decide" if experiment.excitation else "What would decide"
@@ -52,6 +52,6 @@ def _command(experiment: Experiment) -> str:
     given = experiment.excitation
     settings = {k: given[k] for k in _EXCITE if k in given}
     if "kind" not in settings or given.get("unit") != UNITS["command"]:
-        return ""  # excite plays torques, no positions
+        return ""  # excite plays torques, not positions
     options = " ".join(f"-p {k}:={v}" for k, v in settings.items())
     return f"<p class='under'>{code(f'ros2 run rsea_ros excite --ros-args {options}')}</p>"

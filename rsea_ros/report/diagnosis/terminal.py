@@ -22,7 +22,7 @@ _MOST = 3
 
 
 def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
-    """Return the verdict and what it rests on, a line each."""
+    """Return the verdict and the evidence, one line each."""
     lines = [Text(say.headline(diagnosis), style=_STYLES.get(diagnosis.verdict, "bold green"))]
     return [*lines, *(Text.assemble((name.ljust(_WIDTH), "dim"), text) for name, text in _rows(diagnosis))]
 

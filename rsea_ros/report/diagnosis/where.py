@@ -50,7 +50,7 @@ def finding(profiles: Sequence[Profile]) -> str:
     if most.contrast >= _DEPENDS or not physical:
         return f"The residual depends most on {say.respect(most.what)}: {_extremes(most)}"
     respects = listed([say.respect(p.what) for p in physical], "or")
-    alike = f"The residual is alike at every {respects}"
+    alike = f"The residual is the same at every {respects}"
     changing = [p for p in profiles if p.what == "time" and p.contrast >= _DEPENDS]
     return f"{alike}; over time it changes: {_extremes(changing[0])}" if changing else alike
 

@@ -15,18 +15,18 @@ from rsea_ros.wording import listed
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
 _REASONS: Mapping[Reason, str] = {
-    "far_behind": "far behind the best on the data of the fit",
-    "at_bound": "its size ran to the bound of what such an effect has",
-    "not_sure": "does not surely lower the residual of data that it was not fitted to",
-    "too_small": "lowers the residual of data that it was not fitted to, but by too little",
+    "far_behind": "much worse than the best effect on the training data",
+    "at_bound": "its fitted size is at the bound of the effect",
+    "not_sure": "does not certainly lower the residual of held-out data",
+    "too_small": "lowers the residual of held-out data, but by too little",
     "leaves_priors": "gains less than it costs to leave the rig's values so far outside their stated doubt",
     "explains_less": "{rival} explains more",
     "no_better_than_simpler": "no better than {rival}, which is simpler",
-    "no_better_than_likelier": "no better than {rival}, which needs less of what is known beforehand",
-    "redundant": "not needed beside the other causes",
-    "replaced": "another took its place beside the causes that came later",
-    "improbable": "helps, but its law does not fit what it takes away: probability {probability:.2f}",
-    "leaves_too_much": "helps, but leaves so much that it may stand in for something else",
+    "no_better_than_likelier": "no better than {rival}, which agrees better with the priors",
+    "redundant": "not needed in addition to the other causes",
+    "replaced": "replaced by another effect after later causes were added",
+    "improbable": "helps, but its law does not fit the data: probability {probability:.2f}",
+    "leaves_too_much": "helps, but leaves so much that it may replace another effect",
 }
 _RESPECTS = {
     "frequency_band": "frequency",
@@ -38,18 +38,18 @@ _RESPECTS = {
 
 
 def effect(name: str) -> str:
-    """Return the plain name of an effect, as it stands within a sentence."""
+    """Return the plain name of an effect for use within a sentence."""
     return " ".join(_PROPER.get(word, word) for word in name.split("_"))
 
 
 def rejection(rejected: Rejected) -> str:
-    """Return why an effect is no cause, as a part of a sentence."""
+    """Return the reason for a rejection, as part of a sentence."""
     probability = rejected.probability or 0.0
     return _REASONS[rejected.reason].format(rival=rejected.rival, probability=probability)
 
 
 def respect(what: str) -> str:
-    """Return the plain name of what a residual is laid out against."""
+    """Return the plain name of the quantity of a residual profile."""
     return _RESPECTS.get(what, what.replace("_", " "))
 
 
@@ -59,7 +59,7 @@ def prose(text: str) -> str:
 
 
 def size(cause: Cause) -> str:
-    """Return a cause's main parameter, `3.00 N·m`, or with its name where it has no unit."""
+    """Return the main parameter of a cause, `3.00 N·m`, with its name if it has no unit."""
     name, estimate = next(iter(cause.parameters.items()))
     number = words.quantity(estimate.value, estimate.unit, 3)
     return number if estimate.unit != "1" else f"{name.replace('_', ' ')} {number}"
@@ -78,18 +78,18 @@ def headline(diagnosis: Diagnosis) -> str:
     if d.verdict == "unexplained" and silent and before <= AT_NOISE:
         return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
     if d.verdict == "nothing_wrong":
-        return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
+        return "Nothing is wrong with the simulation: with fitted values, only sensor noise is left"
     if d.verdict == "unexplained":
         near = f"{math.ceil(100.0 * before) / 100.0:.2f} times"  # never rounded down to the floor
         size = f"{near if before < 2.0 else _times(before)} the noise"
-        return f"The {channel} residual is {size}, and nothing in the catalogue explains it"
-    is_, it, explains = ("is", "it", "explains") if len(d.causes) == 1 else ("are", "them", "explain")
-    if d.at_noise_floor and d.verdict == "partly_explained":
-        rest = f"{is_} probably what the simulation lacks; with {it}, only noise is left"
-        return words.sentence(f"{named(d.causes)} {rest}")
-    rest = f"{explains} a part of what the simulation gets wrong; the rest stays unexplained"
+        return f"The {channel} residual is {size}, and no effect of the catalogue explains it"
+    explains = "explains" if len(d.causes) == 1 else "explain"
     if d.verdict == "explained":
-        rest = f"{is_} what the simulation lacks; with {it}, only noise is left"
+        rest = f"{explains} the misfit; only noise is left"
+    elif d.at_noise_floor:
+        rest = f"probably {explains} the misfit; only noise is left"
+    else:
+        rest = f"{explains} part of the misfit; the rest stays unexplained"
     return words.sentence(f"{named(d.causes)} {rest}")
 
 
@@ -100,7 +100,7 @@ def misfit(m: Misfit) -> str:
 
 
 def confusions(diagnosis: Diagnosis) -> list[str]:
-    """Return a sentence for each cause that these data cannot tell from others."""
+    """Return a sentence for each cause that these data do not distinguish from others."""
     return [
         words.sentence(
             f"{effect(c.name)}: these data do not distinguish it from {_either(c.confusable_with)}."
@@ -111,7 +111,7 @@ def confusions(diagnosis: Diagnosis) -> list[str]:
 
 
 _BY_THE_WAY = ("rate", "seed", "period")
-"""Settings of an experiment that only the command that plays it needs."""
+"""Settings of an experiment that matter only to the command that plays it."""
 
 
 def excitation(settings: Mapping[str, float | str]) -> str:

@@ -1,1 +1,1 @@
-"""A designed run and a session of such runs: pages, sentences, experiment.json."""
+"""A designed run: page, sentences, experiment.json."""

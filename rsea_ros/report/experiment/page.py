@@ -1,4 +1,4 @@
-"""The page of a designed run: what it separates, what it asks of the bench, how it looks."""
+"""The page of a designed run: the causes that it separates, its demands on the bench, its command."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:
         ]
         blocks += [limits_section(p, advice.asked.limits.stated())]
     if advice.proofs:
-        blocks.append(section("What no run separates", bullets([proof_words(x) for x in advice.proofs])))
+        blocks.append(section("Not separable by any run", bullets([proof_words(x) for x in advice.proofs])))
     rig = advice.hypotheses[0].problem.rig.name
     return page(
         verdict(advice), f"The next experiment · {rig}", blocks, provenance.lines if provenance else ()
@@ -75,7 +75,7 @@ def _separations(p: Proposal) -> str:
         "has been fitted to the run. 6 makes odds of twenty to one."
     )
     head = ("true \\ rival", *(plain_name(n) for n in p.names))
-    return section("What the run separates", table(head, rows, range(1, len(head))), caption=caption)
+    return section("Causes that the run separates", table(head, rows, range(1, len(head))), caption=caption)
 
 
 def _number(value: float) -> str:
@@ -86,7 +86,7 @@ def limits_section(p: Proposal, stated: dict[str, float]) -> str:
     """Return what a run asks of the bench beside what it may."""
     head = ("quantity", "expected", "at level", "limit", "unit")
     return section(
-        "What it asks of the bench",
+        "Demands on the bench",
         table(head, limit_rows(p, stated), {1, 2, 3}),
         caption=f"At level: {LEVEL_WORDS}.",
     )

@@ -1,4 +1,4 @@
-"""What a designed run says, in sentences."""
+"""A designed run in sentences."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def verdict(advice: Advice) -> str:
     p = advice.proposal
     names = [plain_name(h.name) for h in advice.hypotheses]
     if p is None:
-        return f"No run within the limits tells {listed(names)} apart"
+        return f"No run within the limits separates {listed(names)}"
     if len(names) == 1:
         times = 2.718281828**p.sharpened
-        return f"The next run narrows what is known of {names[0]} {times:.3g} times: {shape_words(p)}"
+        return f"The next run narrows the interval of {names[0]} {times:.3g} times: {shape_words(p)}"
     share = f"{100.0 * p.decided:.0f} %"
     return f"The next run is expected to decide between {listed(names)} in {share} of cases: {shape_words(p)}"
 
@@ -45,7 +45,7 @@ def proof_words(proof: Proof) -> str:
         f"{low:.2g} to {high:.3g} Hz within the limits separates them by more than S = {b.most:.2g} "
         "(6 makes odds of twenty to one)"
     )
-    return f"{head}. Measure apart: {'; or '.join(a.what for a in proof.apart)}."
+    return f"{head}. Measure separately: {'; or '.join(a.what for a in proof.apart)}."
 
 
 def limit_rows(p: Proposal, stated: dict[str, float]) -> list[tuple[str, str, str, str, str]]:

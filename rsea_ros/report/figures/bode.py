@@ -38,24 +38,8 @@ def _gain(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
     side = _SIDE * shown.sd / np.abs(shown.response)
     decibel = 20.0 * np.log10(np.abs(shown.response))
     low, high = (decibel + _decibel(1.0 + s) for s in (-side, side))
-    traces = [
-        band(shown.frequency, low, high, faint(MEASURED, 0.28), yaxis="y"),
-        line(
-            shown.frequency,
-            decibel,
-            "measured",
-            faint(MEASURED, 0.55),
-            5.0,
-            yaxis="y",
-            hovertemplate="%{y:.2f} dB",
-        ),
-    ]
-    if model is not None:
-        gain = 20.0 * np.log10(np.abs(model))
-        traces.append(
-            line(shown.frequency, gain, "model", AFTER, 1.6, yaxis="y", hovertemplate="%{y:.2f} dB")
-        )
-    return traces
+    gain = None if model is None else 20.0 * np.log10(np.abs(model))
+    return _measured_and_model(shown.frequency, (low, decibel, high), gain, "y", "%{y:.2f} dB")
 
 
 def _phase(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
@@ -63,24 +47,27 @@ def _phase(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
     smooth = np.unwrap(np.angle(reference))
     measured = np.degrees(smooth + np.angle(shown.response / reference))
     side = np.degrees(np.arcsin(np.minimum(_SIDE * shown.sd / np.abs(shown.response), 1.0)))
+    phase = None if model is None else np.degrees(smooth)
+    return _measured_and_model(
+        shown.frequency, (measured - side, measured, measured + side), phase, "y2", "%{y:.1f}°"
+    )
+
+
+def _measured_and_model(
+    hz: FloatArray,
+    measured: tuple[FloatArray, FloatArray, FloatArray],
+    model: FloatArray | None,
+    yaxis: str,
+    hover: str,
+) -> list[Json]:
+    """Return the measured values with their band, and the model's on top. measured: low, middle, high."""
+    low, middle, high = measured
+    place = {"yaxis": yaxis, "hovertemplate": hover}
     traces = [
-        band(shown.frequency, measured - side, measured + side, faint(MEASURED, 0.28), yaxis="y2"),
-        line(
-            shown.frequency,
-            measured,
-            "measured",
-            faint(MEASURED, 0.55),
-            5.0,
-            yaxis="y2",
-            hovertemplate="%{y:.1f}°",
-        ),
+        band(hz, low, high, faint(MEASURED, 0.28), yaxis=yaxis),
+        line(hz, middle, "measured", faint(MEASURED, 0.55), 5.0, **place),
     ]
-    if model is not None:
-        phase = np.degrees(smooth)
-        traces.append(
-            line(shown.frequency, phase, "model", AFTER, 1.6, yaxis="y2", hovertemplate="%{y:.1f}°")
-        )
-    return traces
+    return traces if model is None else [*traces, line(hz, model, "model", AFTER, 1.6, **place)]
 
 
 def _ratio(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:

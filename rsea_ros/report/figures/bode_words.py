@@ -31,7 +31,7 @@ def finding(measured: FrequencyResponse, model: ComplexArray | None) -> str:
             f"of the frequencies from {_range(measured.frequency)}"
         )
     decibel = 20.0 * np.log10(np.abs(model[worst] / measured.response[worst]))
-    where = f"{words.number(measured.frequency[worst])} Hz ({decibel:+.1f} dB)".replace("-", "−")
+    where = words.minus(f"{words.number(measured.frequency[worst])} Hz ({decibel:+.1f} dB)")
     return words.sentence(f"{what}: the model leaves the measured 95 % circle, most at {where}")
 
 

@@ -1,4 +1,4 @@
-"""Few colours, each with one meaning on every page. Blue and orange are told apart by colour-blind eyes."""
+"""Few colours, each with one meaning on every page; colour-blind readers can distinguish them."""
 
 INK = "#1f2933"
 QUIET = "#66717d"

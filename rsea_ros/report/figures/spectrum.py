@@ -14,7 +14,8 @@ from rsea_ros.signals import UNITS, FloatArray
 
 _PER_DECADE = 40
 _LONGEST = 4096
-_ABOVE = 2.0
+ABOVE_FLOOR = 2.0
+"""Times the noise floor, from which a density of a band stands above it and does not merely scatter."""
 _TINY = 1e-300
 _LABEL = 0.06
 """Height of a label, of the figure's."""
@@ -82,9 +83,9 @@ def finding(frequency: FloatArray, values: FloatArray, noise: float, what: str) 
     f, d = in_bands(frequency, values)
     ratio = d / max(noise, _TINY)
     worst = int(np.argmax(ratio))
-    if ratio[worst] < _ABOVE:
+    if ratio[worst] < ABOVE_FLOOR:
         return words.sentence(f"{what}: the residual lies at the noise floor at all frequencies")
-    above = f[ratio > _ABOVE]
+    above = f[ratio > ABOVE_FLOOR]
     band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
     most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
     return words.sentence(f"{what}: the residual stands above the noise floor from {band}, most at {most}")

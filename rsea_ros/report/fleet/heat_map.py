@@ -27,7 +27,7 @@ _OFTEN = 0.5
 
 
 def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: Steps, links: Links) -> str:
-    """Return the section of a parameter, the first joint on top; grey where recordings could not tell."""
+    """Return the section of a parameter, the first joint on top; grey if not determined."""
     rows = [fleet.trends.get((joint, parameter), fleet.sizes.get((joint, parameter))) for joint in joints]
     shown = [_row(trend, steps) for trend in rows]
     change, undetermined = np.array([c for c, _ in shown]), np.array([u for _, u in shown])
@@ -40,7 +40,7 @@ def heat_map(parameter: str, joints: Sequence[str], fleet: FleetTrends, steps: S
         picture,
         _key(percent(-full), "as on the first day", percent(full), (-1.0, 1.0)),
         caption=f"Mean of each {steps.name} against the joint's first level, at its mean temperature. Grey: "
-        "recordings, but none that could tell. Empty: no recording.",
+        "recordings that do not determine it. Empty: no recording.",
     )
 
 
@@ -64,7 +64,7 @@ def naming_map(
         f"{plain}: often in {often} of {len(fleet.joints)} joints",
         picture,
         _key("no recording", "", f"all recordings of the {steps.name}", (0.0, 1.0)),
-        caption=f"Share of the recordings of each {steps.name} that name it, for the joints that do at all.",
+        caption=f"Share of the recordings of each {steps.name} that name it, for joints with at least one.",
     )
 
 

@@ -1,4 +1,4 @@
-"""The page of a joint: what to look at, each parameter over time, causes, the recordings that show it."""
+"""The page of a joint: findings, each parameter over time, causes, recordings."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _blocks(
     yield '<p class="next"><a href="index.html">All joints</a></p>'
     yield key_numbers(_keys(trends, recordings, rows))
     if alarms:
-        yield section("What to look at", alarm_table(alarms, links, with_joint=False))
+        yield section("Findings", alarm_table(alarms, links, with_joint=False))
     yield from _pictures(joint, trends, fleet, steps)
     yield section("All parameters", parameter_rows(trends))
     yield folded("The latest recordings", _recordings(recordings, rows, links))
@@ -103,7 +103,7 @@ def _keys(trends: Sequence[Trend], recordings: Table, rows: np.ndarray) -> list[
     done = int(np.sum(np.asarray(recordings["outcome"], str)[rows] == "done"))
     faulty = sum(bool(len(recordings["faults"][i])) for i in rows if recordings["faults"][i] is not None)
     return [
-        (f"{determined} of {len(trends)}", "parameters that the recordings tell"),
+        (f"{determined} of {len(trends)}", "parameters determined by the recordings"),
         (str(done), f"recordings used, of {len(rows)}"),
         (str(faulty), "recordings with faults in the data"),
     ]
@@ -113,7 +113,7 @@ def _quiet(fleet: FleetTrends, joint: str) -> str:
     trends = [t for (j, _), t in fleet.trends.items() if j == joint]
     determined = [t for t in trends if t.state != "undetermined"]
     return (
-        f"steady in all {len(determined)} parameters that its recordings tell"
+        f"steady in all {len(determined)} parameters that its recordings determine"
         if determined
         else "too few recordings yet"
     )

@@ -1,4 +1,4 @@
-"""What the latest recording of a joint names: before there are enough for a trend, that is the news."""
+"""Causes in the latest recording of a joint, for a fleet with too few recordings for trends."""
 
 from __future__ import annotations
 

@@ -8,7 +8,9 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
-_RESULTS = ("report.html", "diagnosis.json", "identification.json")
+from rsea_ros.report.file_names import DIAGNOSIS_JSON, IDENTIFICATION_JSON, REPORT
+
+_RESULTS = (REPORT, DIAGNOSIS_JSON, IDENTIFICATION_JSON)
 """What shows a recording's diagnosis best, in this order."""
 
 

@@ -61,7 +61,7 @@ def _blocks(
         yield naming_map(what, kind, _naming(fleet, kind, what, joints)[:_ROWS], fleet, steps, links)
     yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
     yield _undetermined(fleet, links)
-    yield folded("How sure this is", bullets(_sure(fleet)))
+    yield folded("Certainty of these findings", bullets(_sure(fleet)))
 
 
 def _mapped(fleet: FleetTrends) -> list[str]:
@@ -81,7 +81,7 @@ def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) ->
     if not any(t.state != "undetermined" for t in fleet.trends.values()):
         latest = [f"{what} in {joint}" for joint, what in latest_causes(fleet.joints, recordings).items()]
         now = f"; the latest name {listed(latest[:_NAMED])}" if latest else ""
-        return f"Too few recordings yet to say what changes{now}"
+        return f"Too few recordings yet for trends{now}"
     groups = by_joint(alarms)
     if not groups:
         return f"All {len(fleet.joints)} joints are steady"
@@ -119,7 +119,7 @@ def _undetermined(fleet: FleetTrends, links: Links) -> str:
     undetermined = undetermined_trends(fleet)
     if not undetermined:
         return section(
-            "Nothing was left undetermined", paragraph("Every joint's recordings tell every parameter.")
+            "Nothing was left undetermined", paragraph("All recordings determine all parameters.")
         )
     number = "One course" if len(undetermined) == 1 else f"{len(undetermined)} courses"
     title = f"{number} cannot be determined"
@@ -133,11 +133,11 @@ def _sure(fleet: FleetTrends) -> list[str]:
         f"{fleet.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
         f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
         f"and Hochberg, over all joints and parameters of this look).",
-        "Recordings of one day count as one draw: what a day does to a joint (mounting, grease, zeros) is "
-        "estimated from the scatter of the days, by restricted likelihood, and is no change.",
+        "Recordings of one day count as one draw: the effect of a day (mounting, grease, zeros) is "
+        "estimated from the scatter of the days, by restricted likelihood, and is not a change.",
     ]
     if warm:
-        lines.append(f"A kelvin changes, as the joints of this fleet tell each other: {listed(warm)}.")
+        lines.append(f"Change per kelvin, estimated across the joints of this fleet: {listed(warm)}.")
     return lines
 
 

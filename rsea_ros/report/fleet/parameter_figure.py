@@ -18,7 +18,7 @@ _AHEAD = 0.5
 
 
 def parameter_figure(trend: Trend, steps: Steps) -> Figure:
-    """Return the figure of a parameter that the recordings tell."""
+    """Return the figure of a parameter that the recordings determine."""
     factor, unit = words.scaled(trend.now.value if trend.now else 1.0, trend.series.unit)
     bins = binned(trend, steps)
     ahead, until = _ahead(trend, steps, factor)
@@ -65,7 +65,7 @@ def _weeks(bins: Binned, steps: Steps, factor: float, unit: str) -> Json:
 
 
 def _undetermined(bins: Binned, steps: Steps) -> Json:
-    """Return a mark at the bottom for each week whose recordings could not tell the parameter."""
+    """Return a mark at the bottom for each week whose recordings could not determine the parameter."""
     none = (bins.recorded > 0) & (bins.identifiable == 0)
     return points(
         steps.middle[none],
@@ -109,7 +109,7 @@ def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float
         "fillcolor": faint(BEFORE, 0.15), "hoverinfo": "skip"}  # fmt: skip
     y = numbers(np.array([now.value, ends.value]) * factor)
     dashed = {"color": BEFORE, "width": 1.6, "dash": "dash"}
-    stroke = points(np.array([last, until]), y, "if it goes on", mode="lines", line=dashed, hoverinfo="skip")
+    stroke = points(np.array([last, until]), y, "forecast", mode="lines", line=dashed, hoverinfo="skip")
     return [fan, stroke], until
 
 

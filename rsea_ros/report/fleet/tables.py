@@ -84,7 +84,7 @@ def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) ->
 def parameter_rows(trends: Sequence[Trend]) -> str:
     """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
     head = [
-        "Parameter", "State", "#Now, 95 %", "#A year", "#A day scatters", "#Least step seen",
+        "Parameter", "State", "#Now, 95 %", "#A year", "#Scatter of days", "#Smallest detectable step",
         "#Determined by",
     ]  # fmt: skip
     rows = []
@@ -123,7 +123,7 @@ def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
 
 def _why(trend: Trend) -> str:
     if trend.state != "undetermined":
-        return f"Determined until {day(trend.silent_since_s)}, by none of the recordings since"
+        return f"Determined until {day(trend.silent_since_s)}, but by no later recording"
     return words.sentence(trend.reason)
 
 

@@ -62,7 +62,7 @@ def percent(share: float) -> str:
     """Return a relative change as `−15 %`, small ones with two significant digits."""
     size = abs(100.0 * share)
     digits = 0 if size >= 9.95 else 1 if size >= 0.095 else 2
-    text = f"{100.0 * share:+.{digits}f} %".replace("-", "−")
+    text = words.minus(f"{100.0 * share:+.{digits}f} %")
     return "0 %" if float(f"{size:.{digits}f}") == 0.0 else text
 
 

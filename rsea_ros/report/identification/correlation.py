@@ -13,7 +13,7 @@ from rsea_ros.report.page.html import folded, paragraph
 from rsea_ros.signals import FloatArray
 
 STRONG = 0.9
-"""Correlation from which two values are hardly told apart."""
+"""Correlation from which two values are hardly distinguishable."""
 
 
 def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
@@ -35,11 +35,11 @@ def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
 
 
 def finding(names: Sequence[str], matrix: FloatArray) -> str:
-    """Return a sentence on the pair that is told apart least."""
+    """Return a sentence on the pair that is least distinguishable."""
     apart = np.abs(np.where(np.eye(len(names), dtype=bool), 0.0, np.nan_to_num(matrix)))
     i, k = (int(v) for v in np.unravel_index(int(np.argmax(apart)), apart.shape))
     pair = f"{words.parameter(names[i])} and {words.parameter(names[k])}"
-    value = f"{matrix[i, k]:.2f}".replace("-", "−")
+    value = words.minus(f"{matrix[i, k]:.2f}")
     if apart[i, k] < STRONG:
         return f"No two are strongly correlated; the strongest pair is {pair} ({value})."
     return f"Strongly correlated: {pair} ({value}). An error of one is made good by the other."
@@ -50,5 +50,5 @@ def _cell(value: float) -> str:
     if not np.isfinite(value):
         return "<td class='number'>–</td>"
     shade = faint(AFTER if value >= 0.0 else BEFORE, 0.6 * min(1.0, abs(value)))
-    text = f"{value:.2f}".replace("-", "−")
+    text = words.minus(f"{value:.2f}")
     return f"<td class='number' style='background:{shade}'>{text}</td>"

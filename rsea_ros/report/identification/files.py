@@ -7,12 +7,11 @@ from pathlib import Path
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.report.file_names import IDENTIFICATION_JSON, MODEL, REPORT
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.identification.page import identification_report
 from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
-
-JSON, MODEL, REPORT = NAMES = ("identification.json", "model.yaml", "report.html")
 
 
 def write_results(
@@ -23,6 +22,7 @@ def write_results(
     Raises OutputError for a name that is taken, OSError where something cannot be written.
     """
     with NewFiles(out) as new:
-        new.write(JSON, json_text(with_provenance(identification_json(identification), provenance)))
+        contents = with_provenance(identification_json(identification), provenance)
+        new.write(IDENTIFICATION_JSON, json_text(contents))
         new.write(MODEL, rig_text(identification.rig))
         return new.write(REPORT, identification_report(identification, provenance))

@@ -13,20 +13,18 @@ from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, MEASURED
 from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.identification.correlation import correlation_section
-from rsea_ros.report.identification.parameters import clock_sentence, parameter_table, told
+from rsea_ros.report.identification.parameters import clock_sentence, how_determined, parameter_table
 from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import UNITS
-
-_ORDER = ("ft", "deflection", "position", "velocity")
+from rsea_ros.signals import SENSED, UNITS
 
 
 def identification_report(identification: Identification, provenance: Provenance | None = None) -> str:
-    """Return the report as HTML that opens without a network."""
+    """Return the report as HTML that opens offline."""
     blocks: list[Block] = [
         key_numbers(_keys(identification)),
         _next(identification),
@@ -44,17 +42,17 @@ def identification_report(identification: Identification, provenance: Provenance
 
 
 def main_channel(identification: Identification) -> str:
-    """Return the channel that the reader looks at first."""
-    present = [n for n in _ORDER if n in identification.residual_rms]
+    """Return the most important channel."""
+    present = [n for n in SENSED if n in identification.residual_rms]
     return present[0] if present else next(iter(identification.residual_rms), "")
 
 
 def _next(identification: Identification) -> str:
-    """Return what to do about a residual above the noise."""
+    """Return the next step for a residual above the noise."""
     command = next_command(identification)
     if not command:
         return ""
-    return f'<p class="next">What it is, and how much it would gain: {code(command)}</p>'
+    return f'<p class="next">To find the cause and its gain: {code(command)}</p>'
 
 
 def _keys(identification: Identification) -> list[tuple[str, str]]:
@@ -81,7 +79,7 @@ def _parameters(identification: Identification) -> str:
         _parameter_finding(identification),
         parameter_table(identification.parameters),
         f'<p class="caption under">{clock}</p>' if clock else "",
-        caption="Grey: what the rig stated, with its 95 % range. Blue: the result and its 95 % interval.",
+        caption="Grey: value of the rig with its 95 % range. Blue: result with its 95 % interval.",
     )
 
 
@@ -94,16 +92,16 @@ def _statics(identification: Identification) -> str:
 
 def _parameter_finding(identification: Identification) -> str:
     physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
-    settled = [p for p in physical if told(p) == "yes"]
+    settled = [p for p in physical if how_determined(p) == "yes"]
     if len(settled) == len(physical):
         return f"The data determine all {len(physical)} parameters"
-    return f"The data determine {len(settled)} of {len(physical)} parameters, the others not or only in part"
+    return f"The data determine {len(settled)} of {len(physical)} parameters, the others not, or only in part"
 
 
 def _shown(identification: Identification) -> list[Overlay]:
-    """Return the overlays worth a figure, the first one first; the motor torque only echoes the command."""
+    """Return the overlays that get a figure; the motor torque is left out, it only repeats the command."""
     by_name = {o.channel: o for o in identification.overlays}
-    return [by_name[n] for n in _ORDER if n in by_name] or list(identification.overlays)
+    return [by_name[n] for n in SENSED if n in by_name] or list(identification.overlays)
 
 
 def _over_time(identification: Identification, overlay: Overlay) -> Figure:
@@ -130,7 +128,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 def _untold(identification: Identification) -> str:
     title = "What these data cannot determine"
     said = (*doubt_sentences(identification), *remark_sentences(identification.remarks))
-    body = bullets(said) if said else paragraph("Nothing that was asked for.")
+    body = bullets(said) if said else paragraph("The data determine every free value.")
     return section(title, body)
 
 

@@ -1,4 +1,4 @@
-"""The table of parameters: value, interval, where it started, and how much of it the data told."""
+"""The table of parameters: value, interval, initial value, and how well the data determine it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from rsea_ros.report.page.table import table_of_rows
 _WIDTH, _HEIGHT = 190.0, 26.0
 _TOLD = 0.9
 _UNTOLD = 0.5
-_LOPSIDED = 1.5
-"""Ratio of the sides of an interval, from which its ends are shown instead of ± its half."""
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the HTML table of the physical parameters, sensor clocks left out."""
     physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
-    head = ("Parameter", "#Value ± 95 %", "Unit", "Against what the rig stated", "#Rig", "#Change",
-            "Told by the data")  # fmt: skip
+    head = ("Parameter", "#Value ± 95 %", "Unit", "Compared with the rig", "#Rig", "#Change",
+            "Determined by data")  # fmt: skip
     return table_of_rows(head, (_row(p) for p in physical))
 
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
-    """Return what was found of the sensors' clocks, empty where all may be true to their stamps."""
+    """Return the time offsets of the sensors; empty if all stamps may be correct."""
     clocks = [p for p in parameters if p.name.startswith(CLOCKS) and not p.ci95[0] <= 0.0 <= p.ci95[1]]
     if not clocks:
         return ""
@@ -37,11 +35,11 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
         f"{' of the time passed' if p.unit == 'ppm' else ''}"
         for p in clocks
     ]
-    return f"Sensors read later than stamped by: {'; '.join(parts)}."
+    return f"Sensors read later than their stamps by: {'; '.join(parts)}."
 
 
-def told(p: ParameterEstimate) -> str:
-    """Return in words how much of a parameter the data told: against what was known, and against its size.
+def how_determined(p: ParameterEstimate) -> str:
+    """Return in words how well the data determine a parameter, relative to the prior and to its size.
 
     None where the interval reaches as far as the value is large, or where the fit ended at a bound.
     """
@@ -60,7 +58,7 @@ def value_text(p: ParameterEstimate) -> tuple[str, str]:
         return value, ""
     low, high = p.ci95
     sides = sorted((p.value - low, high - p.value))
-    if sides[1] <= _LOPSIDED * sides[0]:
+    if sides[1] <= words.LOPSIDED * sides[0]:
         return value, f" ± {half}"
     step = 10.0 ** (math.floor(math.log10(sides[1])) - 2)
     ends = (step * math.floor(low / step), step * math.ceil(high / step))
@@ -72,17 +70,17 @@ def _rounded(value: float, step: float) -> str:
     """Return a value to a decimal step, plain where that is short."""
     decimals = -round(math.log10(step))
     shown = f"{value:.{max(0, decimals)}f}" if decimals < 9 else f"{value:.2e}"
-    return shown.replace("-", "−")
+    return words.minus(shown)
 
 
 def _row(p: ParameterEstimate) -> str:
     value, doubt = value_text(p)
-    change = f"{100.0 * (p.value / p.start - 1.0):+.1f} %".replace("-", "−") if p.start else "–"
+    change = words.minus(f"{100.0 * (p.value / p.start - 1.0):+.1f} %") if p.start else "–"
     return (
         f"<tr><td>{escape(words.parameter(p.name))} {_symbol(p.name)}<small>{escape(p.name)}</small></td>"
         f"<td class='number'><b>{value}</b>{doubt}</td><td class='unit'>{escape(words.unit(p.unit))}</td>"
         f"<td>{_interval(p)}</td><td class='number'>{words.number(p.start, 4)}</td>"
-        f"<td class='number'>{change}</td><td>{told(p)}</td></tr>"
+        f"<td class='number'>{change}</td><td>{how_determined(p)}</td></tr>"
     )
 
 

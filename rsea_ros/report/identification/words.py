@@ -1,4 +1,4 @@
-"""What an identification comes to, in words: for the terminal, the page and identification.json alike."""
+"""The result of an identification in words, for the terminal, the page and identification.json."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def verdict_sentence(identification: Identification) -> str:
     """Return whether the model fits, by the worst channel's residual over its noise, and the rig by name."""
     ratios, rig = identification.times_noise, f"rig {identification.rig.name}"
     if not ratios:
-        return f"No channel to judge the model by ({rig})"
+        return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
     size = f"{words.channel(worst)} {times(ratios[worst])} times the noise ({rig})"
     if not identification.at_noise:
@@ -28,12 +28,12 @@ def verdict_sentence(identification: Identification) -> str:
 
 
 def times(ratio: float) -> str:
-    """Return a ratio so that it never reads as one on the other side of a limit."""
+    """Return a ratio, rounded so that it stays on its side of the limit."""
     return f"{ratio:.2f}" if ratio < 2.0 else f"{ratio:.2g}" if ratio < 100.0 else f"{ratio:.0f}"
 
 
 def next_command(identification: Identification) -> str:
-    """Return the command that says what is missing in a model that does not fit; empty for one that does."""
+    """Return the command that diagnoses a model that does not fit; empty if it fits."""
     if identification.at_noise:
         return ""
     rig = identification.rig_option or identification.rig.name
@@ -42,7 +42,7 @@ def next_command(identification: Identification) -> str:
 
 
 def doubt_sentences(identification: Identification) -> tuple[str, ...]:
-    """Return what the intervals hold for, where that is more or less than noise."""
+    """Return the conditions of the intervals, if they cover more or less than noise."""
     said = []
     if identification.coloured:
         said.append(coloured_noise(identification.coloured))

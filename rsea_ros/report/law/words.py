@@ -1,4 +1,4 @@
-"""Sentences about a law that was looked for in what a model leaves."""
+"""Sentences about a law for the residual of a model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rsea_ros.laws.result import LawResult
 from rsea_ros.report import words
 
 _CLEARLY = 0.1
-"""Share of what the law leaves that another variable must take to be told of."""
+"""Share of what the law leaves that another variable must explain to be reported."""
 NAMES = {"w": "speed", "q": "angle", "theta": "rotor's angle", "d": "deflection", "T": "load", "u": "command",
          "t": "time", "share": "time", "h": "load's angle", "law": "law's value"}  # fmt: skip
 UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": "N m", "t": "s", "share": "s",
@@ -18,16 +18,16 @@ UNITS = {"w": "rad/s", "q": "rad", "theta": "rad", "d": "rad", "T": "N m", "u": 
 
 
 def headline(result: LawResult) -> str:
-    """Return what was found, in a sentence."""
+    """Return the result in a sentence."""
     if result.at_floor:
-        return "Nothing is left that a law could take: the model is at the noise floor"
+        return "No law is needed: the model is at the noise floor"
     if not result.laws:
-        return "Something is left, and no law of it holds on blocks that it was not fitted to"
+        return "A residual remains, but no law of it holds on held-out blocks"
     law = result.laws[0].law
     kind = "A learnt law, which names no cause: " if law.is_learnt else ""
     share = min(100.0 * result.share, 100.0)
     also = _also(result)
-    sentence = f"{share:.0f} % of what is left is a function of {depends_on(law, result)}{also}"
+    sentence = f"{share:.0f} % of the remaining residual is a function of {depends_on(law, result)}{also}"
     return f"{kind}{sentence}"
 
 
@@ -46,11 +46,11 @@ def _also(result: LawResult) -> str:
     if len(result.laws) > 1:
         return f", and of {depends_on(result.laws[1].law, result)}"
     others = [d for d in result.dependences if d.beside > max(_CLEARLY, 2.0 * d.beside_se)]
-    return "" if others else ", and nothing else"
+    return "" if others else " only"
 
 
 def gain_sentence(result: LawResult) -> str:
-    """Return the gain on blocks that took part in nothing."""
+    """Return the gain on held-out blocks."""
     low, high = result.gain_ci95
     return (
         f"The residual falls by {100 * result.gain:.1f} % (95 %: {100 * low:.1f} to {100 * high:.1f} %) on "

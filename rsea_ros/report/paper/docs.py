@@ -15,6 +15,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import readings
+from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, TRUTH
 from rsea_ros.report.figures.response import Mark, Response
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit
@@ -63,10 +64,6 @@ def _moving_output() -> str:
     )
 
 
-def _signed(value: float) -> str:
-    return f"{value:+.0f}".replace("-", "−")
-
-
 def _end_to_end() -> str:
     hz: FloatArray = np.geomspace(1.0, 300.0, 400)
     rig = load_rig("prototype_knee")
@@ -77,11 +74,8 @@ def _end_to_end() -> str:
     marks = [Mark(edge, f"{edge:.1f} Hz")]
     for train, colour, anchor in zip(PROTOTYPE_TRAINS, (BEFORE, TRUTH), ("start", "end"), strict=True):
         turned = replace(rig, train=train)
-        curves.append(
-            Response(
-                f"spin, n = {_signed(train_ratio(turned))}", colour, hz, end_to_end(turned)(2j * np.pi * hz)
-            )
-        )
+        name = f"spin, n = {words.signed(train_ratio(turned), 0)}"
+        curves.append(Response(name, colour, hz, end_to_end(turned)(2j * np.pi * hz)))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", anchor))
     return gain_svg(curves, (-40.0, 40.0), marks)

@@ -18,6 +18,7 @@ from rsea_ros.paper import formulas
 from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
 from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
@@ -39,7 +40,7 @@ def figure_9() -> list[Figure]:
         points.append(Point(name, rig["spring.stiffness"], rig["chassis.inertia"], colour))
         for train, pole in _senses(rig):
             turned = replace(rig, train=train)
-            sign = "" if rig.train == "planetary" else f", n = {train_ratio(turned):+.0f}".replace("-", "−")
+            sign = "" if rig.train == "planetary" else f", n = {words.signed(train_ratio(turned), 0)}"
             inner = inner_inertia(turned)
             points.append(Point(f"{name}, with spin{sign}", rig["spring.stiffness"], inner, BEFORE, pole))
     whole = bandwidth_surface(
@@ -77,7 +78,7 @@ def figure_15(measured: FrequencyResponse) -> Figure:
     title = f"Fig. 15: printed fit and Table 2 part by {-apart:.2f} dB at rest; lumped and unlumped are one"
     marks = [Mark(np.sqrt(c_2) / (2 * np.pi), f"{np.sqrt(c_2) / (2 * np.pi):.2f} Hz")]
     return response_figure(
-        title.replace("-", "−"), curves, marks, "T_d/T_m with both ends clamped.", decibel=(-60, 12)
+        words.minus(title), curves, marks, "T_d/T_m with both ends clamped.", decibel=(-60, 12)
     )
 
 
@@ -149,7 +150,7 @@ def figure_20() -> Figure:
     marks = [Mark(55.5, "55.5 Hz, printed")]
     for train, dash in zip(PROTOTYPE_TRAINS, ("solid", "dash"), strict=True):
         turned = replace(rig, train=train)
-        name = f"with the rotor's spin,<br>n = {train_ratio(turned):+.0f}".replace("-", "−")
+        name = f"with the rotor's spin,<br>n = {words.signed(train_ratio(turned), 0)}"
         curves.append(Response(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))

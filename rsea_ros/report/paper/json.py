@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import Any
 
@@ -12,6 +11,7 @@ from rsea_ros.paper.bands import TOLERANCES, Bands
 from rsea_ros.paper.claims import TABLE_2, claims
 from rsea_ros.paper.findings import findings
 from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.report.json_values import finite
 from rsea_ros.report.paper.page import PaperTests, actuator_bands
 
 
@@ -34,16 +34,12 @@ def _bands(b: Bands) -> dict[str, Any]:
     return {
         "eq_7_hz": b.eq_7,
         "eq_7_with_spin_hz": b.eq_7_spin,
-        "eq_7_with_spin_hz_90_percent_of_rotor_inertia": [_finite(v) for v in b.spin_range],
+        "eq_7_with_spin_hz_90_percent_of_rotor_inertia": [finite(v) for v in b.spin_range],
         "tolerances_db_deg": [list(t) for t in TOLERANCES],
-        "exact": {row.what: [_finite(v) for v in row.hz] for row in b.rows},
+        "exact": {row.what: [finite(v) for v in row.hz] for row in b.rows},
         "spring_limit": b.spring_limit,
         "motor_limit": [{"hz": f, "torque": t} for f, t in b.motor_limit.items()],
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _moving(test: MovingOutput) -> dict[str, Any]:

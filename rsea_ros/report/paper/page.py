@@ -70,7 +70,7 @@ _KICKER = (
     "actuators”, recomputed"
 )
 _FOOTER = [
-    "Benches are simulated by the unlumped model: what is tested is whether data can tell, not nature. "
+    "Benches are simulated by the unlumped model: the test is whether data can decide, not nature. "
     "Values drawn from the rigs' spread, sensors' noise, bags written and read back.",
     "Models: rsea_ros/model; what they take for exact: docs/physics.md; derivation: docs/derivation.md. "
     "All values in SI.",
@@ -81,7 +81,7 @@ _FOOTER = [
 def _title(test: MovingOutput) -> str:
     unlumped, lumped = (100.0 * rival.judged[0].explained for rival in test.rivals)
     return (
-        f"A moving output tells the models apart: unlumped {unlumped:.2f} % of a simulated bench's torque, "
+        f"A moving output separates the models: unlumped {unlumped:.2f} % of a simulated bench's torque, "
         "lumped "
         f"{lumped:.0f} %. Eq. (7) leaves out the rotor's spin"
     )

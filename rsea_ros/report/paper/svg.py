@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from rsea_ros.report import words
 from rsea_ros.report.figures.palette import GRID, INK, QUIET
 from rsea_ros.report.figures.response import Mark, Response
 
@@ -28,7 +29,7 @@ def gain_svg(responses: Sequence[Response], decibel: tuple[float, float], marks:
     parts = [f'<rect width="{_WIDTH:g}" height="{_HEIGHT:g}" fill="#ffffff"/>']
     for db in np.arange(math.ceil(decibel[0] / 20) * 20, decibel[1] + 1, 20):
         parts.append(_stroke(_LEFT, y(db), x(high), y(db), GRID))
-        parts.append(_text(f"{db:.0f}".replace("-", "−"), _LEFT - 8, y(db) + 4, QUIET, "end"))
+        parts.append(_text(words.minus(f"{db:.0f}"), _LEFT - 8, y(db) + 4, QUIET, "end"))
     for hz in (m * 10.0**d for d in range(-2, 4) for m in (1, 2, 5)):
         if 0.999 * low <= hz <= 1.001 * high:
             parts.append(_stroke(x(hz), y(decibel[0]), x(hz), y(decibel[1]), GRID))

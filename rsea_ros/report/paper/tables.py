@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
@@ -43,9 +42,9 @@ def claims_table(claims: Sequence[Claim]) -> str:
     agree = sum(c.agrees for c in recomputed)
     rows = []
     for c in claims:
-        unit = "°" if c.unit == "deg" else words.unit(c.unit)
+        unit = words.unit(c.unit)
         ours = words.number(c.ours, 5)
-        same = "to the last digit" if c.agrees else f"{100 * c.difference:+.2f} %".replace("-", "−")
+        same = "to the last digit" if c.agrees else f"{words.signed(100 * c.difference, 2)} %"
         rows.append([c.where, c.what, c.printed, ours, unit, same, c.status, c.how])
     head = ["Where", "What", "Printed", "Ours", "", "Difference", "", "Ours comes from"]
     title = (
@@ -116,10 +115,10 @@ def bands_table(actuators: Mapping[str, Bands]) -> str:
     parts = []
     for name, b in actuators.items():
         first = ["Eq. (7) as printed", f"{b.eq_7:.1f}", *[""] * (len(tolerances) - 1)]
-        low, high = b.spin_range
+        low, high = map(words.hertz, b.spin_range)
         spin = ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *[""] * (len(tolerances) - 1)]
-        doubt = ["the same over 90 % of J_m", f"{_hz(low)} to {_hz(high)}", *[""] * (len(tolerances) - 1)]
-        rows = [first, spin, doubt, *([row.what, *(_hz(v) for v in row.hz)] for row in b.rows)]
+        doubt = ["the same over 90 % of J_m", f"{low} to {high}", *[""] * (len(tolerances) - 1)]
+        rows = [first, spin, doubt, *([row.what, *(words.hertz(v) for v in row.hz)] for row in b.rows)]
         motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
         limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
         body = table(["|T_d/T_p| within, Hz", *tolerances], rows, numbers=range(1, 5))
@@ -138,18 +137,14 @@ def bands_table(actuators: Mapping[str, Bands]) -> str:
     )
 
 
-def _hz(value: float) -> str:
-    return "no limit" if math.isinf(value) else f"{value:.1f}"
-
-
 def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> str:
     """Return transfer functions and limits of all arrangements."""
     body = [
         [
             words.train(r.train),
-            f"{r.ratio:+.0f}".replace("-", "−"),
+            words.signed(r.ratio, 0),
             f"{r.outer:.4f}",
-            f"{r.inner:+.5f}".replace("-", "−"),
+            words.signed(r.inner, 5),
             "T_d/T_m = (b_s s + K_s)/den",
             "T_p/T_m = (J_in s² + b_s s + K_s)/den",
         ]

@@ -12,8 +12,8 @@ import pytest
 from rsea_ros.diagnosis.result import Estimate, Experiment
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.diagnosis.files import NAMES
 from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.file_names import DIAGNOSIS
 from rsea_ros.signals import Fault
 
 
@@ -27,7 +27,7 @@ def strict(text: str) -> Any:
 
 
 def test_all_files_are_there_and_nothing_else(diagnosed) -> None:
-    assert sorted(p.name for p in diagnosed.out.iterdir()) == sorted(NAMES)
+    assert sorted(p.name for p in diagnosed.out.iterdir()) == sorted(DIAGNOSIS)
     assert (diagnosed.out / "report.html").stat().st_size < 8_000_000
 
 

@@ -15,8 +15,8 @@ from rsea_ros.report.diagnosis.page import diagnosis_report
 from rsea_ros.signals import Fault
 
 HEADINGS = (
-    "is what the simulation lacks",
-    "times above the noise floor",
+    "explains the misfit",
+    "times the noise floor",
     "F/T torque over time",
     "causes were tried, 1 accepted",
     "What these data cannot determine",

@@ -37,7 +37,7 @@ def terminal(diagnosis):
 
 def test_the_terminal_says_the_essence_in_about_ten_lines(diagnosed):
     lines = terminal(diagnosed.diagnosis)
-    assert lines[0] == "Coulomb friction (3.00 N·m) is what the simulation lacks; with it, only noise is left"
+    assert lines[0] == "Coulomb friction (3.00 N·m) explains the misfit; only noise is left"
     assert lines[1].startswith("residual    F/T torque ")
     assert lines[2].startswith("cause       coulomb_friction: torque ")
     assert len(lines) <= 12
@@ -146,7 +146,7 @@ def test_faulty_samples_count_for_nothing(diagnosed):
 
 def test_a_residual_alike_everywhere_is_said_to_be(diagnosed):
     found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
-    assert finding(list(found.values())) == "The residual is alike at every load, speed or rotor angle"
+    assert finding(list(found.values())) == "The residual is the same at every load, speed or rotor angle"
 
 
 def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import Identification
-from rsea_ros.report.bars import Bar, bar_figure
 from rsea_ros.report.figures.bode import bode_figure
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, overlay_figure, sampled
@@ -84,12 +83,4 @@ def test_overlay_of_two_simulations() -> None:
     simulations = [Simulated("before", BEFORE, np.cos(t)), Simulated("after", AFTER, np.sin(t))]
     figure = overlay_figure("Before and after", "ft", t, np.sin(t), simulations)
     assert [r["name"] for r in figure.extra["residuals"]] == ["before", "after"]
-    as_json(figure)
-
-
-def test_bars_carry_their_text_and_interval() -> None:
-    bars = [Bar("coulomb_friction", 0.61, "61 %", (0.58, 0.64), strong=True), Bar("backlash", -0.02, "−2 %")]
-    figure = bar_figure("Friction explains it", bars, "gain on held-out data")
-    assert [a["text"] for a in figure.layout["annotations"]] == ["−2 %", "61 %"]
-    assert figure.data[0]["error_x"]["array"] == pytest.approx([0.0, 0.03])
     as_json(figure)

@@ -69,7 +69,7 @@ def test_what_the_latest_recording_names_is_news_before_there_is_a_trend(tmp_pat
     worn = recordings(joints, 2, causes=lambda j, d: [cause("backlash", 4e-3)] if j == "right" and d else [])
     index = write_fleet_report(made, worn, tmp_path / "out")
     text = index.read_text(encoding="utf-8")
-    assert "<h1>Too few recordings yet to say what changes; the latest name backlash in right" in text
+    assert "<h1>Too few recordings yet for trends; the latest name backlash in right" in text
     assert "now backlash" in text and "<td>steady</td>" not in text
     assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
 

@@ -56,7 +56,7 @@ def test_the_pair_that_is_told_apart_least_is_named():
 def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed):
     d = diagnosed.diagnosis
     html = diagnosis_report(d)
-    assert html.index("beside the causes") < html.index("before any cause was looked for")
+    assert html.index("together with the causes") < html.index("before the search for causes")
     final = {p.name: p.value for p in final_values(d)}
     assert final["rotor.reflected_damping"] == d.extended_rig["rotor.reflected_damping"]
     biased = {p.name: p.value for p in d.baseline}
@@ -71,7 +71,7 @@ def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed)
         ("command_delay", "command"),
         ("torque_constant_error", "motor"),
         ("ft_gain_error", "F/T sensor"),
-        ("base_compliance", "what holds it"),
+        ("base_compliance", "support"),
     ],
 )
 def test_the_culprit_is_marked_where_it_sits(name, part):

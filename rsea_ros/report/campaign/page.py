@@ -1,4 +1,4 @@
-"""The page of a session of experiments: what each run left possible, and what it looked like."""
+"""The page of a session of experiments: the remaining causes after each run, and its command."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rsea_ros.experiment.campaign import Outcome
 from rsea_ros.experiment.limits import Limits
-from rsea_ros.report.experiment.campaign_words import end_sentence, size
+from rsea_ros.report.campaign.words import end_sentence, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line, numbers
@@ -36,9 +36,9 @@ def campaign_page(
         blocks += [command_figure(p) for _, p in played]
         blocks.append(limits_section(played[-1][1], limits.stated()))
     if outcome.proofs:
-        blocks.append(section("What no run separates", bullets([proof_words(x) for x in outcome.proofs])))
+        blocks.append(section("Not separable by any run", bullets([proof_words(x) for x in outcome.proofs])))
     if notes:
-        blocks.append(section("How this was made", bullets(notes)))
+        blocks.append(section("Method", bullets(notes)))
     footer = provenance.lines if provenance else ()
     return page(_title(outcome), f"A session of experiments · {rig}", blocks, footer)
 
@@ -52,7 +52,7 @@ def _keys(outcome: Outcome) -> list[tuple[str, str]]:
     p = outcome.weighing.probability[outcome.cause]
     count = sum(r.proposal is not None for r in outcome.rounds)
     keys = [(f"{p:.1%}", plain_name(outcome.cause)), (f"{outcome.seconds:.3g} s", "of excitation")]
-    return [*keys, (str(count), "runs"), (f"{outcome.weighing.left:.2f}", "times the noise is left")]
+    return [*keys, (str(count), "runs"), (f"{outcome.weighing.left:.2f}", "times the noise remains")]
 
 
 def probability_figure(outcome: Outcome) -> Figure:
@@ -74,7 +74,7 @@ def probability_figure(outcome: Outcome) -> Figure:
             notes.append(label(plain_name(name), float(x[-1]), float(y[-1]), colour, xshift=10))
     ticks = ["first records" if not k else f"after run {k}" for k in range(len(rounds))]
     return Figure(
-        "What stays possible after each run",
+        "Remaining causes after each run",
         "Probability of each cause by all records up to there. Each cause weighed here is as likely as "
         "any other before the first record.",
         traces,

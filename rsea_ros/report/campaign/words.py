@@ -1,4 +1,4 @@
-"""What a session of experiments says, in sentences."""
+"""The result of a session of experiments in sentences."""
 
 from __future__ import annotations
 
@@ -47,24 +47,24 @@ def end_sentence(outcome: Outcome) -> str:
         case "confirmed":
             return f"{plain_name(cause)}, {size(outcome.weighing, cause)}: probability {p:.3f} {spent}"
         case "nothing_wrong":
-            return f"No cause: the rig with fitted values explains all, probability {p:.3f} {spent}"
+            return f"No cause: the rig with fitted values explains everything, probability {p:.3f} {spent}"
         case "unexplained":
             return (
                 f"None of the causes explains the runs {spent}: the best, {plain_name(cause)}, leaves "
                 f"{outcome.weighing.left:.2f} times the noise"
             )
         case "undecidable":
-            return f"No further run tells more: {_open(outcome)} stay possible {spent}"
+            return f"No further run would help: {_open(outcome)} remain possible {spent}"
         case "spent":
-            return f"The budget is spent {spent}: {_open(outcome)} stay possible"
+            return f"The budget is spent {spent}: {_open(outcome)} remain possible"
         case "declined":
-            return f"The next run was not wanted {spent}: {_open(outcome)} stay possible"
+            return f"The next run was declined {spent}: {_open(outcome)} remain possible"
         case "broken":
             return (
-                f"A run broke off ({outcome.why}); nothing was learnt from it; {_open(outcome)} stay possible"
+                f"A run was aborted ({outcome.why}) and is not used; {_open(outcome)} remain possible"
             )
         case _:
-            return f"The session could not go on ({outcome.why}): {_open(outcome)} stay possible"
+            return f"The session could not continue ({outcome.why}): {_open(outcome)} remain possible"
 
 
 def _runs(outcome: Outcome) -> str:

@@ -1,0 +1,1 @@
+"""A session of experiments: page, sentences, experiment.json."""
