@@ -1,9 +1,9 @@
-"""Every supported Python: the locked environment, the wheel and the suite's fast part on each.
+"""Test every supported Python: the locked environment, the wheel and the fast part of the suite.
 
     python bench/pythons.py                    all that this machine has of 3.10 to 3.14
     python bench/pythons.py --only 3.13
 
-Nodes are left out: the wheels of ROS 2 come for one Python. A version that is missing here counts as untried.
+Nodes are left out, because the wheels of ROS 2 exist for one Python. A missing version counts as untried.
 """
 
 from __future__ import annotations

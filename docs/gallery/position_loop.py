@@ -7,6 +7,7 @@ firmware, and the fit simulates the closed loop. The figure shows the measured a
 import numpy as np
 
 import rsea_ros as rsea
+from rsea_ros.library.figures import overlay_figure
 
 rig = rsea.load_rig("pd_joint")
 t = np.arange(2000) / 100.0  # s, targets at 100 Hz
@@ -16,4 +17,4 @@ fit = rsea.identify(rsea.simulate(bench, target, rate=100.0), rig)
 print(fit.summary())
 
 damping = fit.parameters["rotor.reflected_damping"]
-figure = fit.plot()
+figure = overlay_figure(fit.result.overlays)
