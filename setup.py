@@ -47,7 +47,7 @@ setup(
     zip_safe=False,
     package_data={
         "": ["py.typed"],
-        "rsea_ros.report": ["*.css", "*.js", "vendor/*"],
+        "rsea_ros.report.page": ["*.css", "*.js", "vendor/*"],
         "rsea_ros.report.fleet": ["*.css"],
         "rsea_ros.hardware.dynamixel": ["models/*.yaml"],
         "rsea_ros.nodes": ["*.xml"],

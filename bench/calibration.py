@@ -24,14 +24,14 @@ from calibration_records import Plan, left_out, made, plans
 from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, table
 
 from rsea_ros.checks.faults import check
+from rsea_ros.diagnosis.criteria import is_at_floor, takes_most
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
+from rsea_ros.diagnosis.naming.weighing import Place, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.verdict import is_at_floor, takes_most
-from rsea_ros.diagnosis.weighing import Place, weigh
 from rsea_ros.identification.workers import worker_pools
 
 CACHE = Path("out/calibration/evidence.jsonl")
-TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/coefficients.py"
+TABLE = Path(__file__).resolve().parents[1] / "rsea_ros/diagnosis/naming/coefficients.py"
 
 
 def _read_only(values: dict[str, Any]) -> MappingProxyType[str, Any]:

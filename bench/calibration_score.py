@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from rsea_ros.diagnosis.coefficients import COEFFICIENTS
-from rsea_ros.diagnosis.evidence import Evidence
-from rsea_ros.diagnosis.flexible import Flexible
-from rsea_ros.diagnosis.naming import standing
-from rsea_ros.diagnosis.probability import features
-from rsea_ros.diagnosis.signature import Signature
+from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.naming.flexible import Flexible
+from rsea_ros.diagnosis.naming.probability import features
+from rsea_ros.diagnosis.naming.signature import Signature
+from rsea_ros.diagnosis.naming.status import standing
 
 OUTSIDE = ("off", "taken_out")
 """Groups, by how their names begin, whose record holds a law that the diagnosis cannot know."""

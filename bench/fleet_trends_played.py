@@ -31,7 +31,7 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.errors import RseaError
 from rsea_ros.library.diagnosed import diagnose
 from rsea_ros.library.fit import identify
-from rsea_ros.report.diagnosis_page import final_values
+from rsea_ros.report.diagnosis.page import final_values
 from rsea_ros.signals import Record
 
 SAMPLE = Path(__file__).with_name("fleet_trends_played.json")

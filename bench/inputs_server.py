@@ -22,13 +22,14 @@ WALL = 600.0
 MODULES = (
     "rsea_ros.cli.identify", "rsea_ros.cli.diagnose", "rsea_ros.cli.predict", "rsea_ros.cli.simulate",
     "rsea_ros.cli.control", "rsea_ros.cli.design", "rsea_ros.cli.export", "rsea_ros.cli.import_",
-    "rsea_ros.cli.check", "rsea_ros.cli._checks", "rsea_ros.checks.check", "rsea_ros.report.check_text",
-    "rsea_ros.report.check_json", "rsea_ros.report.control_json", "rsea_ros.report.design_json",
+    "rsea_ros.cli.check", "rsea_ros.cli._checks", "rsea_ros.checks.check", "rsea_ros.report.check.text",
+    "rsea_ros.report.check.json", "rsea_ros.report.control.json", "rsea_ros.report.design.json",
     "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
-    "rsea_ros.report.results", "rsea_ros.report.diagnosis_files", "rsea_ros.report.diagnosis_terminal",
-    "rsea_ros.report.terminal", "rsea_ros.report.control_page", "rsea_ros.report.design_page",
-    "rsea_ros.control.study", "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records",
-    "msg_adapters.overlay", "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
+    "rsea_ros.report.identification.files", "rsea_ros.report.diagnosis.files",
+    "rsea_ros.report.diagnosis.terminal", "rsea_ros.report.identification.terminal",
+    "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.control.study",
+    "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records", "msg_adapters.overlay",
+    "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
 )  # fmt: skip
 FIRST = (
     ["simulate", RIG, "--out", "DIR/bag.mcap", "--duration", "5"],

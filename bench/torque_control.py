@@ -34,7 +34,7 @@ from rsea_ros.control.trials import hardest, tracked
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report import control_tables as tables
+from rsea_ros.report.control import tables
 
 SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
 

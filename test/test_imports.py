@@ -53,16 +53,19 @@ OWN = {
     "trends": BASE,
     "fleet": CORE | {"trends", "report", "library", "msg_adapters", "one_thread"},
     "exports": BASE | {"effects", "model", "design"},
+    "paper": BASE | {"effects", "model", "identification", "design"},
     "watch": BASE,
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
     "arrays": {"errors", "signals"},
     "one_thread": set(),
-    "report": CORE | AROUND,
+    "report": CORE | AROUND | {"paper"},
     "library": CORE | AROUND | {"report", "msg_adapters"},
     "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "one_thread", "watch"},
-    "cli": CORE | AROUND | {"hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch"},
+    "cli": CORE
+    | AROUND
+    | {"paper", "hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch"},
     "__main__": {"cli"},
     "__init__": CORE | {"library"},
     "compiler_cache": set(),
@@ -70,21 +73,27 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "coherence", "data_split", "residual_peaks", "screening", "coefficients", "joint_scale"},
-    {"result", "score", "short_pieces", "initial_guess", "recommended_run"},
-    {"candidate", "criteria", "verdict", "residual_analysis", "next_experiment", "sentences", "stacking"},
-    {"selection", "step_fits", "signature"},
-    {"forward_step", "backward_elimination", "evaluation", "flexible"},
-    {"replacement", "evidence", "joint_play"},
-    {"stepwise", "claims", "probability"},
-    {"promotion"},
-    {"weighing"},
-    {"naming"},
-    {"causes"},
-    {"conclusion"},
+    {"settings", "screening", "residual_peaks"},
+    {"result", "data_split", "coherence"},
+    {"score", "problem_variants", "residual_analysis", "initial_guess", "sentences"},
+    {"candidate", "criteria", "next_experiment"},
+    {"selection", "step_fits"},
+    {"forward_step", "backward_elimination", "evaluation"},
+    {"stepwise", "naming"},
     {"diagnose"},
 )
 """Layers of rsea_ros/diagnosis: a module imports those of the lines above its own only."""
+NAMING = (
+    {"coefficients", "contribution"},
+    {"signature", "flexible"},
+    {"evidence"},
+    {"rivals", "probability"},
+    {"weighing"},
+    {"status"},
+    {"causes"},
+    {"conclusion"},
+)
+"""Layers of its folder naming: how the selected causes are named."""
 
 NUMERIC = {"numpy", "scipy", "control", "numba", "llvmlite"}
 MESSAGES = {
@@ -115,6 +124,7 @@ FOREIGN = {
     "trends": {"numpy", "scipy", "ruptures"},
     "fleet": {"numpy", "dask", "distributed", "fsspec", "pyarrow", "duckdb", "yaml"},
     "exports": NUMERIC | {"mujoco", "fmpy", "pythonfmu3"},
+    "paper": NUMERIC,
     "watch": {"tornado"},
     "signals": {"numpy"},
     "arrays": {"numpy"},
@@ -186,22 +196,35 @@ def test_a_module_imports_only_what_its_layer_may(path):
     assert offences(path, path.read_text(encoding="utf-8")) == []
 
 
-DIAGNOSIS_FOLDER = ROOT / "rsea_ros" / "diagnosis"
+FOLDERS = {"rsea_ros.diagnosis": DIAGNOSIS, "rsea_ros.diagnosis.naming": NAMING}
+"""Folders with layers of their own, by package."""
 
 
-def test_every_module_of_the_diagnosis_has_a_layer():
-    modules = sorted(p.stem for p in DIAGNOSIS_FOLDER.glob("*.py") if p.stem != "__init__")
-    assert sorted(name for layer in DIAGNOSIS for name in layer) == modules
+@pytest.mark.parametrize("package", FOLDERS)
+def test_every_module_of_a_folder_has_a_layer(package):
+    modules = [p.stem for p in folder(package).iterdir() if p.suffix == ".py" or (p / "__init__.py").exists()]
+    assert sorted(name for layer in FOLDERS[package] for name in layer) == sorted(set(modules) - {"__init__"})
 
 
-@pytest.mark.parametrize("layer", range(len(DIAGNOSIS)))
-def test_a_module_of_the_diagnosis_imports_only_from_the_layers_above_it(layer):
-    allowed = set().union(*DIAGNOSIS[:layer])
-    for name in DIAGNOSIS[layer]:
-        path = DIAGNOSIS_FOLDER / f"{name}.py"
-        modules = (module.split(".") for module, _ in imports(path, path.read_text(encoding="utf-8")))
-        used = {parts[2] for parts in modules if parts[:2] == ["rsea_ros", "diagnosis"]}
-        assert used <= allowed, name
+@pytest.mark.parametrize(("package", "layer"), [(p, k) for p, ls in FOLDERS.items() for k in range(len(ls))])
+def test_a_module_imports_only_from_the_layers_above_it(package, layer):
+    allowed = set().union(*FOLDERS[package][:layer])
+    for name in FOLDERS[package][layer]:
+        assert used_by(package, name) <= allowed | {name}, name
+
+
+def folder(package: str) -> Path:
+    """Return the folder of a package."""
+    return ROOT.joinpath(*package.split("."))
+
+
+def used_by(package: str, name: str) -> set[str]:
+    """Return the modules of a package that one of them imports; of a folder, those that its modules do."""
+    file = folder(package) / f"{name}.py"
+    paths = [file] if file.exists() else sorted((folder(package) / name).glob("*.py"))
+    modules = (module for p in paths for module, _ in imports(p, p.read_text(encoding="utf-8")))
+    inside = (m.removeprefix(package + ".") for m in modules if m.startswith(package + "."))
+    return {m.split(".")[0] for m in inside}
 
 
 @pytest.mark.parametrize(
@@ -231,7 +254,7 @@ def test_an_offence_is_found(place, source):
         ("rsea_ros/hardware/simulated.py", "from rsea_ros.model.simulation import Plant"),
         ("rsea_ros/nodes/plant.py", "import rclpy\nfrom msg_adapters.ros import JointState"),
         ("msg_adapters/ros.py", "from sensor_msgs.msg import JointState"),
-        ("rsea_ros/report/bode.py", "import plotly\nfrom ..identification.identify import Identification"),
+        ("rsea_ros/report/figures/bode.py", "import plotly\nfrom ...identification import result"),
     ],
 )
 def test_what_is_allowed_passes(place, source):

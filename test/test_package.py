@@ -72,8 +72,8 @@ def test_every_module_is_installed(workspace, top):
 
 
 def test_the_style_of_reports_is_installed(workspace):
-    (installed,) = (workspace / "install/rsea_ros/lib").glob("python3*/site-packages/rsea_ros/report")
-    assert {file.name for file in installed.glob("page.*")} == {"page.py", "page.css", "page.js"}
+    (installed,) = (workspace / "install/rsea_ros/lib").glob("python3*/site-packages/rsea_ros/report/page")
+    assert {file.name for file in installed.glob("page.*")} == {"page.css", "page.js"}
     vendored = {file.name for file in (installed / "vendor").iterdir()}
     assert vendored == {"plotly-cartesian.LICENSE", "plotly-cartesian.min.js.gz"}
 

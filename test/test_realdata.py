@@ -19,7 +19,7 @@ from rsea_ros.identification.identify import identify
 from rsea_ros.identification.statics import Statics, statics_of
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.statics_words import statics_sentences
+from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.signals import Record
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"

@@ -9,7 +9,7 @@ from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.usable import require_motion
 from rsea_ros.model.rig import Rig
-from rsea_ros.report.check_text import warnings
+from rsea_ros.report.check.text import warnings
 from rsea_ros.signals import Record
 
 

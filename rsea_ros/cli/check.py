@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         for bag, record in zip(args.bags, records, strict=True)
     ]
     if args.json:
-        from rsea_ros.report.check_json import check_json
+        from rsea_ros.report.check.json import check_json
 
         print(json.dumps(check_json(checks), indent=1, allow_nan=False, ensure_ascii=False))
     else:
@@ -81,7 +81,7 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 def _print(checks: list[Findings]) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.check_text import check_table, summary
+    from rsea_ros.report.check.text import check_table, summary
 
     console = Console()
     if not console.is_terminal:

@@ -48,9 +48,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.control.loads import lightest
     from rsea_ros.control.study import study
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.control_json import control_json
-    from rsea_ros.report.control_page import control_report
-    from rsea_ros.report.results import json_text
+    from rsea_ros.report.control.json import control_json
+    from rsea_ros.report.control.page import control_report
+    from rsea_ros.report.json_values import json_text
 
     place = results_place(args, "out/control", (JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)
@@ -98,7 +98,7 @@ def _print(found: Study, report: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from rsea_ros.report import control_tables as tables
+    from rsea_ros.report.control import tables
 
     console = Console()
     for line in tables.gains_words(found):

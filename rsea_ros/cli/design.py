@@ -95,9 +95,9 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design.catalogue import unit_named
     from rsea_ros.design.judge import judge, least_stiffness
     from rsea_ros.design.margins import robust_stiffness
-    from rsea_ros.report.design_json import design_json
-    from rsea_ros.report.design_page import design_report
-    from rsea_ros.report.results import json_text
+    from rsea_ros.report.design.json import design_json
+    from rsea_ros.report.design.page import design_report
+    from rsea_ros.report.json_values import json_text
 
     place = results_place(args, "out/design", (JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")
@@ -135,7 +135,7 @@ def _requirement(args: argparse.Namespace) -> Requirement:
 def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     from rsea_ros.design.by_train import by_train
     from rsea_ros.report import words
-    from rsea_ros.report.design_page import verdict
+    from rsea_ros.report.design.page import verdict
 
     print(verdict(asked))
     for check in asked.checks:

@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.diagnosis.diagnose import diagnose  # after the bags: a bad one is told of at once
         from rsea_ros.effects.catalogue import effect_named
-        from rsea_ros.report.diagnosis_files import write_diagnosis
+        from rsea_ros.report.diagnosis.files import write_diagnosis
 
         without = tuple(effect_named(name).name for name in args.without)
         result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
@@ -105,7 +105,7 @@ def left_unexplained(result: Diagnosis) -> float:
 def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.diagnosis_terminal import terminal_lines
+    from rsea_ros.report.diagnosis.terminal import terminal_lines
 
     console = Console()
     for line in terminal_lines(result):

@@ -123,10 +123,10 @@ def _possible(
 def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
     """Write run.csv, experiment.json and report.html; return the report's path."""
     from rsea_ros.experiment.run_file import run_text
-    from rsea_ros.report.experiment_json import advice_json
-    from rsea_ros.report.experiment_page import advice_page
+    from rsea_ros.report.experiment.json import advice_json
+    from rsea_ros.report.experiment.page import advice_page
+    from rsea_ros.report.json_values import json_text, with_provenance
     from rsea_ros.report.provenance import provenance_of
-    from rsea_ros.report.results import json_text, with_provenance
 
     source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])
     with NewFiles(place) as new:
@@ -137,7 +137,7 @@ def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
 
 
 def _print(advice: Advice, report: Path) -> None:
-    from rsea_ros.report.experiment_words import limit_rows, plain_name, proof_words, verdict
+    from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
 
     print(verdict(advice))
     for h in advice.hypotheses:

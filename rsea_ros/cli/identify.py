@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         records = checked(records, rig, topics.axis, quiet=args.json, masks=False)
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.identification.identify import identify  # 0.7 s that a bag refused need not wait for
-        from rsea_ros.report.results import write_results
+        from rsea_ros.report.identification.files import write_results
 
         result = replace(identify(records, rig, tell), rig_option=args.rig)
         report = write_results(result, place, provenance("identify", args.bags, args.rig))
@@ -75,9 +75,9 @@ def _print(result: Identification, report: Path) -> None:
     from rich.console import Console
 
     from rsea_ros.report.fault_words import fault_lines
-    from rsea_ros.report.identification_words import doubt_sentences, next_command, verdict_sentence
-    from rsea_ros.report.statics_words import statics_sentences
-    from rsea_ros.report.terminal import terminal_table
+    from rsea_ros.report.identification.statics import statics_sentences
+    from rsea_ros.report.identification.terminal import terminal_table
+    from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 
     console = Console()
     if not console.is_terminal:

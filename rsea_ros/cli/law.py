@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.laws.learn import learn
         from rsea_ros.laws.writing import Provenance
-        from rsea_ros.report.law_files import write_law
+        from rsea_ros.report.law.files import write_law
 
         where = provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print((report.parent / "law.json").read_text(encoding="utf-8"), end="")
     else:
-        from rsea_ros.report.law_words import gain_sentence, headline, law_lines
+        from rsea_ros.report.law.words import gain_sentence, headline, law_lines
 
         print(headline(result))
         for line in law_lines(result):

@@ -14,7 +14,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.new_files import NewFiles, Place, check_free
 
 if TYPE_CHECKING:
-    from rsea_ros.report.paper_page import PaperTests
+    from rsea_ros.report.paper.page import PaperTests
     from rsea_ros.signals import Record
 
 HELP = "every equation, table and figure of the paper recomputed beside the printed value"
@@ -57,9 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
-    from rsea_ros.report.paper_json import paper_json
-    from rsea_ros.report.paper_page import paper_report
-    from rsea_ros.report.results import json_text
+    from rsea_ros.report.json_values import json_text
+    from rsea_ros.report.paper.json import paper_json
+    from rsea_ros.report.paper.page import paper_report
 
     if args.figures:
         return _figures(args)
@@ -93,7 +93,7 @@ def _share(explained: float) -> str:
 
 
 def _figures(args: argparse.Namespace) -> int:
-    from rsea_ros.report.paper_docs import documentation_figures
+    from rsea_ros.report.paper.docs import documentation_figures
 
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)
@@ -110,10 +110,10 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
 
     from rsea_ros.identification.excitation import Settings, excitation
     from rsea_ros.identification.frequency_response import estimate_response
-    from rsea_ros.identification.moving_output import RATE, moving_output
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
-    from rsea_ros.report.paper_page import PaperTests
+    from rsea_ros.paper.moving_output import RATE, moving_output
+    from rsea_ros.report.paper.page import PaperTests
     from rsea_ros.signals import Channel
 
     def bag(name: str, record: Record) -> Record:

@@ -50,13 +50,15 @@ class Limits:
 class Reading:
     """One sample of the bench: N m, rad/s, rad; motor_torque: N m over the sample before, nan if unknown.
 
-    The measured torque tells of a command that came late or was cut down by the driver.
+    The measured torque shows a command that came late or was cut down by the driver. ft_age: samples by
+    which ft was taken before the rest; a sensor with a clock of its own sends when it likes.
     """
 
     ft: float
     velocity: float
     position: float
     motor_torque: float = math.nan
+    ft_age: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -164,10 +166,11 @@ class TorqueController:
     def _compare(self, reading: Reading, offset: float) -> tuple[float, float, Reading]:
         """Return how far the model is ahead in torque (N m) and speed (rad/s), and the reading at its place.
 
-        What is compared is of one instant, that of the reading.
+        What is compared is of one instant: torque where ft was taken, speed where the rest was.
         """
         model = self._reference
-        (torque, speed), (ft, velocity) = model.at(offset), model.at(0.0)
+        torque, speed = model.at(offset - reading.ft_age)[0], model.at(offset)[1]
+        ft, velocity = model.at(0.0)
         speed += self._crossed
         velocity += self._crossed
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,11 +69,13 @@ class Arrivals:
     """When measurements are taken and commands act, of n samples, in periods.
 
     taken: by how much each measurement is taken after its place; nan for one that is lost. acting: by how
-    much the command that it leads to acts after the sample that it is meant for. Both shape (n,).
+    much the command that it leads to acts after the sample that it is meant for. ft_age: by how much its
+    torque is older than the rest of it; zeros by default. All of shape (n,).
     """
 
     taken: FloatArray
     acting: FloatArray
+    ft_age: FloatArray | None = None
 
 
 def irregular(
@@ -93,8 +95,10 @@ def irregular(
     plant, grid, lateness = Plant(rig, rate * PARTS, seed=seed), Grid(1e9 / rate), Lateness(rate)
     due = {round((k + off) * PARTS): k for k, off in enumerate(arrivals.taken) if np.isfinite(off)}
     acting: dict[int, float] = {}
+    ages = np.zeros(len(desired)) if arrivals.ft_age is None else arrivals.ft_age
     rows, torque, command, numbers = [], 0.0, 0.0, np.arange(len(desired))
     sample = plant.step(0.0)
+    torques = [sample.ft]
     controller.start(_reading(sample), float(desired[0]))
     for part in range(len(desired) * PARTS):
         if part in due:
@@ -103,14 +107,15 @@ def irregular(
             trust = lateness.take(max(late, periods - 1), max(1, periods))
             if periods:
                 wanted = float(np.interp((grid.at - LONG_AGO) * 1e-9 * rate, numbers, desired))
-                command = controller.step(
-                    _reading(sample), wanted, periods - 1, trust=trust, offset=grid.offset
-                )
+                back = min(round(ages[due[part]] * PARTS), part)
+                reading = replace(_reading(sample), ft=torques[part - back], ft_age=back / PARTS)
+                command = controller.step(reading, wanted, periods - 1, trust=trust, offset=grid.offset)
                 acting[part + round((1.0 + late) * PARTS)] = command
         if part % PARTS == 0:
             rows.append((sample.ft, command, sample.velocity))
         torque = acting.pop(part, torque)
         sample = plant.step(torque)
+        torques.append(sample.ft)
     n = np.array(rows)
     return Trace(np.arange(len(n)) / rate, np.asarray(desired), n[:, 0], n[:, 1], n[:, 2])
 

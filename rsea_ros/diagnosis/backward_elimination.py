@@ -9,7 +9,8 @@ from functools import partial
 from rsea_ros.diagnosis.candidate import Candidate, FitSetup, effect_size, fit_candidate
 from rsea_ros.diagnosis.criteria import costs_priors_less, is_far_from_floor, preference
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
-from rsea_ros.diagnosis.screening import screen, without_effect
+from rsea_ros.diagnosis.problem_variants import without_effect
+from rsea_ros.diagnosis.screening import screen
 from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named, look_alikes

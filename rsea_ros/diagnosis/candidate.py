@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION, part
+from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
+from rsea_ros.diagnosis.problem_variants import on_blocks, with_common_clock_in_delay, with_doubled_step
 from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT, FitSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, Solution, serial, solve
-from rsea_ros.model.drive import Drive, coarser
 from rsea_ros.signals import FloatArray
-
-DELAY = "command_delay.delay"
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,8 @@ class FitSetup:
 
     def masked(self, problem: Problem) -> Problem:
         """Return a problem on the samples and in the units of this setup."""
-        masked = on_blocks(problem, self.cases, self.blocks, self.weights)
+        misfit = None if self.weights is None else self.weights.ratios
+        masked = on_blocks(problem, self.cases, self.blocks, misfit)
         return with_doubled_step(masked) if self.is_quick else masked
 
     def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:
@@ -156,46 +154,6 @@ def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.
     main = effect_named(name).main
     value, span = solution.values[f"{name}.{main.name}"], main.high - main.low
     return not main.low + near * span < value < main.high - near * span
-
-
-def on_blocks(
-    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], weights: Score | None
-) -> Problem:
-    """Return a problem on some blocks of the cases. weights: a score whose misfit counts as noise."""
-    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks), weights) for c in cases))
-
-
-def with_misfit_as_noise(case: Case, weights: Score | None) -> Case:
-    """Return a case in which what a model leaves of a channel counts as its noise, where that is more."""
-    if weights is None:
-        return case
-    noise = {n: s * max(1.0, weights.ratio(n)) if n in weights.sums else s for n, s in case.noise.items()}
-    return replace(case, noise=noise)
-
-
-def with_doubled_step(problem: Problem) -> Problem:
-    """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
-    drives = (coarser(c.drive) if isinstance(c.drive, Drive) else c.drive for c in problem.cases)
-    return replace(
-        problem, cases=tuple(replace(c, drive=d) for c, d in zip(problem.cases, drives, strict=True))
-    )
-
-
-def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock error that all sensors share turned into delay of the command.
-
-    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
-    rest in the clocks. None for a model without a delay.
-    """
-    names = [u.name for u in solution.problem.unknowns]
-    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
-    if DELAY not in names or not clocks:
-        return None
-    theta = solution.theta.copy()
-    common = float(np.mean(theta[clocks]))
-    theta[clocks] -= common
-    theta[names.index(DELAY)] -= common
-    return np.asarray(theta)
 
 
 def _distance(weights: Score | None, farthest: float) -> float:

@@ -1,10 +1,11 @@
-"""The acceptance rule: when a candidate is better than the present model, and which of several to accept.
+"""The criteria: when a candidate is accepted, which of several, and the verdict.
 
 A candidate is preferred when it is surely better on the validation blocks, to which neither model was fitted,
 and when that matters. Sure: the block bootstrap of the difference of the losses lies above zero at 95 %, each
 parameter paid for by the loss that a useless one would gain (Akaike, IEEE TAC 19, 1974). It matters: the
 residual of some channel falls by more than a few percent, or a response that noise hides is no longer missed.
-It is accepted when, besides, it takes away enough. All numbers are in DiagnosisSettings.
+It is accepted when, besides, it takes away enough (`refusal`). The verdict compares the test blocks with the
+noise. All numbers are in DiagnosisSettings.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from rsea_ros.diagnosis.result import Reason
+from rsea_ros.diagnosis.result import Reason, Status, Verdict
 from rsea_ros.diagnosis.score import Score, bootstrap_means
-from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings
+from rsea_ros.diagnosis.settings import DEFAULT, AcceptanceSettings, DiagnosisSettings, FloorSettings
+from rsea_ros.identification.silent import silent_channels
+from rsea_ros.signals import Fault
 
 
 class Scored(Protocol):
@@ -166,3 +169,44 @@ def loss_excess(model: Scored, best: Scored) -> float:
 
 def _loss(model: Scored, against: Scored) -> float:
     return float(model.validation.loss(against.validation).sum())
+
+
+def verdict_of(
+    scores: Sequence[Score],
+    statuses: Sequence[Status | None] = (),
+    levels: FloorSettings = DEFAULT.floor,
+    faults: Sequence[Fault] = (),
+) -> Verdict:
+    """Return the verdict of models, from the nominal one to the one with all causes.
+
+    scores: on the test blocks, one a model. statuses: of the cause that each model adds to the one before,
+    None for one that is not named. faults: of the data. Where a sensor measures nothing, something is wrong
+    that no effect explains (docs/decisions/0063-a-sensor-that-measures-nothing.md).
+    `nothing_wrong` and `explained`: the residual is at the noise floor, without causes and with such as are
+    all confirmed. `partly_explained`: causes are named although that is not so. `unexplained`: none is.
+    """
+    first, last = scores[0], scores[-1]
+    if not any(statuses):
+        is_fine = is_at_floor(first, levels) and not silent_channels(faults)
+        return "nothing_wrong" if is_fine else "unexplained"
+    is_whole = is_at_floor(last, levels) and all(status == "confirmed" for status in statuses)
+    return "explained" if is_whole else "partly_explained"
+
+
+def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
+    """Tell whether every channel is at its noise floor."""
+    return all(test.ratio(n) <= levels.reached for n in test.sums)
+
+
+def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT) -> bool:
+    """Tell whether causes take half of the residual in every channel that misfits, or all of one.
+
+    The latter counts where that one misfits much and no other gets worse by what matters.
+    """
+    levels, unchanged = settings.floor, 1.0 + settings.acceptance.matters
+    misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]
+    left = [last.ratio(n) / first.ratio(n) for n in misfitting]
+    is_explained = any(
+        first.ratio(n) > levels.large_misfit and last.ratio(n) < levels.misfit for n in misfitting
+    )
+    return bool(left) and (max(left) < levels.share_left or (is_explained and max(left) <= unchanged))

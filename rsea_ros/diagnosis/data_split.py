@@ -3,13 +3,22 @@
 Of four blocks two neighbours train, one validates, one tests, in an order drawn anew for every four: with one
 order for all, an excitation that repeats after four blocks would show each set the same part of it.
 Where a held-out record is given, all of it tests instead.
+
+Effects are screened on a few short pieces of the training blocks, spread over the record: enough to tell
+promising effects from hopeless ones.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
+from rsea_ros.diagnosis.settings import DEFAULT, PieceSettings
 from rsea_ros.identification.problem import Case
+from rsea_ros.model.drive import Drive
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
 _LONGEST, _SHORTEST = 1.0, 0.25
@@ -22,6 +31,8 @@ _ORDERS = np.array(
 )
 _PATTERN = _ORDERS[np.random.default_rng(4).integers(0, len(_ORDERS), 997)]
 """Set of each block, four in a row; repeats after more than an hour."""
+_ROUNDING = 0.05
+"""Of a period: up to this much less than a whole number of samples is one, jitter of the stamps."""
 
 
 def block_length(case: Case) -> float:
@@ -50,3 +61,104 @@ def part(case: Case, sets: tuple[int, ...]) -> Case:
     """Return the case with only the samples of some sets."""
     mask: dict[str, BoolArray] = {n: np.isin(set_of(blocks_of(case, n)), sets) for n in case.t}
     return case.within(mask)
+
+
+def short_pieces_of(
+    case: Case, outputs: Mapping[str, FloatArray], rule: PieceSettings = DEFAULT.pieces
+) -> tuple[Case, ...]:
+    """Return pieces of a case, each a run-up and a pair of training blocks, about 14 s of data in all.
+
+    Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
+    A case of a measured motion (inverse model) costs little and is returned whole.
+    """
+    fit = part(case, TRAIN)
+    thinner = _as_often_as_commands(fit)
+    drive = thinner.drive
+    if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
+        return (thinner,)
+    length = 2.0 * block_length(case)
+    starts = train_starts(case)[1:]
+    half = round(0.5 * rule.enough / length)
+    spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
+    misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])
+    misfit[spread] = -1.0
+    worst = np.argsort(misfit)[len(spread) - 2 * half :]
+    chosen = starts[np.sort(np.concatenate([spread, worst]))]
+    return tuple(_piece(thinner, drive, float(t), float(t) + length, rule.run_up) for t in chosen)
+
+
+def _as_often_as_commands(case: Case) -> Case:
+    """Return a case with every k-th sample of a channel that has k or more to a command.
+
+    What a command does shows at its own rate; the rest tells noise from noise, at several times the cost.
+    """
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return case
+    period = drive.hold * drive.step
+    every = {n: slice(None, None, _samples_in(period, t)) for n, t in case.t.items()}
+    thinner = replace(
+        drive,
+        at={n: at[every[n]] for n, at in drive.at.items()},
+        impulse={n: i[every[n]] for n, i in drive.impulse.items()},
+    )
+    return replace(
+        case,
+        drive=thinner,
+        t={n: t[every[n]] for n, t in case.t.items()},
+        measured={n: y[every[n]] for n, y in case.measured.items()},
+        mask={n: m[every[n]] for n, m in case.mask.items()},
+    )
+
+
+def _samples_in(period: float, t: FloatArray) -> int:
+    """Return how many samples of a channel a period holds, 1 at least."""
+    between = float(np.median(np.diff(t))) if len(t) > 1 else period
+    return max(1, int(period / max(between, 1e-3 * period) + _ROUNDING))
+
+
+def _misfit(case: Case, outputs: Mapping[str, FloatArray], begin: float, length: float) -> float:
+    """Return the power of a residual in a piece, each channel over its power in all, summed."""
+    total = 0.0
+    for n in case.measured.keys() & outputs.keys():
+        power = np.where(case.mask[n], (case.measured[n] - outputs[n]) ** 2, 0.0)
+        t = case.t[n] - case.start
+        inside = (t >= begin) & (t < begin + length)
+        total += float(power[inside].sum() / max(power.sum(), 1e-300))
+    return total
+
+
+def _piece(case: Case, drive: Drive, begin: float, end: float, run_up: float) -> Case:
+    """Return the part of a case between two times since its start, s; its run-up begins with a whole hold."""
+    first, last = int((begin - run_up) / drive.step) // drive.hold * drive.hold, math.ceil(end / drive.step)
+    start = drive.start + first * drive.step
+    compared = start + run_up
+    inside = {n: (t >= start) & (t < drive.start + end) for n, t in case.t.items()}
+    cut = replace(
+        drive,
+        start=start,
+        command=drive.command[first:last],
+        at={n: drive.at[n][keep] - first for n, keep in inside.items()},
+        impulse={n: drive.impulse[n][keep] for n, keep in inside.items()},
+        reference=drive.reference[first:last],
+        angle=drive.angle[first:last],
+        initial=_state_at(case, start),
+        origin=drive.origin + first * drive.step,
+        whole=drive.drift_time,
+    )
+    return replace(
+        case,
+        drive=cut,
+        t={n: t[inside[n]] for n, t in case.t.items()},
+        measured={n: y[inside[n]] for n, y in case.measured.items()},
+        mask={n: (m & (case.t[n] >= compared))[inside[n]] for n, m in case.mask.items()},
+    )
+
+
+def _state_at(case: Case, t: float) -> tuple[float, float]:
+    """Return measured position (rad) and velocity (rad/s) at a time."""
+    position, velocity = (
+        float(np.interp(t, case.t[n], case.measured[n])) if n in case.measured else 0.0
+        for n in ("position", "velocity")
+    )
+    return position, velocity

@@ -2,7 +2,7 @@
 
 The nominal model is fitted; effects are added one after another, each fitted to the training blocks and
 accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is weighed on
-the test blocks (weighing.py), and named with its gain and probability where it may be (naming.py).
+the test blocks (naming/weighing.py), and named with gain and probability where it may be (naming/status.py).
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from dataclasses import replace
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
-from rsea_ros.diagnosis.conclusion import diagnosis_of
 from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
-from rsea_ros.diagnosis.joint_play import play_not_told
+from rsea_ros.diagnosis.naming.causes import play_not_told
+from rsea_ros.diagnosis.naming.conclusion import diagnosis_of
+from rsea_ros.diagnosis.naming.weighing import weigh
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.diagnosis.stepwise import select_stepwise
-from rsea_ros.diagnosis.weighing import weigh
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.identification.confidence import torque_scale
 from rsea_ros.identification.identify import CHANNELS, unknowns_of

@@ -1,4 +1,8 @@
-"""Where fits of an effect begin: at what its file says of the residual, else at its typical parameters."""
+"""Where fits of an effect begin: at what its file says of the residual, else at its typical parameters.
+
+The typical sizes of the catalogue are those of an actuator of some 20 N m; a servo of 1 N m would stick fast.
+A joint in a position loop has sizes of its own: its largest torque says how large an effect in N m may be.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from rsea_ros.diagnosis.joint_scale import joint_starts, torque_scale
 from rsea_ros.diagnosis.residual_peaks import (
     angle_errors,
     peaks,
@@ -22,6 +25,7 @@ from rsea_ros.effects.guess import Guess
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
+from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -34,7 +38,11 @@ _SHARP_APART = 0.5
 _LOWEST, _HIGHEST = 1.0, 0.49
 """Hz and share of the rate between which peaks are looked for."""
 _OUTLIERS = 0.999
-"""Quantile of the motor torque's size that counts as its largest."""
+"""Quantile that counts as the largest value: a few samples may be outliers."""
+_SHARES = (0.03, 0.1, 0.3)
+"""Of a joint's largest torque: what friction, ripple and their like may have."""
+_LIMITS = (1.0, 0.9, 0.7)
+"""Of the same: where a limit of the torque may begin."""
 
 
 def initial_guesses(effect: Effect, view: RecordView) -> list[Guess]:
@@ -145,3 +153,30 @@ class RecordView:
     def repeating_angle(self) -> list[Guess]:
         """Return the same of the measured angle's error, amplitude in rad."""
         return angle_errors(self.case, self.rig, self.outputs)
+
+
+def torque_scale(case: Case, rig: Rig) -> float:
+    """Return the largest torque of a position loop's motor, N m: measured, or asked for by its errors."""
+    if "motor_torque" in case.measured:
+        keep = case.mask["motor_torque"]
+        return float(np.quantile(np.abs(case.measured["motor_torque"][keep]), _OUTLIERS))
+    if "position" not in case.measured or not isinstance(case.drive, Drive):
+        return 0.0
+    keep, drive = case.mask["position"], case.drive
+    steps = ((case.t["position"][keep] - drive.start) / drive.step).astype(np.int64)
+    error = drive.command[np.clip(steps, 0, len(drive.command) - 1)] - case.measured["position"][keep]
+    _, position, _, velocity, *_ = loop_parameters(rig)
+    gain = position if rig.loop == "pd" else position * velocity
+    return gain * float(np.quantile(np.abs(error), _OUTLIERS))
+
+
+def joint_starts(effect: Effect, scale: float) -> list[dict[str, float]]:
+    """Return where fits of an effect begin whose main parameter is a torque. scale: largest torque, N m."""
+    main = effect.main
+    shares = _LIMITS if main.name == "limit" else _SHARES
+    sizes = {min(max(share * scale, main.low), main.high) for share in shares}
+    torques = [p.name for p in effect.parameters if p.unit == "N m"]
+    return [
+        {**effect.typical, **{name: size * effect.typical[name] / main.typical for name in torques}}
+        for size in sorted(sizes)
+    ]

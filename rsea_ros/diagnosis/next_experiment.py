@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.recommended_run import Run, allowed_run, playable_rate
 from rsea_ros.diagnosis.result import Experiment
+from rsea_ros.identification.allowed_run import Run, allowed_run, playable_rate
 from rsea_ros.identification.excitation import JOINT, PERIODIC, Settings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, bounded_step, jacobian

@@ -42,6 +42,11 @@ class Score:
         """The channel with the largest RMS of the residual over its noise."""
         return max(self.sums, key=self.ratio)
 
+    @property
+    def ratios(self) -> dict[str, float]:
+        """RMS of the residual over the noise, by channel."""
+        return {n: self.ratio(n) for n in self.sums}
+
     def ratio(self, channel: str) -> float:
         """RMS of the residual over the noise of a channel."""
         return float(np.sqrt(self.sums[channel].sum() / max(self.counts[channel].sum(), 1.0)))

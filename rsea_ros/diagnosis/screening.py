@@ -42,13 +42,6 @@ class ScreenedEffect:
         return self.effect.name
 
 
-def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
-    """Return a problem without one of its effects, and theta without its parameters."""
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-    return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
-
-
 def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]]) -> ScreenedEffect | None:
     """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 

@@ -139,7 +139,7 @@ class ForwardSettings:
 
 @dataclass(frozen=True)
 class NamingSettings:
-    """From which probability a cause is named, and as what (naming.py)."""
+    """From which probability a cause is named, and as what (naming/status.py)."""
 
     confirmed_at_floor: float = number(
         0.8, "1", "probability from which a cause is confirmed where all causes together leave only noise",

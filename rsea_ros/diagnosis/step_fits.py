@@ -13,16 +13,19 @@ from rsea_ros.diagnosis.candidate import (
     FitSetup,
     fit_candidate,
     refit,
-    with_doubled_step,
-    with_misfit_as_noise,
 )
 from rsea_ros.diagnosis.criteria import is_equally_good, is_far_from_floor, preference
-from rsea_ros.diagnosis.data_split import VALIDATION
+from rsea_ros.diagnosis.data_split import VALIDATION, short_pieces_of
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
+from rsea_ros.diagnosis.problem_variants import (
+    with_clocks,
+    with_doubled_step,
+    with_misfit_as_noise,
+    without_clocks,
+)
 from rsea_ros.diagnosis.score import score_on
 from rsea_ros.diagnosis.screening import ScreenedEffect, screen
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.diagnosis.short_pieces import short_pieces_of
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
@@ -57,7 +60,7 @@ class StepFits:
         """The present model fitted to short pieces, with clocks taken as right."""
         runs = zip(self.present.cases, self.present.outputs, strict=True)
         pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings.pieces))
-        cases = tuple(with_misfit_as_noise(p, self.present.validation) for p in pieces)
+        cases = tuple(with_misfit_as_noise(p, self.present.validation.ratios) for p in pieces)
         solution = self.present.solution
         problem, theta = without_clocks(replace(solution.problem, cases=cases), solution.theta)
         problem = with_doubled_step(problem) if self.is_far else problem
@@ -174,19 +177,3 @@ class StepFits:
         scores, channels = (model.validation, self.present.validation), model.validation.sums
         now, before = (np.array([max(s.ratio(n), 1.0) for n in channels]) for s in scores)
         return bool(np.any(np.abs(now / before - 1.0) > self.settings.forward.moved))
-
-
-def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
-    """Return a problem and its theta with all clocks taken as right.
-
-    Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
-    """
-    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
-    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
-
-
-def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
-    """Return a problem and its theta with the clocks of another problem free again, at zero."""
-    clocks = tuple(u for u in model.unknowns if u.is_clock)
-    larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
-    return larger, np.concatenate([theta, np.zeros(len(clocks))])

@@ -2,6 +2,11 @@
 effect helps.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
+
+Where no effect helps any more, a cause's place is offered to the more detailed effects that it is said to be
+confused with. What was named first was chosen while the other causes still hid in the residual: a hardening
+spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one
+does better.
 """
 
 from __future__ import annotations
@@ -12,16 +17,19 @@ from dataclasses import replace
 from rsea_ros.diagnosis.candidate import (
     Candidate,
     FitSetup,
+    effect_size,
     fit_candidate,
     leaves_only_noise,
     refit,
     scored_against,
     with_noise_reestimated,
 )
-from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep
-from rsea_ros.diagnosis.replacement import replacement_step
+from rsea_ros.diagnosis.criteria import is_acceptable, is_far_from_floor
+from rsea_ros.diagnosis.forward_step import NO_STEP, ForwardStep, StepResult
+from rsea_ros.diagnosis.problem_variants import without_effect
 from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.effects.catalogue import look_alikes
 from rsea_ros.effects.effect import Effect
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import vector_of
@@ -62,6 +70,24 @@ def select_stepwise(
         models.append(refit(with_noise_reestimated(step.accepted), setup))
     cases = models[-1].cases
     return Selection((*(scored_against(m, cases) for m in models[:-1]), models[-1]), tuple(trials), rivals)
+
+
+def replacement_step(step: ForwardStep) -> StepResult:
+    """Return the step to a model with another effect in the place of one cause, where it is acceptable."""
+    present, settings = step.present, step.settings
+    for name in present.causes if is_far_from_floor(present, settings) else ():
+        alike = [e for e in look_alikes(name, step.effects) if e.name not in present.problem.acting]
+        rivals = [e for e in alike if effect_size(e.name) > effect_size(name)]
+        if not rivals:
+            continue
+        setup = FitSetup(
+            present.cases, settings.fits, step.pools.run, weights=present.validation, is_quick=True
+        )
+        rest = fit_candidate(setup, *without_effect(present.problem, present.solution.theta, name))
+        result = replace(step, present=rest, effects=rivals).run()
+        if result.accepted is not None and is_acceptable(result.accepted, present, settings):
+            return result
+    return NO_STEP
 
 
 def _fitted_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:

@@ -27,8 +27,8 @@ from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.report.identification_json import identification_json
-from rsea_ros.report.results import json_text
+from rsea_ros.report.identification.json import identification_json
+from rsea_ros.report.json_values import json_text
 from rsea_ros.signals import UNITS, Fault, Record
 
 _MAIN = ("ft", "deflection", "position", "velocity")
@@ -77,8 +77,8 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
     backlash for a softer spring, by as much as the work of the day makes of it (docs/fleet-trends.md).
     """
     from rsea_ros.diagnosis.diagnose import diagnose
-    from rsea_ros.report.diagnosis_json import diagnosis_json
-    from rsea_ros.report.diagnosis_page import final_values
+    from rsea_ros.report.diagnosis.json import diagnosis_json
+    from rsea_ros.report.diagnosis.page import final_values
 
     try:
         check_diagnosable(record)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from rsea_ros.diagnosis.criteria import is_at_floor
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.verdict import is_at_floor
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.laws.assembly import curve_of, law_of

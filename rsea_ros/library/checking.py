@@ -29,7 +29,7 @@ class Checks:
 
     def summary(self) -> str:
         """Return the findings as a table in plain text."""
-        from rsea_ros.report.check_text import check_table
+        from rsea_ros.report.check.text import check_table
 
         return plain(check_table(self.result))
 

@@ -51,7 +51,7 @@ class Diagnosed:
 
     def summary(self) -> str:
         """Return the verdict and what it rests on, as plain text."""
-        from rsea_ros.report.diagnosis_terminal import terminal_lines
+        from rsea_ros.report.diagnosis.terminal import terminal_lines
 
         return "\n".join(line.plain for line in terminal_lines(self.result))
 
@@ -74,7 +74,7 @@ class Diagnosed:
         """
         from msg_adapters.overlay import write_overlay
         from rsea_ros.new_files import Place
-        from rsea_ros.report.diagnosis_files import write_diagnosis
+        from rsea_ros.report.diagnosis.files import write_diagnosis
 
         return write_diagnosis(self.result, self.record, Place(Path(directory), force), write_overlay)
 

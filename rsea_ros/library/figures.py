@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import Identification, Overlay
 from rsea_ros.report import words
-from rsea_ros.report.bode import bode_figure
-from rsea_ros.report.palette import AFTER, BEFORE, MEASURED
+from rsea_ros.report.figures.bode import bode_figure
+from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED
 from rsea_ros.signals import UNITS
 
 if TYPE_CHECKING:

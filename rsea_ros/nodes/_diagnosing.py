@@ -64,7 +64,7 @@ class Diagnosing:
     def _diagnose(self, record: Record) -> Diagnosis:
         from rsea_ros.checks.carried import held_against
         from rsea_ros.diagnosis.diagnose import diagnose
-        from rsea_ros.report.diagnosis_files import write_diagnosis
+        from rsea_ros.report.diagnosis.files import write_diagnosis
 
         result = diagnose([held_against(record, self._rig, masks=True)], self._rig, progress=self._tell)
         self._report = write_diagnosis(result, record, Place(self._out, fresh=True), write_overlay)

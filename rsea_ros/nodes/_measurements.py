@@ -61,7 +61,7 @@ class Measurements:
                 continue
             self._waiting_states.popleft()
             if math.isfinite(torque + velocity + position):
-                yield stamp, Reading(torque, velocity, position, effort)
+                yield stamp, Reading(torque, velocity, position, effort, (stamp - at) / self._period)
             else:
                 self._refuse()
 

@@ -31,10 +31,10 @@ from rsea_ros.nodes._player import Player
 from rsea_ros.nodes._qos import COMMAND
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._trial import Ears, Trial
-from rsea_ros.report.campaign_files import write_campaign
-from rsea_ros.report.campaign_words import end_sentence, known
-from rsea_ros.report.diagnosis_files import write_diagnosis
-from rsea_ros.report.experiment_words import shape_words
+from rsea_ros.report.diagnosis.files import write_diagnosis
+from rsea_ros.report.experiment.campaign_files import write_campaign
+from rsea_ros.report.experiment.campaign_words import end_sentence, known
+from rsea_ros.report.experiment.words import shape_words
 from rsea_ros.signals import Record
 
 DEFAULT = "out/experiment"

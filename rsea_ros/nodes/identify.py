@@ -28,7 +28,7 @@ from rsea_ros.nodes._qos import RECORD, RECORD_RELIABLE
 from rsea_ros.nodes._run import run_node
 from rsea_ros.nodes._tap import Tap
 from rsea_ros.report.fault_words import fault_lines
-from rsea_ros.report.identification_words import verdict_sentence
+from rsea_ros.report.identification.words import verdict_sentence
 from rsea_ros.signals import Record
 
 DEFAULT = "out/identify"
@@ -117,7 +117,7 @@ class Identify:
         """Identify and write the results, or do nothing when stopped before."""
         from rsea_ros.checks.carried import held_against
         from rsea_ros.identification.identify import identify
-        from rsea_ros.report.results import write_results
+        from rsea_ros.report.identification.files import write_results
 
         if not self._done:
             return

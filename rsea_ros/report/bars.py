@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.report.figure import Figure, Json, axis, layout
-from rsea_ros.report.palette import AFTER, MEASURED, QUIET, faint
+from rsea_ros.report.figures.figure import Figure, Json, axis, layout
+from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 
 
 @dataclass(frozen=True)

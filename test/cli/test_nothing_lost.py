@@ -26,16 +26,14 @@ from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.report import (
-    control_json,
-    control_page,
-    design_json,
-    design_page,
-    diagnosis_files,
-    paper_json,
-    paper_page,
-    results,
-)
+from rsea_ros.report.control import json as control_json
+from rsea_ros.report.control import page as control_page
+from rsea_ros.report.design import json as design_json
+from rsea_ros.report.design import page as design_page
+from rsea_ros.report.diagnosis import files as diagnosis_files
+from rsea_ros.report.identification import files as results
+from rsea_ros.report.paper import json as paper_json
+from rsea_ros.report.paper import page as paper_page
 from rsea_ros.signals import Channel, Record
 
 RIG = "paper_high_impedance"

@@ -94,6 +94,20 @@ def test_measurements_that_come_when_they_come_make_no_kick(rate, kind):
     assert np.abs(run.command[settled]).max() < 0.75 * 68.0
 
 
+@pytest.mark.parametrize("rate", [280.0, 1000.0])
+def test_a_torque_sensor_that_samples_when_it_likes_costs_no_accuracy(rate):
+    """Torques up to half a sample older than the angles were taken for torques of the same instant."""
+    n = round(2.0 * rate)
+    wanted = 10.0 * np.sin(2.0 * math.pi * 5.0 * np.arange(n) / rate)
+    ages = 0.5 * np.random.default_rng(3).random(n)
+    kinds = [Arrivals(np.zeros(n), np.zeros(n), age) for age in (np.zeros(n), ages)]
+    even, aged = (
+        irregular(RIG, rate, TorqueController(RIG, rate, RATES[rate]), wanted, kind).error(0.6)
+        for kind in kinds
+    )
+    assert aged < 1.1 * even
+
+
 def test_trust_falls_at_once_and_comes_back_slowly():
     lateness = Lateness(280.0)
     assert [lateness.take(0.0), lateness.take(3.0)] == [1.0, 0.0]

@@ -10,7 +10,7 @@ from independent.faults import FAULTS
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.diagnosis_words import headline
+from rsea_ros.report.diagnosis.words import headline
 from rsea_ros.signals import Channel, Record
 
 

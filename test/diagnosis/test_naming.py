@@ -6,15 +6,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rsea_ros.diagnosis.coefficients import COEFFICIENTS
-from rsea_ros.diagnosis.evidence import Evidence
-from rsea_ros.diagnosis.flexible import Flexible
-from rsea_ros.diagnosis.naming import standing, status_of
-from rsea_ros.diagnosis.probability import features, probability
+from rsea_ros.diagnosis.criteria import takes_most, verdict_of
+from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.naming.flexible import Flexible
+from rsea_ros.diagnosis.naming.probability import features, probability
+from rsea_ros.diagnosis.naming.signature import Signature
+from rsea_ros.diagnosis.naming.status import standing, status_of
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
-from rsea_ros.diagnosis.signature import Signature
-from rsea_ros.diagnosis.verdict import takes_most, verdict_of
 
 SHARE = st.floats(0.0, 1.0)
 SPREAD = st.floats(0.0, 10.0)

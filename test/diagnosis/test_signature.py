@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.signature import Rows, projected, signature
+from rsea_ros.diagnosis.naming.contribution import Rows, projected
+from rsea_ros.diagnosis.naming.signature import signature
 
 BLOCKS, LENGTH = 48, 100
 RNG = np.random.default_rng(5)

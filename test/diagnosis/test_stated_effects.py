@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis import conclusion
 from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.naming import conclusion
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import IdentificationError
@@ -16,7 +16,7 @@ from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
-from rsea_ros.report.diagnosis_terminal import terminal_lines
+from rsea_ros.report.diagnosis.terminal import terminal_lines
 from rsea_ros.signals import Channel
 
 RATE, DURATION = 280.0, 8.0

@@ -15,7 +15,7 @@ from rsea_ros.experiment.limits import Limits
 from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.weighing import middles_of_runs, weigh
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.report.campaign_files import write_campaign
+from rsea_ros.report.experiment.campaign_files import write_campaign
 
 RIG = load_rig("paper_high_impedance")
 CAUSES = ("current_loop_lag", "hard_stop")

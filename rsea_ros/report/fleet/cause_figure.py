@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.report import words
-from rsea_ros.report.figure import Figure, Json, axis, label, layout, numbers
-from rsea_ros.report.fleet.fleet_words import day, name, value
+from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, numbers
+from rsea_ros.report.figures.palette import BEFORE, MEASURED, NOISE, QUIET, faint
 from rsea_ros.report.fleet.marks import change_marks, date_axis, points
-from rsea_ros.report.palette import BEFORE, MEASURED, NOISE, QUIET, faint
+from rsea_ros.report.fleet.words import day, name, value
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import Appearance
 from rsea_ros.trends.weeks import Steps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime, timezone
 
-from rsea_ros.report.fleet.fleet_words import short_day
+from rsea_ros.report.fleet.words import short_day
 from rsea_ros.trends.weeks import Steps
 
 _MOST = 6

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from rsea_ros.new_files import NewFiles, Place
-from rsea_ros.report.fleet.fleet_page import fleet_page
 from rsea_ros.report.fleet.joint_page import joint_page
 from rsea_ros.report.fleet.links import Links, page_names
+from rsea_ros.report.fleet.page import fleet_page
 from rsea_ros.trends.alarms import alarms_of
 from rsea_ros.trends.fleet_trends import fleet_trends
 from rsea_ros.trends.ranking import by_joint

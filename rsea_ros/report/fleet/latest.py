@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rsea_ros.report.diagnosis_words import effect
+from rsea_ros.report.diagnosis.words import effect
 from rsea_ros.trends.series import Table
 from rsea_ros.wording import listed
 

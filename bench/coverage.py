@@ -1,0 +1,144 @@
+"""Which effects are found, by kind of work and by severity, on a plant that shares no code with the project.
+
+    python bench/coverage.py play --log coverage.jsonl [--severity medium] [--sample 60]     resumes
+    python bench/coverage.py table --log coverage.jsonl
+
+A cell counts where its effect shows: where the rig alone, fitted, leaves more than the noise in some channel.
+Found: the effect is named, alone or among the rivals of a cause.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from coverage_records import COMMANDS, made
+from independent.severities import SEVERITIES, SIZES
+
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.model.rig_file import load_rig
+
+SHOWS = 1.1
+"""Times the noise that the fitted rig leaves, from which an effect shows."""
+MARKS = {"named": "+", "rival": "r", "other": "x", "none": "-", "hidden": ".", "error": "E"}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play cells or print their table."""
+    args = _parser().parse_args(argv)
+    return int(args.step(args) or 0)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    verbs = parser.add_subparsers(required=True, metavar="play|table")
+    play = verbs.add_parser("play", help="diagnose cells that the log does not hold")
+    play.add_argument("--severity", choices=SEVERITIES, action="append", help="by default all")
+    play.add_argument("--work", choices=COMMANDS, action="append", help="by default all")
+    play.add_argument("--effect", choices=SIZES, action="append", help="by default all")
+    play.add_argument("--sample", type=int, help="only so many cells, drawn by the seed")
+    play.add_argument("--seed", type=int, default=5, help="of records (default %(default)s)")
+    play.add_argument("--duration", type=float, default=20.0, help="of records, s (default %(default)s)")
+    play.set_defaults(step=_play)
+    table = verbs.add_parser("table", help="the outcomes by cell")
+    table.set_defaults(step=_table)
+    for verb in (play, table):
+        verb.add_argument("--log", type=Path, required=True, help="JSON lines, a cell each")
+    return parser
+
+
+def _play(args: argparse.Namespace) -> None:
+    import numpy as np
+
+    done = {entry["cell"] for entry in _read(args.log)}
+    cells = list(product(args.effect or SIZES, args.work or COMMANDS, args.severity or SEVERITIES))
+    order = np.random.default_rng(args.seed).permutation(len(cells))[: args.sample]
+    for effect, work, severity in (cells[k] for k in order):
+        cell = f"{effect}/{work}/{severity}/{args.seed}/{args.duration:g}"
+        if cell in done:
+            continue
+        entry = {"cell": cell, "effect": effect, "work": work, "severity": severity}
+        entry |= _outcome(effect, work, severity, args)
+        with args.log.open("a") as file:
+            file.write(json.dumps(entry) + "\n")
+        named = [f"{c['name']} {c['status']} {c['probability']:.2f}" for c in entry.get("causes", [])]
+        print(f"{entry['outcome']:<7}{cell:<55}{', '.join(named)} {entry['seconds']:.0f} s", flush=True)
+
+
+def _outcome(effect: str, work: str, severity: str, args: argparse.Namespace) -> dict[str, Any]:
+    start = time.perf_counter()
+    try:
+        record, parameters = made(effect, work, severity, args.seed, args.duration)
+        result = diagnose([record], load_rig("paper_high_impedance"))
+    except Exception:
+        return {"outcome": "error", "error": traceback.format_exc(limit=-3), "seconds": 0.0}
+    causes = [
+        {
+            "name": c.name,
+            "status": c.status,
+            "probability": c.probability,
+            "rivals": [a.name for a in result.alternatives if a.instead_of == c.name],
+        }
+        for c in result.causes
+    ]
+    left = max((result.residual_rms[k] / n for k, n in result.noise_rms.items() if n), default=0.0)
+    return {
+        "outcome": _judged(effect, causes, left),
+        "causes": causes,
+        "left": left,
+        "verdict": result.verdict,
+        "parameters": dict(parameters),
+        "seconds": round(time.perf_counter() - start, 1),
+    }
+
+
+def _judged(effect: str, causes: Sequence[dict[str, Any]], left: float) -> str:
+    """Return the outcome of a cell, a key of MARKS."""
+    if any(c["name"] == effect for c in causes):
+        return "named"
+    if any(effect in c["rivals"] for c in causes):
+        return "rival"
+    if left <= SHOWS and not causes:
+        return "hidden"
+    return "other" if causes else "none"
+
+
+def _table(args: argparse.Namespace) -> None:
+    entries = _read(args.log)
+    by_cell: dict[tuple[str, str, str], list[str]] = {}
+    for entry in entries:
+        by_cell.setdefault((entry["effect"], entry["work"], entry["severity"]), []).append(entry["outcome"])
+    print("| effect | " + " | ".join(COMMANDS) + " |\n|---|" + "---|" * len(COMMANDS))
+    for effect in SIZES:
+        marks = (
+            " ".join("".join(MARKS[o] for o in by_cell.get((effect, work, s), ())) or " " for s in SEVERITIES)
+            for work in COMMANDS
+        )
+        print(f"| {effect} | " + " | ".join(marks) + " |")
+    showing = [e for e in entries if e["outcome"] != "hidden"]
+    found = [e for e in showing if e["outcome"] in ("named", "rival")]
+    wrong = [e for e in entries if _is_surely_wrong(e)]
+    print(f"\nmild, medium, strong; {', '.join(f'{m} {o}' for o, m in MARKS.items())}")
+    print(f"found {len(found)} of {len(showing)} that show ({len(entries)} played): ", end="")
+    print(f"{len(found) / max(len(showing), 1):.1%}; wrong and confirmed: {len(wrong)}")
+
+
+def _is_surely_wrong(entry: dict[str, Any]) -> bool:
+    return any(c["status"] == "confirmed" and c["name"] != entry["effect"] for c in entry.get("causes", []))
+
+
+def _read(log: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""Records for the coverage table: one effect, one kind of work, one severity, on test/independent.
+
+That plant shares no code with the project. Six kinds of work: what benches are driven with, and what
+machines do.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
+
+from calibration_records import RATE, work
+from independent.bench import Bench, drawn_bench, record_command
+from independent.equations import DG, DH, SIZE, G, H
+from independent.excitations import chirp_noise, odd_multisine
+from independent.hidden import hide
+from independent.severities import drawn_parameters
+from independent.solvers import _pieces, _rk4
+
+from rsea_ros.signals import FloatArray, Record
+
+STIFF, DAMPED = 900.0, 15.0
+"""Gains of the closed loop on the deflection, N m/rad and N m s/rad."""
+SOFTNESS = 25.0 / 1500.0
+"""Largest angle that the closed loop is asked for, rad."""
+
+
+def made(
+    effect: str, excitation: str, severity: str, seed: int, duration: float
+) -> tuple[Record, Mapping[str, float]]:
+    """Return a record (duration in s) and the parameters of what is hidden in it."""
+    rng = np.random.default_rng([seed, *map(ord, effect + excitation + severity)])
+    parameters = drawn_parameters(effect, severity, rng)
+    bench = hide(drawn_bench(rng), effect, parameters)
+    return record_command(bench, COMMANDS[excitation](bench, duration, rng), rng), parameters
+
+
+def _work(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
+    levels = 30.0 * work(duration, rng, smooth=True)
+    return levels + rng.normal(size=len(levels))
+
+
+def _steps(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
+    return 30.0 * work(duration, rng, smooth=False)
+
+
+def _slow_sweep(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
+    """A sine of 30 N m from 0.1 to 10 Hz."""
+    t = np.arange(round(duration * RATE)) / RATE
+    growth = np.log(100.0) / duration
+    return 30.0 * np.sin(2.0 * np.pi * 0.1 * np.expm1(growth * t) / growth)
+
+
+def _closed_loop(bench: Bench, duration: float, rng: np.random.Generator) -> FloatArray:
+    """The commands of a PD loop that follows a log of work in angle, on noisy readings."""
+    reference = SOFTNESS * work(duration, rng, smooth=True)
+    noise = rng.normal(size=(2, len(reference))) * np.array([[2.0e-5], [5.0e-3]])
+    plant = bench.plant._replace(duration=duration)
+    steps = 72 if plant.gap > 0.0 or plant.gear_k > 0.0 else 24
+    late, limit = _pieces(plant.delay, 1.0 / RATE), bench.outside.saturation
+    return _followed(reference, noise, 1.0 / RATE, *late, steps, plant, limit)
+
+
+@njit(cache=True)
+def _followed(reference, noise, period, whole, part, steps, p, limit):
+    """Return the commands (n,) of u = STIFF (r - q) - DAMPED q', computed and applied sample by sample."""
+    x, commands = np.zeros(SIZE), np.zeros(reference.size)
+    k1, k2, k3, k4 = np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE)
+    first = int(np.ceil(part * steps))
+    for k in range(reference.size):
+        angle, speed = x[G] - x[H] + noise[0, k], x[DG] - x[DH] + noise[1, k]
+        wanted = 1500.0 * reference[k] + STIFF * (reference[k] - angle) - DAMPED * speed
+        commands[k] = min(max(wanted, -68.0), 68.0)
+        late = min(max(commands[k - whole - 1], -limit), limit) if k > whole else 0.0
+        now = min(max(commands[k - whole], -limit), limit) if k >= whole else 0.0
+        if first > 0:
+            _rk4(x, k * period, part * period, first, late, 0.0, p, k1, k2, k3, k4)
+        rest = (1.0 - part) * period
+        _rk4(x, k * period + part * period, rest, max(steps - first, 1), now, 0.0, p, k1, k2, k3, k4)
+    return commands
+
+
+COMMANDS: Mapping[str, Callable[[Bench, float, np.random.Generator], FloatArray]] = {
+    "chirp": lambda bench, duration, rng: chirp_noise(duration, rng),
+    "multisine": lambda bench, duration, rng: odd_multisine(duration, rng, period=5.0),
+    "work": _work,
+    "loop": _closed_loop,
+    "steps": _steps,
+    "sweep": _slow_sweep,
+}
+"""Commands of each kind of work, N m."""

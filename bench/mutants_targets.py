@@ -1,0 +1,22 @@
+"""Which modules are mutated, and which tests must notice: those of the module that run in a second or two.
+
+Tests are run in this order up to the first that fails. The slow tests of whole records would kill more, but
+late: what a decision function does is to be held by a table of it.
+"""
+
+from __future__ import annotations
+
+TARGETS: dict[str, tuple[str, ...]] = {
+    "hardware/limits": ("hardware/test_limits.py", "hardware/test_limit_tables.py"),
+    "hardware/guarded": ("hardware/test_guarded.py", "hardware/test_limits.py"),
+    "identification/noise": ("identification/test_noise_tables.py",),
+    "identification/noise_level": ("identification/test_noise_level_tables.py",),
+    "identification/coloured": ("identification/test_coloured_tables.py",),
+    "identification/quantum": ("identification/test_noise_tables.py",),
+    "identification/clocks": ("identification/test_clock_tables.py",),
+    "diagnosis/criteria": ("diagnosis/test_criteria.py",),
+    "diagnosis/verdict": ("diagnosis/test_verdict_tables.py",),
+    "diagnosis/stepwise": ("diagnosis/test_stepwise_tables.py",),
+    "diagnosis/backward_elimination": ("diagnosis/test_elimination_tables.py",),
+}
+"""By module below rsea_ros: files below test."""

@@ -1,0 +1,1 @@
+"""Naming causes: evidence, rivals, probability, status. The door is conclusion.py."""

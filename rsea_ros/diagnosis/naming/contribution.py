@@ -1,0 +1,79 @@
+"""What one cause alone contributes to a model's channels, row by row, beside the residual that is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
+from rsea_ros.diagnosis.problem_variants import with_misfit_as_noise, without_effect
+from rsea_ros.diagnosis.score import Score
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
+from rsea_ros.signals import BoolArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The weighted residuals of a model and what one cause contributes to them, row by row, shape (m,).
+
+    others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, tests:
+    whether it takes part in no fit and no choice. runs: rows of one channel of one record, in time.
+    """
+
+    contribution: FloatArray
+    residual: FloatArray
+    others: FloatArray
+    prior: FloatArray
+    block: IntArray
+    tests: BoolArray
+    runs: tuple[slice, ...]
+
+
+def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
+    """Return a problem on all samples of the cases, each channel in units of what `weights` leaves of it."""
+    return replace(problem, cases=tuple(with_misfit_as_noise(c, weights.ratios) for c in cases))
+
+
+def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -> Rows | None:
+    """Return a model's residuals and what a cause of it contributes; None where that runs away."""
+    error = problem.residual(theta)
+    less, rest = without_effect(problem, theta, name)
+    without = less.residual(rest)
+    if not np.isfinite(power(error)) or not np.isfinite(power(without)):
+        return None
+    which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
+    block, tests, runs = _places(problem)
+    return Rows(
+        contribution=error - without,
+        residual=-error,
+        others=jacobian_columns(problem, theta, error, which, run),
+        prior=np.array([1.0 / problem.unknowns[i].reach for i in which]),
+        block=block,
+        tests=tests,
+        runs=runs,
+    )
+
+
+def _places(problem: Problem) -> tuple[IntArray, BoolArray, tuple[slice, ...]]:
+    """Return for every row its block, numbered through all records, and whether it tests; and the runs."""
+    blocks, tests, runs, first, at = [], [], [], 0, 0
+    for case in problem.cases:
+        last = 0
+        for n in problem.present(case):
+            own = blocks_of(case, n)[case.mask[n]]
+            blocks.append(first + own)
+            tests.append(np.isin(set_of(own), TEST))
+            runs.append(slice(at, at + len(own)))
+            at, last = at + len(own), max(last, int(own.max(initial=0)))
+        first += last + 1
+    return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
+
+
+def projected(rows: Rows, values: FloatArray) -> FloatArray:
+    """Return what is left of rows of values when the other unknowns have done what they can."""
+    a = rows.others
+    normal = a.T @ a + np.diag(rows.prior**2)
+    return np.asarray(values - a @ np.linalg.lstsq(normal, a.T @ values, rcond=None)[0])

@@ -1,0 +1,101 @@
+"""The evidence for a cause: what data that took part in no fit say of it, beside its rivals.
+
+Computed once for every cause that was accepted and for what does nearly as well in its place; probability.py
+makes a probability of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from rsea_ros.diagnosis.criteria import preference
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION
+from rsea_ros.diagnosis.naming.contribution import rows_of, weighted_by
+from rsea_ros.diagnosis.naming.flexible import Flexible, flexible
+from rsea_ros.diagnosis.naming.signature import Signature, signature
+from rsea_ros.diagnosis.score import Score, gain, score_on
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Map
+from rsea_ros.signals import FloatArray
+
+_NEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What held-out data say of one named cause.
+
+    gain, gain_low: 1 - RMS(with) / RMS(without) of the channel that it helps most, and the lower end of its
+    95 % interval. is_sure: the gain pays for the parameters. weight: of this cause among all effects tried in
+    its place, 0 to 1. before: the worst channel's residual over its noise without it, left: what its model
+    leaves of the worst channel. at_edge: a parameter ran to a bound. siblings: causes beside it.
+    """
+
+    name: str
+    signature: Signature
+    flexible: Flexible | None
+    channel: str
+    gain: float
+    gain_low: float
+    is_sure: bool
+    weight: float
+    before: float
+    left: float
+    at_edge: bool
+    siblings: int
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A model in which a cause acts, its score on test blocks, and the score without the cause."""
+
+    name: str
+    problem: Problem
+    theta: FloatArray
+    with_it: Score
+    without: Score
+    weight: float
+
+
+def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | None:
+    """Return the evidence for a claim; None where its simulation runs away."""
+    everything = replace(claim.problem, cases=cases)
+    weights = score_on(everything, cases, (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta))
+    problem = weighted_by(claim.problem, cases, weights)
+    rows = rows_of(problem, claim.theta, claim.name, run)
+    if rows is None:
+        return None
+    own = [u for u in problem.unknowns if u.name.startswith(claim.name + ".")]
+    channel = min(
+        claim.without.sums, key=lambda n: claim.with_it.ratio(n) / max(claim.without.ratio(n), 1e-12)
+    )
+    gained, (low, _) = gain(claim.with_it, claim.without, channel)
+    return Evidence(
+        name=claim.name,
+        signature=signature(rows),
+        flexible=flexible(problem, claim.theta, claim.name, rows),
+        channel=channel,
+        gain=gained,
+        gain_low=low,
+        is_sure=preference(claim.with_it, claim.without, len(own)).sure,
+        weight=claim.weight,
+        before=claim.without.ratio(claim.without.worst),
+        left=weights.ratio(weights.worst),
+        at_edge=is_at_edge(problem, claim.theta, claim.name),
+        siblings=len(problem.added) - 1,
+    )
+
+
+def is_at_edge(problem: Problem, theta: FloatArray, name: str) -> bool:
+    """Tell whether a parameter of an effect, optional ones apart, has run to a bound of what it may be."""
+    parameters = {f"{name}.{p.name}": p for p in effect_named(name).parameters if not p.optional}
+    for unknown, t in zip(problem.unknowns, theta, strict=True):
+        p = parameters.get(unknown.name)
+        if p is None or (p.unit == "rad" and math.isclose(p.high - p.low, 2.0 * math.pi, rel_tol=0.1)):
+            continue
+        margin = _NEAR * (p.high - p.low)
+        if not p.low + margin < unknown.outer(float(t)) < p.high - margin:
+            return True
+    return False

@@ -1,0 +1,171 @@
+"""A flexible law of the same regressors: what it still gains where a cause has been named.
+
+Beside the named law a small spline of what that law reads (speed, deflection, command, the torque measured)
+acts at the same place. Were the named law right, the spline would have nothing left to do; a law that the
+catalogue lacks leaves it much. Fitted linearly, with all other unknowns, on all blocks but the test blocks.
+
+The responses to the spline's parts are simulated: a torque at the gear or in the spring is a torque beside
+the command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.naming.contribution import Rows
+from rsea_ros.diagnosis.score import RESAMPLES
+from rsea_ros.effects import signal_table as st
+from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.effects.effect import Effect
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.model.drive import Drive
+from rsea_ros.signals import FloatArray
+
+_KNOTS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+"""Quantiles of a regressor's size between which the spline is straight, each sign for itself."""
+_LAGS = (1, 2, 4, 8)
+"""Samples by which a law of the command's past may look back."""
+_RIDGE = 1e-6
+"""Of each column's power: keeps parts of the spline apart that the data do not."""
+_STEP = 1e-2
+"""Of the largest command: torque at which the responses are taken."""
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """What the spline gains: share of the residual on test blocks, its 95 % interval, and how much of what
+    the cause itself takes away that is (both as powers)."""
+
+    gain: float
+    ci95: tuple[float, float]
+    of_cause: float
+
+
+def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flexible | None:
+    """Return what a spline gains beside a cause; None where the cause reads nothing that a spline could."""
+    responses = _responses(problem, theta, effect_named(name))
+    if not responses:
+        return None
+    matrix = np.column_stack([*responses, rows.others])
+    size = np.sqrt(np.sum(matrix**2, axis=0))
+    matrix = matrix[:, size > 0.0] / size[size > 0.0]
+    fits = ~rows.tests
+    normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
+    left = (
+        rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
+    )
+    before, after = (_by_block(rows, v) for v in (rows.residual, left))
+    cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
+    return Flexible(
+        gain=1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))),
+        ci95=_interval(before, after),
+        of_cause=float(before.sum() - after.sum()) / max(cause, 1e-300),
+    )
+
+
+def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
+    """Return the power of values in each test block."""
+    power = np.bincount(rows.block, values**2 * rows.tests)
+    return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
+
+
+def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:
+    picks = np.random.default_rng(0).integers(0, len(before), (RESAMPLES, len(before)))
+    gains = 1.0 - np.sqrt(after[picks].sum(axis=1) / np.maximum(before[picks].sum(axis=1), 1e-300))
+    low, high = np.quantile(gains, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
+    """Return the weighted responses of all rows to each part of the spline, shape (m,) each."""
+    base = problem.outputs(theta)
+    signals = [_signal(c, out, effect) for c, out in zip(problem.cases, base, strict=True)]
+    if any(s is None for s in signals):
+        return []
+    parts = [
+        _spline(s, effect, _hold(c)) for s, c in zip(signals, problem.cases, strict=True) if s is not None
+    ]
+    zero = problem.residual_of(base)
+    moved = ([_with_part(problem, theta, base, effect, [p[k] for p in parts])] for k in range(len(parts[0])))
+    return [problem.residual_of(m[0]) - zero for m in moved]
+
+
+def _hold(case: Case) -> int:
+    return case.drive.hold if isinstance(case.drive, Drive) else 1
+
+
+def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArray | None:
+    """Return what the effect reads, on the drive's steps or at the samples of the channel that it adds to."""
+    drive = case.drive
+    if not isinstance(drive, Drive):
+        return drive.v if st.GEAR_VELOCITY in effect.reads else None
+    if effect.port in (st.Port.COMMAND, st.Port.MOTOR):
+        return drive.command
+    if effect.port is st.Port.SENSOR:
+        return out.get("ft")
+    at = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
+    if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
+        return np.asarray(np.interp(at, case.t["velocity"], out["velocity"]))
+    if st.GEAR_VELOCITY in effect.reads and "position" in out:
+        t = case.t["position"]
+        return np.asarray(np.interp(at, t, np.gradient(out["position"], t)))
+    read = next((n for n in ("position", "ft") if n in out), None)
+    if effect.port is not st.Port.SPRING or read is None:
+        return None
+    return np.asarray(np.interp(at, case.t[read], out[read]))
+
+
+def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
+    """Return the parts of the spline along a signal: hats over its size for either sign, or its past."""
+    if effect.main.unit in ("s", "Hz") and effect.port in (st.Port.COMMAND, st.Port.SENSOR):
+        step = hold if effect.port is st.Port.COMMAND else 1
+        return [np.concatenate([np.full(k * step, signal[0]), signal[: -k * step]]) - signal for k in _LAGS]
+    size = np.abs(signal)
+    knots = np.unique(np.quantile(size, _KNOTS))
+    if len(knots) < 2:
+        return []
+    hats = [np.interp(size, knots, np.eye(len(knots))[k]) for k in range(len(knots))]
+    return [hat * side for side in (signal > 0.0, signal < 0.0) for hat in hats]
+
+
+def _with_part(
+    problem: Problem,
+    theta: FloatArray,
+    base: Sequence[dict[str, FloatArray]],
+    effect: Effect,
+    parts: Sequence[FloatArray],
+) -> list[dict[str, FloatArray]]:
+    """Return the channels with one part of the spline acting where the effect does."""
+    if effect.port is st.Port.SENSOR:
+        return [{**out, "ft": out["ft"] + part} for out, part in zip(base, parts, strict=True)]
+    drives = [c.drive for c in problem.cases]
+    if not all(isinstance(d, Drive) for d in drives):
+        return [{"motor_torque": o["motor_torque"] + p} for o, p in zip(base, parts, strict=True)]
+    size = _STEP * max(float(np.max(np.abs(d.command))) for d in drives if isinstance(d, Drive))
+    pushed = [
+        replace(d, command=d.command + size * p / max(float(np.max(np.abs(p))), 1e-300))
+        for d, p in zip(drives, parts, strict=True)
+        if isinstance(d, Drive)
+    ]
+    cases = tuple(replace(c, drive=d) for c, d in zip(problem.cases, pushed, strict=True))
+    outputs = replace(problem, cases=cases).outputs(theta)
+    if effect.port is not st.Port.COMMAND:
+        outputs = [{**o, **_kept(b, "motor_torque")} for o, b in zip(outputs, base, strict=True)]
+    if effect.port is st.Port.SPRING:
+        outputs = [_seen(c, o, d) for c, o, d in zip(problem.cases, outputs, pushed, strict=True)]
+    return outputs
+
+
+def _kept(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
+    return {name: base[name]} if name in base else {}
+
+
+def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
+    """Return channels in which the F/T sensor feels what was taken from the spring's torque."""
+    if "ft" not in out or not isinstance(case.drive, Drive):
+        return out
+    at = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)
+    return {**out, "ft": out["ft"] - np.interp(case.t["ft"], at, pushed.command - case.drive.command)}

@@ -1,0 +1,63 @@
+"""The probability that a cause is what it is called: a logistic model of the evidence for it.
+
+    p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
+
+The features f say how far the law's shape fits (signature.py), what a flexible law still gains (flexible.py),
+how it stands among its rivals (rivals.py), and how much it helps. The coefficients are those of
+`bench/calibration.py fit`; "none of these" is the mass that a cause and its rivals leave.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
+from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.identification.result import AT_NOISE
+
+INTERCEPT = "intercept"
+_LEAST = 3e-3
+"""Spread of lambda that two right simulations of one law have at least (MODEL_DOUBT in causes.py)."""
+_MOST = 3.0
+"""Spread of lambda from which a larger one says no more."""
+_CERTAIN = 30.0
+"""Log odds from which no number of this machine differs from certainty."""
+_SUREST = 4.0
+"""Log odds among rivals: what is more certain says no more, for all of them may be wrong."""
+
+
+def features(e: Evidence, preferred: bool) -> dict[str, float]:
+    """Return the numbers that the logistic model weighs, by name. preferred: the search chose it.
+
+    shape: how far lambda spreads. rivals: log odds among them, less the farther the noise is, for what is
+    left there is no noise, and more parameters always bend a law a little nearer to it. noise: its model
+    leaves only that. flexible: what a spline surely gains beside it. edge: a parameter ran to a bound.
+    """
+    s, flexible = e.signature, e.flexible
+    bent = max(s.amplitude, s.time, s.frequency)
+    return {
+        INTERCEPT: 1.0,
+        "shape": 0.5 * (_relative(s.overall) + _relative(bent)),
+        "rivals": _log_odds(e.weight) / max(e.left, 1.0),
+        "preferred": float(preferred),
+        "noise": float(e.left <= AT_NOISE),
+        "flexible": flexible.gain if flexible and flexible.ci95[0] > 0.0 else 0.0,
+        "edge": float(e.at_edge),
+    }
+
+
+def _relative(spread: float) -> float:
+    """Return the logarithm of a spread of lambda over 0.1."""
+    return math.log((_LEAST + min(spread, _MOST)) / 0.1)
+
+
+def _log_odds(weight: float) -> float:
+    inside = min(max(weight, 1e-9), 1.0 - 1e-9)
+    return min(max(math.log(inside / (1.0 - inside)), -_SUREST), _SUREST)
+
+
+def probability(e: Evidence, preferred: bool, coefficients: Mapping[str, float] = COEFFICIENTS) -> float:
+    """Return the probability that the cause is part of the truth under its name, 0 to 1."""
+    odds = sum(coefficients[name] * value for name, value in features(e, preferred).items())
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -_CERTAIN), _CERTAIN)))

@@ -1,0 +1,135 @@
+"""Claims: every accepted cause and every rival of it, as a model that held-out data can be asked about.
+
+Rivals of a cause are the effects that were tried beside the same model and what is said to be confused with
+it and does as well in its place. Each has a weight by what it leaves of the test blocks: pseudo-BMA with the
+Bayesian bootstrap,
+
+    w_k = mean over bootstraps of softmax_k(-1/2 (sum_b v_b loss_kb + price_k))
+
+v: Dirichlet weights of the blocks times their number. A rival that is ahead by a few blocks' luck does not
+get all the weight, as it would from the sum alone (Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13, 2018).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
+from rsea_ros.diagnosis.data_split import TEST
+from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.naming.evidence import Claim
+from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.workers import Pools
+from rsea_ros.signals import FloatArray
+
+LEAST_WEIGHT = 0.02
+"""Of all that was tried in a cause's place: a rival with less is none."""
+MOST_RIVALS = 3
+
+
+@dataclass(frozen=True)
+class Contest:
+    """A cause that was accepted and its rivals, the likeliest first."""
+
+    cause: Claim
+    rivals: tuple[Claim, ...]
+
+
+def contests(selection: Selection, stages: Sequence[Evaluated], pools: Pools) -> list[Contest]:
+    """Return the contest for the place of each accepted cause, in the order of the stages."""
+    result = []
+    for without, with_it in itertools.pairwise(stages):
+        name = with_it.added
+        last = stages[-1].solution
+        claim = Claim(name, last.problem, last.theta, with_it.test, without.test, 1.0)
+        rounds = [t for t in selection.trials if t.name == name and t.reason == "replaced"]
+        tried = beside(selection, rounds[-1].beside) if rounds else []
+        result.append(weighed(selection, claim, tried, pools))
+    return result
+
+
+def beside(selection: Selection, model: Candidate) -> list[Trial]:
+    """Return the trials beside a model that were fitted to everything, each effect's last."""
+    full = {t.name: t for t in selection.trials if t.is_full and t.beside.causes == model.causes}
+    return list(full.values())
+
+
+def weighed(selection: Selection, claim: Claim, tried: Sequence[Trial], pools: Pools) -> Contest:
+    """Return a contest of a claim with what was tried beside the same model, or does as well in its place.
+
+    Another cause that was accepted too is no rival, whichever of the two came first.
+    """
+    cases, last = selection.cases, set(selection.last.causes)
+    tried = [t for t in tried if t.name == claim.name or t.name not in last]
+    scores = list(pools.fits.map(lambda t: trial_score(t, cases), tried))
+    priors = [prior_cost(t.problem, t.theta) for t in tried]
+    weights = _stacked(scores, priors, [effect_size(t.name) for t in tried])
+    of = {t.name: w for t, w in zip(tried, weights, strict=True)}
+    rivals = [
+        Claim(t.name, t.problem, t.theta, s, score_on(t.problem, cases, TEST, t.beside.outputs), of[t.name])
+        for t, s in zip(tried, scores, strict=True)
+        if t.name != claim.name
+    ]
+    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(last)]
+    own, others = of.get(claim.name, 1.0), _weights_of(selection, swapped)
+    for model, weight in zip(swapped, others[1:], strict=True):
+        rivals.append(_in_place(claim, model, cases, weight))
+    heavy = sorted((r for r in rivals if r.weight >= LEAST_WEIGHT), key=lambda r: -r.weight)
+    once = {r.name: r for r in reversed(heavy)}
+    kept = sorted(once.values(), key=lambda r: -r.weight)[:MOST_RIVALS]
+    return Contest(replace(claim, weight=min(own, others[0])), tuple(kept))
+
+
+def trial_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
+    """Return how a trial does on the test blocks."""
+    problem = replace(trial.problem, cases=cases)
+    return score_on(problem, cases, TEST, problem.outputs(trial.theta))
+
+
+def _in_place(claim: Claim, model: Candidate, cases: tuple[Case, ...], weight: float) -> Claim:
+    """Return the claim of another effect that does as well in a cause's place."""
+    problem, theta = model.solution.problem, model.solution.theta
+    tested = score_on(problem, cases, TEST, model.outputs)
+    return Claim(model.newest, problem, theta, tested, claim.without, weight)
+
+
+def _weights_of(selection: Selection, rivals: Sequence[Candidate]) -> list[float]:
+    """Return the weights of the last model and of those with another effect in a cause's place."""
+    models = [selection.last, *rivals]
+    scores = [score_on(m.solution.problem, selection.cases, TEST, m.outputs) for m in models]
+    return _stacked(scores, [m.prior_cost for m in models], [m.size for m in models])
+
+
+def _stacked(scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int]) -> list[float]:
+    """Return weights; every number that describes an effect costs the logarithm of the number of blocks.
+
+    A law that holds another as a special case does as well wherever the other is right (Schwarz, Annals of
+    Statistics 6, 1978).
+    """
+    if not scores:
+        return []
+    best = min(scores, key=lambda s: float(s.loss(s).sum()))
+    losses = [s.loss(best) for s in scores]
+    prices = [p + math.log(len(losses[0])) * size for p, size in zip(priors, sizes, strict=True)]
+    return [float(w) for w in stacked(losses, prices)]
+
+
+def stacked(losses: Sequence[FloatArray], prices: Sequence[float]) -> FloatArray:
+    """Return a weight for each model, shape (k,), summing to 1.
+
+    losses: twice the negative log likelihood of every block, shape (b,) each. prices: of the priors, alike.
+    """
+    loss = np.array(losses)
+    blocks = loss.shape[1]
+    draws = np.random.default_rng(0).dirichlet(np.ones(blocks), RESAMPLES) * blocks
+    evidence = -0.5 * (draws @ loss.T + np.asarray(prices))
+    evidence -= evidence.max(axis=1, keepdims=True)
+    likely = np.exp(evidence)
+    return np.asarray((likely / likely.sum(axis=1, keepdims=True)).mean(axis=0))

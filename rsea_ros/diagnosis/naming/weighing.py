@@ -1,0 +1,112 @@
+"""Weighing: the evidence for every accepted cause and its rivals, and for one more that surely helps.
+
+A step of the search asks for a tenth of some channel's residual, far from the floor for more. Where several
+small effects overlap none brings so much. What nevertheless surely helps on blocks that took no part is
+promoted: it becomes a cause to be weighed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from rsea_ros.checks.faults import Checked
+from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
+from rsea_ros.diagnosis.criteria import is_at_floor, preference
+from rsea_ros.diagnosis.data_split import TEST
+from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
+from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
+from rsea_ros.diagnosis.naming.rivals import beside, contests, trial_score
+from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.settings import DiagnosisSettings
+from rsea_ros.identification.problem import Case
+from rsea_ros.identification.workers import Pools
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A claim with its evidence."""
+
+    claim: Claim
+    evidence: Evidence
+
+
+@dataclass(frozen=True)
+class Place:
+    """A cause and its rivals, each with its evidence. is_late: the steps of the search had left it out."""
+
+    cause: Weighed
+    rivals: tuple[Weighed, ...]
+    is_late: bool = False
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """The selection and its stages, with one more cause where one surely helps, and the evidence by place."""
+
+    selection: Selection
+    stages: list[Evaluated]
+    places: list[Place]
+
+
+def weigh(
+    selection: Selection,
+    stages: Sequence[Evaluated],
+    holdout: Checked | None,
+    pools: Pools,
+    settings: DiagnosisSettings,
+) -> Weighing:
+    """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far.
+
+    holdout: the record that takes the place of the test blocks, where one was given.
+    """
+    accepted = len(stages)
+    if not is_at_floor(stages[-1].test, settings.floor):
+        selection, stages = promoted(selection, stages, holdout, pools, settings)
+    held = contests(selection, stages, pools)
+    claims = [c for contest in held for c in (contest.cause, *contest.rivals)]
+    found = pools.fits.map(partial(evidence_for, cases=selection.cases, run=pools.run), claims)
+    of = {id(c): e for c, e in zip(claims, found, strict=True)}
+
+    def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
+        return tuple(Weighed(c, e) for c in group if (e := of[id(c)]) is not None)
+
+    places = [
+        Place(cause[0], with_evidence(contest.rivals), is_late=k >= accepted)
+        for k, contest in enumerate(held, start=1)
+        if (cause := with_evidence([contest.cause]))
+    ]
+    return Weighing(selection, list(stages), places)
+
+
+def promoted(
+    selection: Selection,
+    stages: Sequence[Evaluated],
+    holdout: Checked | None,
+    pools: Pools,
+    settings: DiagnosisSettings,
+) -> tuple[Selection, list[Evaluated]]:
+    """Return the selection and its stages with the effect that helps most, if one surely does."""
+    cases, last = selection.cases, selection.last
+    tried = [t for t in beside(selection, last) if t.name not in last.causes]
+    scores = list(pools.fits.map(lambda t: trial_score(t, cases), tried))
+    helpful = [(t, s) for t, s in zip(tried, scores, strict=True) if _helps(t, s, cases)]
+    if not helpful:
+        return selection, list(stages)
+    against = min((s for _, s in helpful), key=lambda s: float(s.loss(s).sum()))
+    trial, _ = min(helpful, key=lambda item: float(item[1].loss(against).sum()))
+    setup = FitSetup(cases, settings.fits, pools.run, trial.beside.validation)
+    model = fit_candidate(setup, trial.problem, trial.theta)
+    if model.is_at_bound:
+        return selection, list(stages)
+    marked = replace(trial, reason="replaced")
+    larger = replace(selection, models=(*selection.models, model), trials=(*selection.trials, marked))
+    return larger, [*stages, evaluate(larger, model, holdout, pools, settings)]
+
+
+def _helps(trial: Trial, score: Score, cases: tuple[Case, ...]) -> bool:
+    """Tell whether a trial surely does better than the model that it was tried beside."""
+    without = score_on(trial.problem, cases, TEST, trial.beside.outputs)
+    return preference(score, without, len(trial.theta) - trial.beside.parameters).better

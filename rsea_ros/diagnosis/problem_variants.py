@@ -1,0 +1,82 @@
+"""Variants of a problem: on some blocks, in other units, on longer steps, without clocks or an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.diagnosis.data_split import part
+from rsea_ros.identification.problem import Case, Problem
+from rsea_ros.identification.solver import Solution
+from rsea_ros.model.drive import Drive, coarser
+from rsea_ros.signals import FloatArray
+
+DELAY = "command_delay.delay"
+
+
+def on_blocks(
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], misfit: Mapping[str, float] | None
+) -> Problem:
+    """Return a problem on some blocks of the cases. misfit: what counts as noise (with_misfit_as_noise)."""
+    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks), misfit) for c in cases))
+
+
+def with_misfit_as_noise(case: Case, misfit: Mapping[str, float] | None) -> Case:
+    """Return a case in which what a model leaves of a channel counts as its noise, where that is more.
+
+    misfit: RMS of what it leaves over the noise, by channel.
+    """
+    if misfit is None:
+        return case
+    noise = {n: s * max(1.0, misfit[n]) if n in misfit else s for n, s in case.noise.items()}
+    return replace(case, noise=noise)
+
+
+def with_doubled_step(problem: Problem) -> Problem:
+    """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
+    drives = (coarser(c.drive) if isinstance(c.drive, Drive) else c.drive for c in problem.cases)
+    return replace(
+        problem, cases=tuple(replace(c, drive=d) for c, d in zip(problem.cases, drives, strict=True))
+    )
+
+
+def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Problem, FloatArray]:
+    """Return a problem without one of its effects, and theta without its parameters."""
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
+    rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
+    return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
+def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with all clocks taken as right.
+
+    Beside a misfit far above the noise the clocks only run to their bounds and lead the search astray.
+    """
+    keep = [i for i, u in enumerate(problem.unknowns) if not u.is_clock]
+    return replace(problem, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+
+
+def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Problem, FloatArray]:
+    """Return a problem and its theta with the clocks of another problem free again, at zero."""
+    clocks = tuple(u for u in model.unknowns if u.is_clock)
+    larger = replace(problem, unknowns=(*problem.unknowns, *clocks))
+    return larger, np.concatenate([theta, np.zeros(len(clocks))])
+
+
+def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
+    """Return theta with the clock error that all sensors share turned into delay of the command.
+
+    Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
+    rest in the clocks. None for a model without a delay.
+    """
+    names = [u.name for u in solution.problem.unknowns]
+    clocks = [i for i, u in enumerate(solution.problem.unknowns) if u.is_clock and not u.is_rate]
+    if DELAY not in names or not clocks:
+        return None
+    theta = solution.theta.copy()
+    common = float(np.mean(theta[clocks]))
+    theta[clocks] -= common
+    theta[names.index(DELAY)] -= common
+    return np.asarray(theta)

@@ -1,0 +1,131 @@
+"""What the paper prints as numbers, each beside the same number recomputed here.
+
+A claim keeps the text as printed, so that agreement means: equal to the last printed digit. Only numbers that
+follow from others of the paper count (`found`); the rest need one that it does not print (`silent`), or one
+that it says it tuned or that our sources only bound (`unclear`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+from rsea_ros.model.bandwidth import pure_torque_bandwidth
+from rsea_ros.model.train import Train
+from rsea_ros.paper import formulas
+
+TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "J_op": ("0.0012", "kg m^2"),
+        "J_od": ("0.010", "kg m^2"),
+        "J_lp": ("1e8", "kg m^2"),
+        "J_ld": ("0.091", "kg m^2"),
+        "J_m": ("0.953", "kg m^2"),
+        "J_sc": ("0.0040", "kg m^2"),
+        "b_s": ("3", "N m s/rad"),
+        "b_m": ("23.088", "N m s/rad"),
+        "b_lp": ("1e8", "N m s/rad"),
+        "b_ld": ("0.02", "N m s/rad"),
+        "K_lp": ("1e8", "N m/rad"),
+        "K_ld": ("7", "N m/rad"),
+        "K_s": ("1530.456", "N m/rad"),
+    }
+)
+"""Table 2 as printed (the paper leaves the per-radian out of its units)."""
+
+SPRING_RATE, ARM = 207350.0, 0.0635
+"""N/m of one spring, nominal, and half of the 127 mm between two (section 3.2.1)."""
+NO_LOAD_CURRENT, NO_LOAD_SPEED, TORQUE_CONSTANT = 1.65, 33.1 * 2.0 * math.pi / 60.0, 6.826
+"""A, rad/s and N m/A of the motor without load (maker's data): what all drag together can be."""
+PENDULUM_MASS, PENDULUM_LENGTH, GRAVITY = 5.8, 0.114, 9.80665
+PROTOTYPE_RATE, PROTOTYPE_ARM = 185185.0, 0.0254
+PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA = 260.0, 6.169e-4
+KNEE_TORQUE = 150.0
+PROTOTYPE_TRAINS: tuple[Train, Train] = ("harmonic_circular_spline_held", "harmonic_flexspline_held")
+"""CPL-25A-160 is a harmonic drive; the paper leaves out which spline is held, so n = -160 or +161."""
+
+Status = Literal["found", "silent", "unclear"]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """where: section or equation. printed: the paper's digits. ours: same unit. how: what ours comes from.
+
+    status: found, where the paper's numbers alone make ours; silent, where one is missing; unclear otherwise.
+    """
+
+    where: str
+    what: str
+    printed: str
+    ours: float
+    unit: str
+    how: str
+    status: Status = "found"
+
+    @property
+    def difference(self) -> float:
+        """(ours - printed) / printed."""
+        return self.ours / float(self.printed) - 1.0
+
+    @property
+    def agrees(self) -> bool:
+        """Whether ours rounds to the printed digits."""
+        return abs(self.ours - float(self.printed)) <= 0.5001 * last_digit(self.printed)
+
+
+def last_digit(printed: str) -> float:
+    """Return the value of one step of the last printed digit: 0.01 for `3.14`, 1e-7 for `6.169e-4`."""
+    mantissa, _, exponent = printed.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return float(10.0 ** (int(exponent or 0) - decimals))
+
+
+def table_2(name: str) -> float:
+    """Return a value of Table 2, SI."""
+    return float(TABLE_2[name][0])
+
+
+def claims() -> tuple[Claim, ...]:
+    """Return every printed number that others bear on, those that the paper's numbers alone make first."""
+    return (*_recomputed(), *_from_the_springs(), *_from_the_parts())
+
+
+def _recomputed() -> Iterator[Claim]:
+    c_2 = formulas.EQ_10[2]
+    yield Claim("Eq. (10)", "K_s/J_eff, numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator")
+    j_eff, b_eff = formulas.eq_10_inertia_and_damping(table_2("K_s"))
+    j_m, b_m = j_eff - table_2("J_sc"), b_eff - table_2("b_s")
+    averaged = "Eq. (10), both K_s/J_eff averaged as the paper says"
+    yield Claim("Table 2", "J_m", TABLE_2["J_m"][0], j_m, "kg m^2", f"{averaged}, less J_sc")
+    yield Claim("Table 2", "b_m", TABLE_2["b_m"][0], b_m, "N m s/rad", f"{averaged}, less b_s")
+    factor = 1.0 - 10.0 ** (-3.0 / 20.0)
+    yield Claim(
+        "Eq. (7)", "factor", "0.292", factor, "1", "+3 dB of an undamped Eq. (6); √2 would make 0.293"
+    )
+    band = pure_torque_bandwidth(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA)
+    yield Claim("4.1, Fig. 20", "bandwidth of the prototype", "55.5", band, "Hz", "Eq. (7)")
+
+
+def _from_the_springs() -> Iterator[Claim]:
+    missing = "Eq. (9) with r_s = 0: r_s is not printed"
+    for where, what, printed, rate, arm in (
+        ("3.2.1", "K_s, nominal", "1690.5", SPRING_RATE, ARM),
+        ("4.1", "K_s, prototype", "260", PROTOTYPE_RATE, PROTOTYPE_ARM),
+    ):
+        ours = formulas.eq_9_spring_stiffness(rate, arm, 0.0)
+        yield Claim(where, what, printed, ours, "N m/rad", missing, "silent")
+
+
+def _from_the_parts() -> Iterator[Claim]:
+    inertia = PENDULUM_MASS * PENDULUM_LENGTH**2
+    stiffness = PENDULUM_MASS * GRAVITY * PENDULUM_LENGTH
+    drag = TORQUE_CONSTANT * NO_LOAD_CURRENT / NO_LOAD_SPEED
+    for what, name, ours, unit, how in (
+        ("J_ld, pendulum", "J_ld", inertia, "kg m^2", "at least: m l² of 5.8 kg at 0.114 m"),
+        ("K_ld, pendulum", "K_ld", stiffness, "N m/rad", "m g l; the paper says that K_ld was tuned"),
+        ("b_m, viscous", "b_m", drag, "N m s/rad", "at most: the maker's no-load 1.65 A at 33.1 rpm"),
+    ):
+        yield Claim("Table 2", what, TABLE_2[name][0], ours, unit, how, "unclear")

@@ -1,0 +1,16 @@
+"""Where the paper contradicts itself, is silent, or can be read in two ways, each with its number.
+
+`found` is only what two statements of the paper make impossible together; what it admits, what it says of
+another machine, or what rests on an estimate of ours is none.
+"""
+
+from __future__ import annotations
+
+from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.findings_bench import identification, moving_output, prototype
+from rsea_ros.paper.findings_theory import circuit, equations
+
+
+def findings() -> tuple[Finding, ...]:
+    """Return all of them, in the order of the paper."""
+    return (*circuit(), *equations(), *identification(), *moving_output(), *prototype())

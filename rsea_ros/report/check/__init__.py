@@ -1,0 +1,1 @@
+"""What a check says of a record: on a terminal and for programs."""

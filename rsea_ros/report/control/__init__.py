@@ -1,0 +1,1 @@
+"""A controlled actuator: page, tables, control.json."""

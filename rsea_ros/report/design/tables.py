@@ -1,0 +1,143 @@
+"""The tables of a design's page: demands, springs, margins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
+from rsea_ros.design.judge import Check, Design, judge
+from rsea_ros.design.margins import Margin, margins, spreads_of
+from rsea_ros.report import words
+from rsea_ros.report.page.html import section
+from rsea_ros.report.page.table import table
+
+
+def checks_table(designs: Sequence[Design]) -> str:
+    head = ["Demand", "Limit", *(f"K_s = {d.stiffness:.0f} N·m/rad" for d in designs)]
+    rows = []
+    for i, check in enumerate(designs[0].checks):
+        sign = "≥" if check.least else "≤"
+        limit = f"{sign} {words.number(check.limit)} {_unit(check)}"
+        rows.append([check.name, limit, *(_cell(d.checks[i]) for d in designs)])
+    met = [d for d in designs if d.feasible]
+    finding = (
+        f"{len(met)} of {len(designs)} designs meet all demands"
+        if met
+        else "No design meets all demands: the motor is too weak"
+    )
+    return section(finding, table(head, rows, numbers=range(1, len(head))))
+
+
+def _cell(check: Check) -> str:
+    value = "not possible" if math.isnan(check.value) else f"{words.number(check.value)} {_unit(check)}"
+    return f"{'✓' if check.met else '✗'} {value}"
+
+
+def _unit(check: Check) -> str:
+    return "°" if check.unit == "deg" else words.unit(check.unit)
+
+
+def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
+    """Return the design with every train that the unit may have, and what J_m leaves open."""
+    hz = d.requirement.bandwidth
+    head = [
+        "Train",
+        "n",
+        "J_sc + n J_r, g·m²",
+        f"±3 dB with K_s = {d.stiffness:.0f}, Hz",
+        "90 % of J_m, Hz",
+        f"K_s for {hz:g} Hz, N·m/rad",
+        "K_s for all demands",
+    ]
+    body = [
+        [
+            words.train(row.train),
+            signed(row.turns, 0),
+            signed(1e3 * row.inner, 2),
+            hertz(row.band),
+            " to ".join(hertz(v) for v in row.band_range),
+            f"{row.for_band:.0f}",
+            f"{row.least:.0f}",
+        ]
+        for row in rows
+    ]
+    spread, factor = 100.0 * d.unit.rotor_spread, math.exp(NINETY_PERCENT * d.unit.rotor_spread)
+    caption = (
+        f"J_m = {d.unit['reflected_inertia']:g} kg·m² within {spread:.0f} % (one sigma, log-normal: 90 % "
+        f"from 1/{factor:.2f} to {factor:.2f} times). A rotor that turns against the output takes its spin "
+        "from the chassis' inertia: below zero T_d/T_p falls without a resonance, and a heavier chassis "
+        f"widens the band. Train: {d.unit.sources['train']}."
+    )
+    title = (
+        "Which way the rotor turns is not known: both senses side by side"
+        if sense_unknown(rows)
+        else "What the rotor's spin makes of the band"
+    )
+    return section(title, table(head, body, numbers=range(1, 7)), caption=caption)
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a number with its sign."""
+    return f"{value:+.{digits}f}".replace("-", "−")
+
+
+def hertz(value: float) -> str:
+    """Return a frequency, or that it has no limit."""
+    return "no limit" if math.isinf(value) else f"{value:.1f}"
+
+
+def springs_table(designs: Sequence[Design]) -> str:
+    r = designs[0].requirement
+    head = [
+        "Separation, mm",
+        *(f"for {d.stiffness:.0f} N·m/rad" for d in designs),
+        "travel, mm",
+    ]
+    rows = []
+    for separation in sorted({r.separation, 0.0762, 0.1016}):
+        if separation > r.diameter:
+            continue
+        varied = replace(r, separation=separation)
+        rates = [judge(varied, d.unit, d.stiffness).rate for d in designs]
+        travel = 0.5 * separation * math.sin(r.deflection)
+        rows.append(
+            [words.number(1e3 * separation), *(f"{v / 1e3:.0f}" for v in rates), words.number(1e3 * travel)]
+        )
+    short = 100.0 * designs[0].error
+    caption = (
+        f"Eq. (9) turned round, r_s = {1e3 * r.spring_radius:.1f} mm. Travel at "
+        f"{math.degrees(r.deflection):g}°, where the sin·cos "
+        f"law of Eq. (8) falls {short:.2f} % short of linear."
+    )
+    return section(
+        "Rate of one spring, N/mm: a wider separation makes the same joint from softer springs",
+        table(head, rows, numbers=range(6)),
+        caption=caption,
+    )
+
+
+def margins_table(d: Design) -> str:
+    rows = margins(d)
+    head = ["Quantity", "5 %", "median", "95 %", "limit", "meets it"]
+    body = [_margin_row(m) for m in rows]
+    spreads = ", ".join(f"{name.replace('_', ' ')} {100 * s:g} %" for name, s in spreads_of(d.unit).items())
+    finding = (
+        f"With parts that scatter, {100 * rows[-1].share:.0f} % of the actuators with {d.stiffness:.0f} "
+        "N·m/rad "
+        "meet all demands"
+    )
+    return section(
+        finding,
+        table(head, body, numbers=range(1, 6)),
+        caption=f"One sigma, relative: {spreads}. 20 000 draws.",
+    )
+
+
+def _margin_row(m: Margin) -> list[str]:
+    sign = "°" if m.unit == "deg" else words.unit(m.unit)
+    if math.isnan(m.limit):
+        return [m.name, "", "", "", "", f"{100 * m.share:.1f} %"]
+    values = ["not possible" if math.isinf(v) else f"{words.number(v)} {sign}" for v in m.percentiles]
+    return [m.name, *values, f"{words.number(m.limit)} {sign}", f"{100 * m.share:.1f} %"]

@@ -1,0 +1,1 @@
+"""What a diagnosis says: page, figures, sentences, terminal, diagnosis.json."""

@@ -1,0 +1,39 @@
+"""The files of a diagnosis: all of them or none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.diagnosis.overlay import overlay_records
+from rsea_ros.report.diagnosis.page import diagnosis_report
+from rsea_ros.report.json_values import json_text, with_provenance
+from rsea_ros.report.provenance import Provenance
+from rsea_ros.signals import Record
+
+OverlayWriter = Callable[[Mapping[str, Record], Path], None]
+"""Writes records by namespace into one bag file: msg_adapters.overlay.write_overlay."""
+JSON, MODEL, OVERLAY, REPORT = NAMES = ("diagnosis.json", "model.yaml", "overlay.mcap", "report.html")
+
+
+def write_diagnosis(
+    diagnosis: Diagnosis,
+    record: Record,
+    out: Place | str | Path,
+    write: OverlayWriter,
+    provenance: Provenance | None = None,
+) -> Path:
+    """Write diagnosis.json, model.yaml, overlay.mcap and report.html, and return the report's path.
+
+    record: the first one diagnosed, as it was read. Raises OutputError for a name that is taken, OSError or
+    BagError where something cannot be written.
+    """
+    with NewFiles(out) as new:
+        new.write(JSON, json_text(with_provenance(diagnosis_json(diagnosis), provenance)))
+        new.write(MODEL, rig_text(diagnosis.extended_rig))
+        write(overlay_records(diagnosis, record), new.staged(OVERLAY))
+        return new.write(REPORT, diagnosis_report(diagnosis, provenance))

@@ -1,0 +1,114 @@
+"""The report of a diagnosis, as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from html import escape
+
+from rsea_ros.diagnosis.result import Diagnosis
+from rsea_ros.identification.result import ParameterEstimate
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.causes import cause_section, tried_section
+from rsea_ros.report.diagnosis.figures import spectrum_figure, time_figure
+from rsea_ros.report.diagnosis.profile import profiles
+from rsea_ros.report.diagnosis.settings import settings_section
+from rsea_ros.report.diagnosis.sketch import sketch
+from rsea_ros.report.diagnosis.tables import channel_section, experiment_section
+from rsea_ros.report.diagnosis.where import where_figure
+from rsea_ros.report.fault_words import fault_lines, faults
+from rsea_ros.report.figures.palette import AFTER, BEFORE
+from rsea_ros.report.identification.parameters import parameter_table
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
+from rsea_ros.report.provenance import Provenance
+
+
+def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
+    """Return the report as HTML that opens without a network."""
+    d = diagnosis
+    footer = [f"Data: {', '.join(d.sources)}", "rsea diagnose. All values in SI."]
+    footer += provenance.lines if provenance else ()
+    return page(say.headline(d), _kicker(d), list(_blocks(d)), footer)
+
+
+def _blocks(d: Diagnosis) -> Iterator[Block]:
+    """Yield the page from top to bottom: the verdict first, then what it rests on."""
+    main = d.channel
+    yield key_numbers(_keys(d, main))
+    if d.faults:
+        yield f'<p class="next">{escape(faults(d.faults))}</p>'
+    yield sketch([c.name for c in d.causes])
+    yield from (spectrum_figure(d, s) for s in d.spectra if s.channel == main)
+    if any(o.channel == main for o in d.before):
+        yield time_figure(d, main)
+    where = profiles(d, main)
+    if where:
+        yield where_figure(where, bool(d.causes), AFTER if d.at_noise_floor and not d.causes else BEFORE)
+    yield from (cause_section(c, d) for c in d.causes)
+    yield _final(d)
+    yield tried_section(d)
+    yield channel_section(d)
+    yield _untold(d)
+    if d.next_experiment is not None:
+        yield experiment_section(d.next_experiment)
+    yield _faults(d)
+    yield _baseline(d)
+    yield settings_section(d.settings)
+
+
+def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
+    """Return the numbers of the first screen."""
+    channel = words.channel(main)
+    if d.causes:
+        gone = (num.percent(num.gain(d, main)), f"of the {channel} residual gone, on data that took no part")
+        return [gone, (num.residual_change(d, main), "times the noise, before and after")]
+    keys = [(num.residual_change(d, main), f"times the noise is the {channel} residual")]
+    if d.rejected:
+        keys.append((str(len(d.rejected)), "causes tried, none accepted"))
+    return [*keys, (f"{d.extended_fit_percent[main]:.2f} %", f"of the {channel} explained")]
+
+
+def _kicker(d: Diagnosis) -> str:
+    return f"Diagnosis of {d.rig_name} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
+
+
+def _untold(d: Diagnosis) -> str:
+    told = [*say.confusions(d), *d.statements]
+    body = bullets(told) if told else paragraph("Nothing that was asked for.")
+    return section("What these data cannot determine", body)
+
+
+def _faults(d: Diagnosis) -> str:
+    if not d.faults:
+        return section(
+            "No fault was found in the data", paragraph("No sample is missing, frozen or clipped.")
+        )
+    items = bullets([words.sentence(f"{line}.") for line in fault_lines(d.faults)])
+    caption = "Found before any fit. Faulty samples are masked, never explained by physics."
+    return section("Faults of the data", items, caption=caption)
+
+
+def _baseline(d: Diagnosis) -> str:
+    """Return the values before the causes, folded: each of them has taken over what the causes do."""
+    title = "The rig's values as fitted before any cause was looked for"
+    return folded(title, parameter_table(d.baseline)) if d.causes else ""
+
+
+def _final(d: Diagnosis) -> str:
+    """Return the rig's values at the end: beside all causes, where there are any."""
+    title = "The rig's values beside the causes" if d.causes else "The rig's values"
+    return section(title, parameter_table(final_values(d)))
+
+
+def final_values(d: Diagnosis) -> list[ParameterEstimate]:
+    """Return the rig's own values in the extended model, with their intervals."""
+    quantities = d.extended_rig.quantities
+    return [
+        replace(p, value=quantities[p.name].value, ci95=quantities[p.name].ci95 or p.ci95)
+        if p.name in quantities
+        else p
+        for p in d.baseline
+    ]

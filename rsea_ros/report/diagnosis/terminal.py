@@ -1,0 +1,67 @@
+"""The essence of a diagnosis on a terminal, in about ten lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.text import Text
+
+from rsea_ros.diagnosis.result import Diagnosis, Estimate, Experiment, Misfit
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.causes import fitted_rivals
+from rsea_ros.report.diagnosis.standing import standing
+from rsea_ros.report.fault_words import fault_lines
+
+_STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
+_WIDTH = 12
+_MOST = 3
+
+
+def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
+    """Return the verdict and what it rests on, a line each."""
+    lines = [Text(say.headline(diagnosis), style=_STYLES.get(diagnosis.verdict, "bold green"))]
+    return [*lines, *(Text.assemble((name.ljust(_WIDTH), "dim"), text) for name, text in _rows(diagnosis))]
+
+
+def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
+    main = d.channel
+    ratios, rms = num.residual_change(d, main), num.rms_change(d, main)
+    yield "residual", f"{words.channel(main)} {ratios} times the noise ({rms})"
+    for cause in d.causes:
+        yield "cause", f"{cause.name}: {', '.join(_size(name, p) for name, p in cause.parameters.items())}"
+        gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
+        yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
+        yield "status", standing(cause, d.alternatives, d.at_noise_floor)
+    if d.misfit:
+        yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
+    for rival in fitted_rivals(d)[:_MOST]:
+        yield "rejected", f"{rival.name}: {say.prose(say.rejection(rival))}"
+    if d.rejected:
+        yield "tried", f"{len(d.causes) + len(d.rejected)} causes of the catalogue"
+    for sentence in (*say.confusions(d), *d.statements):
+        yield "unclear", sentence
+    if d.next_experiment is not None:
+        yield "next run" if d.next_experiment.excitation else "decides", _next(d.next_experiment)
+    for line in fault_lines(d.faults):
+        yield "data", line
+
+
+def _next(experiment: Experiment) -> str:
+    settings = say.excitation(experiment.excitation)
+    return f"{say.prose(experiment.why)}{f': {settings}' if settings else ''}"
+
+
+def _size(name: str, parameter: Estimate) -> str:
+    value, doubt, unit = num.estimate(parameter)
+    return f"{name.replace('_', ' ')} {value}{doubt} {unit}".rstrip()
+
+
+def _worst(d: Diagnosis) -> list[Misfit]:
+    """Return the worst misfit in each respect."""
+    worst: dict[str, Misfit] = {}
+    for m in d.misfit:
+        if m.what not in worst or m.times_noise > worst[m.what].times_noise:
+            worst[m.what] = m
+    return sorted(worst.values(), key=lambda m: -m.times_noise)[:_MOST]

@@ -1,0 +1,133 @@
+"""What a diagnosis says, in words and numbers for people; page and terminal say the same."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
+from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.identification.silent import silent_channels
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.wording import listed
+
+_PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
+_REASONS: Mapping[Reason, str] = {
+    "far_behind": "far behind the best on the data of the fit",
+    "at_bound": "its size ran to the bound of what such an effect has",
+    "not_sure": "does not surely lower the residual of data that it was not fitted to",
+    "too_small": "lowers the residual of data that it was not fitted to, but by too little",
+    "explains_less": "{rival} explains more",
+    "no_better_than_simpler": "no better than {rival}, which is simpler",
+    "no_better_than_likelier": "no better than {rival}, which needs less of what is known beforehand",
+    "redundant": "not needed beside the other causes",
+    "replaced": "another took its place beside the causes that came later",
+    "improbable": "helps, but its law does not fit what it takes away: probability {probability:.2f}",
+    "leaves_too_much": "helps, but leaves so much that it may stand in for something else",
+}
+_RESPECTS = {
+    "frequency_band": "frequency",
+    "amplitude": "load",
+    "velocity": "speed",
+    "time": "time",
+    "angle": "rotor angle",
+}
+
+
+def effect(name: str) -> str:
+    """Return the plain name of an effect, as it stands within a sentence."""
+    return " ".join(_PROPER.get(word, word) for word in name.split("_"))
+
+
+def rejection(rejected: Rejected) -> str:
+    """Return why an effect is no cause, as a part of a sentence."""
+    probability = rejected.probability or 0.0
+    return _REASONS[rejected.reason].format(rival=rejected.rival, probability=probability)
+
+
+def respect(what: str) -> str:
+    """Return the plain name of what a residual is laid out against."""
+    return _RESPECTS.get(what, what.replace("_", " "))
+
+
+def prose(text: str) -> str:
+    """Return a sentence with plain names of effects, `coulomb_friction` as `Coulomb friction`."""
+    return re.sub(r"[a-z]+(?:_[a-z]+)+", lambda match: effect(match[0]), text)
+
+
+def size(cause: Cause) -> str:
+    """Return a cause's main parameter, `3.00 N·m`, or with its name where it has no unit."""
+    name, estimate = next(iter(cause.parameters.items()))
+    number = words.quantity(estimate.value, estimate.unit, 3)
+    return number if estimate.unit != "1" else f"{name.replace('_', ' ')} {number}"
+
+
+def named(causes: Sequence[Cause]) -> str:
+    """Return causes with their sizes: `Coulomb friction (3.00 N·m) and backlash (1.20 mrad)`."""
+    return listed([f"{effect(c.name)} ({size(c)})" for c in causes])
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict as one short sentence."""
+    d, n = diagnosis, diagnosis.channel
+    channel, (before, _) = words.channel(n), num.times_noise(d, n)
+    silent = [words.channel(name) for name in silent_channels(d.faults)]
+    if d.verdict == "unexplained" and silent and before <= AT_NOISE:
+        return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
+    if d.verdict == "nothing_wrong":
+        return "Nothing is wrong with the simulation: its values fitted, only sensor noise is left"
+    if d.verdict == "unexplained":
+        near = f"{math.ceil(100.0 * before) / 100.0:.2f} times"  # never rounded down to the floor
+        size = f"{near if before < 2.0 else _times(before)} the noise"
+        return f"The {channel} residual is {size}, and nothing in the catalogue explains it"
+    is_, it, explains = ("is", "it", "explains") if len(d.causes) == 1 else ("are", "them", "explain")
+    if d.at_noise_floor and d.verdict == "partly_explained":
+        rest = f"{is_} probably what the simulation lacks; with {it}, only noise is left"
+        return words.sentence(f"{named(d.causes)} {rest}")
+    rest = f"{explains} a part of what the simulation gets wrong; the rest stays unexplained"
+    if d.verdict == "explained":
+        rest = f"{is_} what the simulation lacks; with {it}, only noise is left"
+    return words.sentence(f"{named(d.causes)} {rest}")
+
+
+def misfit(m: Misfit) -> str:
+    """Return `speed −0.02 to 0 rad/s (48 times)`."""
+    low, high = (words.number(side, 2) for side in (m.low, m.high))
+    return f"{respect(m.what)} {low} to {high} {words.unit(m.unit)} ({_times(m.times_noise)})"
+
+
+def confusions(diagnosis: Diagnosis) -> list[str]:
+    """Return a sentence for each cause that these data cannot tell from others."""
+    return [
+        words.sentence(
+            f"{effect(c.name)}: these data do not distinguish it from {_either(c.confusable_with)}."
+        )
+        for c in diagnosis.causes
+        if c.confusable_with
+    ]
+
+
+_BY_THE_WAY = ("rate", "seed", "period")
+"""Settings of an experiment that only the command that plays it needs."""
+
+
+def excitation(settings: Mapping[str, float | str]) -> str:
+    """Return `chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s` of an experiment."""
+    known = {k: v if isinstance(v, str) else f"{v:.3g}" for k, v in settings.items() if k not in _BY_THE_WAY}
+    parts = [known.pop("kind", "")]
+    torque = words.unit(known.pop("unit", "N m"))
+    parts += [f"{k} {known.pop(k)} {torque}" for k in ("amplitude", "noise", "peak") if k in known]
+    if {"low", "high"} <= set(known):
+        parts.append(f"{known.pop('low')} to {known.pop('high')} Hz")
+    parts += [f"{known.pop('duration')} s"] if "duration" in known else []
+    return ", ".join(filter(None, [*parts, *(f"{k.replace('_', ' ')} {v}" for k, v in known.items())]))
+
+
+def _either(names: Sequence[str]) -> str:
+    return listed([effect(n) for n in names], "or")
+
+
+def _times(ratio: float) -> str:
+    return f"{words.number(ratio, 2 if ratio < 100.0 else 3)} times"

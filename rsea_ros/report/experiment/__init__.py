@@ -1,0 +1,1 @@
+"""A designed run and a session of such runs: pages, sentences, experiment.json."""

@@ -1,0 +1,124 @@
+"""A figure as plain values in the terms of plotly.js: a sentence that says the finding, traces, layout."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from rsea_ros.report.figures.palette import GRID, INK, QUIET
+from rsea_ros.signals import FloatArray
+
+Json = dict[str, Any]
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+_DIGITS = 5
+
+
+@dataclass(frozen=True)
+class Figure:
+    """title: the finding in a sentence. caption: how to read it. kind: what page.js does beyond drawing."""
+
+    title: str
+    caption: str
+    data: Sequence[Json]
+    layout: Mapping[str, Any]
+    height: int = 420
+    kind: str = "plain"
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+def numbers(values: FloatArray) -> list[float | None]:
+    """Return values for JSON: five significant digits, None where not finite."""
+    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in np.asarray(values, dtype=float)]
+
+
+def layout(**parts: Any) -> Json:
+    """Return a layout in the style of the page; `parts` go on top."""
+    base: Json = {
+        "font": {"family": FONT, "size": 13, "color": INK},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "margin": {"l": 64, "r": 96, "t": 12, "b": 48},
+        "showlegend": False,
+        "hovermode": "x unified",
+        "hoverlabel": {"bgcolor": "#ffffff", "bordercolor": GRID, "font": {"family": FONT, "size": 12}},
+        "dragmode": "zoom",
+    }
+    return {**base, **parts}
+
+
+def axis(title: str = "", **parts: Any) -> Json:
+    """Return an axis: thin grid, no box, its title with the unit."""
+    base: Json = {
+        "title": {"text": title, "font": {"size": 12, "color": QUIET}, "standoff": 8},
+        "gridcolor": GRID,
+        "zeroline": False,
+        "linecolor": GRID,
+        "ticks": "outside",
+        "tickcolor": GRID,
+        "ticklen": 4,
+        "tickfont": {"size": 12, "color": QUIET},
+        "automargin": True,
+    }
+    return {**base, **parts}
+
+
+def frequency_axis(low: float, high: float, **parts: Any) -> Json:
+    """Return a logarithmic axis from low to high, Hz; 1, 2 and 5 of each decade stand as plain numbers."""
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    marks = [m * 10.0**d for d in decades for m in (1, 2, 5) if 0.999 * low <= m * 10.0**d <= 1.001 * high]
+    return axis(
+        "frequency, Hz",
+        type="log",
+        range=[float(np.log10(low)), float(np.log10(high))],
+        tickvals=marks,
+        ticktext=[f"{m:g}" for m in marks],
+        hoverformat=".3g",
+        unifiedhovertitle={"text": "%{x} Hz"},
+        **parts,
+    )
+
+
+def line(x: FloatArray, y: FloatArray, name: str, colour: str, width: float = 1.6, **parts: Any) -> Json:
+    """Return a line trace."""
+    trace: Json = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": numbers(x),
+        "y": numbers(y),
+        "name": name,
+        "line": {"color": colour, "width": width},
+    }
+    return {**trace, **parts}
+
+
+def band(x: FloatArray, low: FloatArray, high: FloatArray, colour: str, **parts: Any) -> Json:
+    """Return a filled band from low to high, without hover."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": numbers(np.concatenate([x, x[::-1]])),
+        "y": numbers(np.concatenate([high, low[::-1]])),
+        "fill": "toself",
+        "fillcolor": colour,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        **parts,
+    }
+
+
+def label(text: str, x: float, y: float, colour: str, **parts: Any) -> Json:
+    """Return a label in the colour of what it names, beside it, instead of a legend."""
+    base: Json = {
+        "text": text,
+        "x": x,
+        "y": y,
+        "showarrow": False,
+        "xanchor": "left",
+        "yanchor": "middle",
+        "align": "left",
+        "font": {"size": 12, "color": colour},
+    }
+    return {**base, **parts}

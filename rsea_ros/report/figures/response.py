@@ -1,0 +1,102 @@
+"""Gain and phase of several responses with marks where the paper says a number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, label, layout, line
+from rsea_ros.report.figures.palette import QUIET
+from rsea_ros.signals import ComplexArray, FloatArray
+
+
+@dataclass(frozen=True)
+class Response:
+    """A curve: name in the legend at its end, hz and values of shape (n,)."""
+
+    name: str
+    colour: str
+    hz: FloatArray
+    values: ComplexArray
+    width: float = 1.8
+    dash: str = "solid"
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A frequency, Hz, what is there, and which side of the text is at the line."""
+
+    hz: float
+    text: str
+    anchor: str = "center"
+
+
+def response_figure(
+    title: str,
+    responses: Sequence[Response],
+    marks: Sequence[Mark] = (),
+    caption: str = "",
+    decibel: tuple[float, float] | None = None,
+    phase: bool = True,
+) -> Figure:
+    """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
+    data: list[Json] = []
+    for r in responses:
+        gain = 20.0 * np.log10(np.abs(r.values))
+        parts: Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
+        data.append(line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
+        if phase:
+            degrees = np.degrees(np.unwrap(np.angle(r.values)))
+            parts |= {"hovertemplate": "%{y:.1f}°", "yaxis": "y2"}
+            data.append(line(r.hz, degrees, r.name, r.colour, **parts))
+    return Figure(title, caption, data, _layout(responses, marks, decibel, phase), 560 if phase else 380)
+
+
+def _layout(
+    responses: Sequence[Response],
+    marks: Sequence[Mark],
+    decibel: tuple[float, float] | None,
+    phase: bool,
+) -> Json:
+    low, high = min(r.hz[0] for r in responses), max(r.hz[-1] for r in responses)
+    gain = axis("gain, dB", domain=[0.44, 1.0] if phase else [0.0, 1.0])
+    if decibel:
+        gain["range"] = list(decibel)
+    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=90)} if phase else {}
+    return layout(
+        xaxis=frequency_axis(low, high, anchor="y2" if phase else "y"),
+        yaxis=gain,
+        **parts,
+        annotations=[*_names(responses), *(_note(mark) for mark in marks)],
+        shapes=[_stroke(mark.hz) for mark in marks],
+        hoversubplots="axis",
+        margin={"l": 64, "r": 190, "t": 34, "b": 48},
+    )
+
+
+def _names(responses: Sequence[Response]) -> list[Json]:
+    return [
+        label(r.name, 1.015, 1.0 - 0.075 * i, r.colour, xref="paper", yref="paper", yanchor="top")
+        for i, r in enumerate(responses)
+    ]
+
+
+def _note(mark: Mark) -> Json:
+    return label(
+        mark.text, float(np.log10(mark.hz)), 1.0, QUIET, yref="paper", yanchor="bottom", xanchor=mark.anchor
+    )
+
+
+def _stroke(hz: float) -> Json:
+    return {
+        "type": "line",
+        "xref": "x",
+        "yref": "paper",
+        "x0": hz,
+        "x1": hz,
+        "y0": 0.0,
+        "y1": 1.0,
+        "line": {"color": QUIET, "width": 1, "dash": "dot"},
+    }

@@ -1,0 +1,122 @@
+"""Amplitude spectral density of residuals against the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rsea_ros.report import words
+from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, label, layout, line
+from rsea_ros.report.figures.palette import NOISE, QUIET
+from rsea_ros.signals import UNITS, FloatArray
+
+_PER_DECADE = 40
+_LONGEST = 4096
+_ABOVE = 2.0
+_TINY = 1e-300
+_LABEL = 0.06
+"""Height of a label, of the figure's."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A density: its name on the page, its colour, unit/√Hz."""
+
+    name: str
+    colour: str
+    density: FloatArray
+
+
+def residual_figure(
+    title: str, channel: str, frequency: FloatArray, curves: Sequence[Curve], noise: float, caption: str = ""
+) -> Figure:
+    """Return the densities of residuals over frequency, Hz. noise: density of the noise floor."""
+    unit = words.unit(UNITS[channel])
+    floor = np.full(2, noise)
+    ends = np.array([frequency[0], frequency[-1]])
+    drawn = [(c, *in_bands(frequency, c.density)) for c in curves]
+    data: list[Json] = [line(ends, floor, "noise floor", NOISE, 6.0, hoverinfo="skip")]
+    data += [line(f, d, c.name, c.colour, 1.8, hovertemplate="%{y:.3g}") for c, f, d in drawn]
+    reach = _range([*(d for _, _, d in drawn), floor])
+    top = max(range(len(drawn)), key=lambda i: float(drawn[i][2].max()))
+    items = [(f"<b>{c.name}</b>", c.colour, float(d[-1])) for i, (c, _, d) in enumerate(drawn) if i != top]
+    names = _apart([*items, ("noise floor", QUIET, noise)], gap=_LABEL * (reach[1] - reach[0]))
+    names.append(_at_peak(*drawn[top]))
+    return Figure(
+        title=title,
+        caption=caption,
+        data=data,
+        layout=layout(
+            xaxis=frequency_axis(frequency[0], frequency[-1]),
+            yaxis=axis(f"density, {unit}/√Hz", type="log", dtick=1, exponentformat="power", range=reach),
+            annotations=names,
+        ),
+        height=380,
+    )
+
+
+def density(residual: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Return Hz and the amplitude spectral density by averaged Hann segments, unit/√Hz. rate: Hz."""
+    length = min(_LONGEST, 2 * (len(residual) // 8))
+    window = np.hanning(length + 1)[:-1]
+    windows = np.lib.stride_tricks.sliding_window_view(residual - residual.mean(), length)[:: length // 2]
+    power = np.mean(np.abs(np.fft.rfft(windows * window, axis=1)) ** 2, axis=0)
+    result: FloatArray = np.sqrt(2.0 * power / (rate * np.sum(window**2)))
+    frequency: FloatArray = np.arange(len(result), dtype=np.float64) * (rate / length)
+    return frequency[2:-1], result[2:-1]
+
+
+def in_bands(frequency: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the RMS in bands of equal ratio, for drawing."""
+    bands = np.floor(np.log10(frequency) * _PER_DECADE)
+    starts = np.flatnonzero(np.diff(bands, prepend=-np.inf))
+    count = np.diff(np.append(starts, len(frequency)))
+    power = np.add.reduceat(values**2, starts) / count
+    return np.add.reduceat(frequency, starts) / count, np.sqrt(power)
+
+
+def finding(frequency: FloatArray, values: FloatArray, noise: float, what: str) -> str:
+    """Return the sentence: at the noise floor, or where above it the most."""
+    f, d = in_bands(frequency, values)
+    ratio = d / max(noise, _TINY)
+    worst = int(np.argmax(ratio))
+    if ratio[worst] < _ABOVE:
+        return words.sentence(f"{what}: the residual lies at the noise floor at all frequencies")
+    above = f[ratio > _ABOVE]
+    band = f"{words.number(above[0], 2)} to {words.number(above[-1], 2)} Hz"
+    most = f"{words.number(f[worst], 2)} Hz ({words.number(ratio[worst], 2)} times)"
+    return words.sentence(f"{what}: the residual stands above the noise floor from {band}, most at {most}")
+
+
+def _exponent(value: float) -> float:
+    """Return the decimal logarithm of a density; a residual that is exactly zero has a low one."""
+    return float(np.log10(max(float(value), _TINY)))
+
+
+def _range(values: Sequence[FloatArray]) -> list[float]:
+    """Return the exponents between which the values lie, two decades at least."""
+    exponents = np.log10(np.maximum(np.concatenate(values), _TINY))
+    low, high = float(exponents.min()), float(exponents.max())
+    lacking = max(0.0, 2.0 - (high - low)) / 2.0
+    return [low - lacking - 0.1, high + lacking + 0.3]
+
+
+def _at_peak(curve: Curve, frequency: FloatArray, values: FloatArray) -> Json:
+    """Return the label of the highest curve, above its peak; lower ones have theirs at their right end."""
+    k = int(np.argmax(values))
+    x, y = float(np.log10(frequency[k])), _exponent(values[k])
+    return label(f"<b>{curve.name}</b>", x, y, curve.colour, xanchor="center", yanchor="bottom", yshift=4)
+
+
+def _apart(items: Sequence[tuple[str, str, float]], gap: float) -> list[Json]:
+    """Return labels at the right end of curves, moved apart where they would overlap."""
+    placed: list[Json] = []
+    order = sorted(items, key=lambda item: item[2])
+    lowest = -np.inf
+    for text, colour, value in order:
+        height = max(_exponent(value), lowest)
+        lowest = height + gap
+        placed.append(label(text, 1.01, height, colour, xref="paper", yref="y"))
+    return placed

@@ -1,0 +1,147 @@
+"""The page of a fleet: worst joints first, what changed since when, joints × weeks, what is undetermined."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rsea_ros.report.fleet.heat_map import heat_map, naming_map, shades
+from rsea_ros.report.fleet.latest import latest_causes
+from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.fleet.tables import (
+    alarm_table,
+    joint_table,
+    undetermined_table,
+    undetermined_trends,
+)
+from rsea_ros.report.fleet.timeline import timeline
+from rsea_ros.report.fleet.words import about, day, name, percent
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
+from rsea_ros.trends.alarms import Alarm
+from rsea_ros.trends.ranking import by_joint, worst_first
+from rsea_ros.trends.result import FleetTrends
+from rsea_ros.trends.series import Table
+from rsea_ros.trends.weeks import Steps
+from rsea_ros.wording import listed
+
+_NAMED = 3
+"""Joints that the headline names."""
+_ROWS = 60
+"""Joints of a heat map: the first of a larger fleet."""
+
+
+def fleet_page(
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+) -> str:
+    """Return the page as HTML that opens without a network."""
+    blocks = list(_blocks(fleet, alarms, recordings, steps, links))
+    footer = [_period(recordings), "rsea fleet report. All values in SI, all times UTC."]
+    kicker = f"Fleet of {len(fleet.joints)} joints · {_period(recordings)}"
+    return page(_headline(fleet, alarms, recordings), kicker, blocks, footer)
+
+
+def _blocks(
+    fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table, steps: Steps, links: Links
+) -> Iterator[Block]:
+    groups = by_joint(alarms)
+    ranked = [a for group in groups.values() for a in group]
+    joints = worst_first(fleet.joints, alarms)
+    latest = latest_causes(joints, recordings)
+    yield key_numbers(_keys(fleet, groups, recordings))
+    yield f"<style>{(Path(__file__).parent / 'fleet.css').read_text(encoding='utf-8')}{shades()}</style>"
+    yield timeline(ranked, steps, links)
+    if ranked:
+        yield section("Worst joints first", alarm_table(ranked, links))
+    for parameter in _mapped(fleet):
+        yield heat_map(parameter, joints[:_ROWS], fleet, steps, links)
+    for kind, what in dict.fromkeys((a.kind, a.about) for a in fleet.appearances):
+        yield naming_map(what, kind, _naming(fleet, kind, what, joints)[:_ROWS], fleet, steps, links)
+    yield section("All joints", joint_table(joints, fleet, groups, latest, recordings, links))
+    yield _undetermined(fleet, links)
+    yield folded("How sure this is", bullets(_sure(fleet)))
+
+
+def _mapped(fleet: FleetTrends) -> list[str]:
+    """Return the parameters that have a map, those that moved most first; of causes the usual ones."""
+    sized = [p for _, p in fleet.sizes]
+    usual = [p for p in dict.fromkeys(sized) if 2 * sized.count(p) > len(fleet.joints)]
+    courses = {**fleet.trends, **fleet.sizes}
+
+    def moved(parameter: str) -> float:
+        here = [t for (_, p), t in courses.items() if p == parameter and t.changes]
+        return -max((abs(t.relative) for t in here), default=0.0)
+
+    return sorted([*dict.fromkeys(p for _, p in fleet.trends), *usual], key=moved)
+
+
+def _headline(fleet: FleetTrends, alarms: Sequence[Alarm], recordings: Table) -> str:
+    if not any(t.state != "undetermined" for t in fleet.trends.values()):
+        latest = [f"{what} in {joint}" for joint, what in latest_causes(fleet.joints, recordings).items()]
+        now = f"; the latest name {listed(latest[:_NAMED])}" if latest else ""
+        return f"Too few recordings yet to say what changes{now}"
+    groups = by_joint(alarms)
+    if not groups:
+        return f"All {len(fleet.joints)} joints are steady"
+    first = next(iter(groups))
+    number = f"{len(groups)} of {len(fleet.joints)} joints need" if len(groups) > 1 else "One joint needs"
+    return f"{number} a look, {first} first: {about(groups[first][0])}"
+
+
+def _keys(fleet: FleetTrends, groups: dict[str, list[Alarm]], recordings: Table) -> list[tuple[str, str]]:
+    kinds = [a.kind for group in groups.values() for a in group]
+    done = int(np.sum(np.asarray(recordings["outcome"], str) == "done"))
+    return [
+        (f"{len(groups)} of {len(fleet.joints)}", "joints need a look"),
+        (str(kinds.count("trend") + kinds.count("change")), f"changes, {kinds.count('trend')} going on"),
+        (str(kinds.count("cause")), "causes that appeared"),
+        (_grouped(done), f"recordings used, of {_grouped(len(recordings['joint']))}"),
+        (
+            str(len(undetermined_trends(fleet))),
+            f"of {len(fleet.trends)} courses cannot be determined, or no more",
+        ),
+    ]
+
+
+def _grouped(number: int) -> str:
+    """Return a number with its thousands apart."""
+    return f"{number:,}".replace(",", " ")
+
+
+def _naming(fleet: FleetTrends, kind: str, what: str, joints: Sequence[str]) -> list[str]:
+    naming = {n.joint for n in fleet.namings if (n.kind, n.about) == (kind, what)}
+    return [j for j in joints if j in naming]
+
+
+def _undetermined(fleet: FleetTrends, links: Links) -> str:
+    undetermined = undetermined_trends(fleet)
+    if not undetermined:
+        return section(
+            "Nothing was left undetermined", paragraph("Every joint's recordings tell every parameter.")
+        )
+    number = "One course" if len(undetermined) == 1 else f"{len(undetermined)} courses"
+    title = f"{number} cannot be determined"
+    return section(title, undetermined_table(undetermined, links))
+
+
+def _sure(fleet: FleetTrends) -> list[str]:
+    rate = f"{100.0 * fleet.false_discovery:g}"
+    warm = [f"{name(p)} {percent(m)} (± {200.0 * s:.2f} %)" for p, (m, s) in fleet.per_kelvin.items() if m]
+    lines = [
+        f"{fleet.tests} courses were tested for any step or ramp, and every cause and fault for the day from "
+        f"which on it is named. At most {rate} in 100 of the findings are expected to be false (Benjamini "
+        f"and Hochberg, over all joints and parameters of this look).",
+        "Recordings of one day count as one draw: what a day does to a joint (mounting, grease, zeros) is "
+        "estimated from the scatter of the days, by restricted likelihood, and is no change.",
+    ]
+    if warm:
+        lines.append(f"A kelvin changes, as the joints of this fleet tell each other: {listed(warm)}.")
+    return lines
+
+
+def _period(recordings: Table) -> str:
+    time_s = np.asarray(recordings["time_s"], float)
+    known = time_s[np.isfinite(time_s)]
+    return f"{day(known.min())} to {day(known.max())}" if known.size else "no date"

@@ -1,0 +1,131 @@
+"""Tables of a fleet: findings, joints, what could not be determined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+
+import numpy as np
+
+from rsea_ros.report import words
+from rsea_ros.report.fleet.links import Links
+from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent, sentence, value
+from rsea_ros.report.page.table import table_of_cells
+from rsea_ros.trends.alarms import Alarm
+from rsea_ros.trends.result import FleetTrends, Trend
+from rsea_ros.trends.series import Table
+
+_STATES = {
+    "steady": "steady",
+    "changed": "changed",
+    "trending": "going on",
+    "undetermined": "cannot be determined",
+}
+
+
+def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) -> str:
+    """Return the findings with date, size, how sure, and the recording that shows each first."""
+    head = ["Joint", "Finding", "Began", "#Size, 95 %", "#Sure", "Shown first by"]
+    rows = [
+        (
+            links.joint(a.joint),
+            escape(sentence(a)),
+            escape(doubt_of_date(a)) or "–",
+            escape(value(a.size, a.unit)) if a.size is not None else "–",
+            _sure(a.confidence),
+            links.recording(a.recording, a.artefacts) if a.recording else "–",
+        )
+        for a in alarms
+    ]
+    start = 0 if with_joint else 1
+    return table_of_cells(head[start:], [r[start:] for r in rows])
+
+
+def joint_table(
+    joints: Sequence[str],
+    fleet: FleetTrends,
+    alarmed: Mapping[str, Sequence[Alarm]],
+    latest: Mapping[str, str],
+    recordings: Table,
+    links: Links,
+) -> str:
+    """Return a row for each joint. latest: causes that its latest recording names."""
+    head = [
+        "Joint", "State", "#Recordings", "#Refused or broken", "#Parameters determined", "#Largest change",
+    ]  # fmt: skip
+    of = np.asarray(recordings["joint"], str)
+    done = np.asarray(recordings["outcome"], str) == "done"
+    rows = []
+    for joint in joints:
+        trends = [t for (j, _), t in fleet.trends.items() if j == joint]
+        determined = [t for t in trends if t.state != "undetermined"]
+        here = of == joint
+        moved = max((t.relative for t in determined if t.changes), key=abs, default=float("nan"))
+        rows.append(
+            (
+                links.joint(joint),
+                escape(_state(alarmed.get(joint, ()), determined, latest.get(joint, ""))),
+                str(int(np.sum(here))),
+                str(int(np.sum(here & ~done))),
+                f"{len(determined)} of {len(trends)}",
+                percent(moved) if moved == moved else "–",
+            )
+        )
+    return table_of_cells(head, rows)
+
+
+def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
+    """Return what moved; else what the latest recording names; else whether anything is known."""
+    kinds = ", ".join(dict.fromkeys(a.kind for a in alarms))
+    return kinds or (f"now {latest}" if latest else "steady" if determined else "too few recordings")
+
+
+def parameter_rows(trends: Sequence[Trend]) -> str:
+    """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
+    head = [
+        "Parameter", "State", "#Now, 95 %", "#A year", "#A day scatters", "#Least step seen",
+        "#Determined by",
+    ]  # fmt: skip
+    rows = []
+    for t in trends:
+        unit, s = t.series.unit, t.series
+        level = abs(t.now.value) if t.now is not None and t.now.value else float("nan")
+        shares = [percent(v / level) if v == v and level == level else "–" for v in
+                  (t.per_year.value if t.per_year else float("nan"), t.day_sd, t.detectable)]  # fmt: skip
+        rows.append(
+            (
+                f"{escape(name(s.parameter))}<small>{escape(s.parameter)}</small>",
+                _STATES[t.state],
+                escape(value(t.now, unit)) if t.now is not None else "–",
+                shares[0],
+                shares[1].lstrip("+") if t.day_sd else "–",
+                shares[2].lstrip("+"),
+                f"{int(np.sum(s.identifiable))} of {len(s.identifiable)}",
+            )
+        )
+    return table_of_cells(head, rows)
+
+
+def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
+    """Return the courses of which nothing can be determined, or no more."""
+    return [t for t in fleet.trends.values() if t.state == "undetermined" or math.isfinite(t.silent_since_s)]
+
+
+def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
+    """Return what could not be determined, and why."""
+    head = ["Joint", "Parameter", "Why"]
+    rows = [
+        (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in undetermined
+    ]
+    return table_of_cells(head, rows)
+
+
+def _why(trend: Trend) -> str:
+    if trend.state != "undetermined":
+        return f"Determined until {day(trend.silent_since_s)}, by none of the recordings since"
+    return words.sentence(trend.reason)
+
+
+def _sure(confidence: float) -> str:
+    return "> 99.99 %" if confidence > 0.9999 else f"{100.0 * confidence:.2f} %"

@@ -1,0 +1,158 @@
+"""Dates, names and findings of a fleet in plain English."""
+
+from __future__ import annotations
+
+import math
+from datetime import datetime, timezone
+
+import numpy as np
+
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis.words import effect
+from rsea_ros.signals import FloatArray
+from rsea_ros.trends.alarms import Alarm
+from rsea_ros.trends.result import Change, Interval, Trend
+from rsea_ros.wording import listed
+
+_MONTHS = ("January", "February", "March", "April", "May", "June", "July", "August", "September", "October",
+           "November", "December")  # fmt: skip
+
+_MOST = 3
+"""Changes that a title names."""
+
+
+def day(time_s: float) -> str:
+    """Return a date as `24 March 2025`."""
+    t = datetime.fromtimestamp(time_s, timezone.utc)
+    return f"{t.day} {_MONTHS[t.month - 1]} {t.year}"
+
+
+def short_day(time_s: float) -> str:
+    """Return a date as `24 Mar 2025`."""
+    t = datetime.fromtimestamp(time_s, timezone.utc)
+    return f"{t.day} {_MONTHS[t.month - 1][:3]} {t.year}"
+
+
+def dates(time_s: FloatArray) -> list[str]:
+    """Return times as plotly reads them, UTC, to the minute."""
+    stamps = np.round(np.asarray(time_s, float)).astype("datetime64[s]")
+    return [str(s) for s in np.datetime_as_string(stamps, unit="m")]
+
+
+def name(about: str) -> str:
+    """Return the plain name of a parameter, a cause, or the size of one: `Coulomb friction torque`."""
+    group, _, key = about.partition(".")
+    if not key:
+        return words.sentence(effect(about))
+    if about in words.PARAMETERS or group not in catalogue():
+        return words.parameter(about)
+    plain, size = effect(group), key.replace("_", " ")
+    return words.sentence(plain if size in plain else f"{plain} {size}")
+
+
+def value(v: Interval, unit: str) -> str:
+    """Return a value with its 95 % interval and unit, `3.90 ± 0.08 mrad`; a bare number in percent."""
+    factor, shown = (100.0, "%") if unit == "1" else words.scaled(v.value, unit)
+    text, doubt = words.with_doubt(v.value * factor, v.low * factor, v.high * factor)
+    return f"{text}{doubt} {shown}".strip()
+
+
+def percent(share: float) -> str:
+    """Return a relative change as `−15 %`, small ones with two significant digits."""
+    size = abs(100.0 * share)
+    digits = 0 if size >= 9.95 else 1 if size >= 0.095 else 2
+    text = f"{100.0 * share:+.{digits}f} %".replace("-", "−")
+    return "0 %" if float(f"{size:.{digits}f}") == 0.0 else text
+
+
+def amount(share: float) -> str:
+    """Return the size of a relative change, `15 %`."""
+    return percent(abs(share)).lstrip("+")
+
+
+def about(alarm: Alarm) -> str:
+    """Return in a few words what an alarm says, without the date."""
+    if alarm.kind == "fault":
+        return f"{_plain(alarm.about)} in the data"
+    if alarm.kind == "cause":
+        size = f", {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
+        return f"{name(alarm.about)}{size}"
+    if alarm.kind == "outlier":
+        side = "above" if alarm.relative > 0.0 else "below"
+        return f"{name(alarm.about)} {amount(alarm.relative)} {side} the fleet"
+    return (
+        f"{name(alarm.about)} {percent(alarm.relative)}"
+        if math.isfinite(alarm.relative)
+        else name(alarm.about)
+    )
+
+
+def sentence(alarm: Alarm) -> str:
+    """Return what an alarm says, with its date."""
+    if alarm.kind == "outlier":
+        side = "above" if alarm.relative > 0.0 else "below"
+        return f"{name(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"
+    since = day(alarm.since_s)
+    if alarm.kind == "fault":
+        return f"{_plain(alarm.about)} in the data since {since}"
+    if alarm.kind == "cause":
+        now = f": now {value(alarm.size, alarm.unit)}" if alarm.size is not None else ""
+        return f"{name(alarm.about)} appeared about {since}{now}"
+    up = alarm.size is not None and alarm.size.value > 0.0
+    if alarm.kind == "trend":
+        way = "rising" if up else "falling"
+        return f"{name(alarm.about)} has been {way} since {since}: {percent(alarm.relative)} so far"
+    return f"{name(alarm.about)} {'rose' if up else 'fell'} by {amount(alarm.relative)} from {since} on"
+
+
+def doubt_of_date(alarm: Alarm) -> str:
+    """Return between which dates it began, empty where that is not known."""
+    if not math.isfinite(alarm.since_s):
+        return ""
+    first, last = short_day(alarm.earliest_s).split(), short_day(alarm.latest_s).split()
+    while first and first[-1] == last[len(first) - 1]:
+        first.pop()
+    return f"{' '.join(first)} to {' '.join(last)}" if first else " ".join(last)
+
+
+def finding(trend: Trend) -> str:
+    """Return the title of a parameter's figure."""
+    silent = trend.silent_since_s
+    return _finding(trend) + (f"; cannot be determined since {day(silent)}" if math.isfinite(silent) else "")
+
+
+def _finding(trend: Trend) -> str:
+    plain, unit = name(trend.series.parameter), trend.series.unit
+    if trend.state == "undetermined":
+        enough = bool(np.mean(trend.series.identifiable) > 0.5)
+        return f"{plain}: {'too few recordings' if enough else 'not enough excitation'} to tell"
+    if trend.state == "steady":
+        factor, shown = words.scaled(trend.detectable, unit)
+        level = trend.now.value if trend.now is not None else 0.0
+        share = f", {amount(trend.detectable / abs(level))}" if level else ""
+        return f"{plain} is steady: no step above {words.number(trend.detectable * factor, 2)} {shown}{share}"
+    if trend.state == "trending" and trend.per_year is not None:
+        way = "rising" if trend.per_year.value > 0.0 else "falling"
+        return f"{plain} is {way}: {percent(trend.relative)} since the first day{_limit(trend)}"
+    return f"{plain} {listed([_moved(c, trend) for c in trend.changes[:_MOST]])}"
+
+
+def _moved(change: Change, trend: Trend) -> str:
+    way = "rose" if change.size.value > 0.0 else "fell"
+    size = change.size.value / abs(trend.first.value) if trend.first and trend.first.value else float("nan")
+    how = f" by {amount(size)}" if math.isfinite(size) else ""
+    return f"{way}{how} {'on' if change.kind == 'step' else 'from'} {day(change.since_s)}" + (
+        " on" if change.kind == "ramp" else ""
+    )
+
+
+def _limit(trend: Trend) -> str:
+    if trend.to_limit_s is None:
+        return ""
+    first, last = (short_day(t) for t in trend.to_limit_s[1:])
+    return f", at its limit about {day(trend.to_limit_s.value)} ({first} to {last})"
+
+
+def _plain(kind: str) -> str:
+    return "NaN" if kind == "nan" else words.sentence(kind.replace("_", " "))

@@ -1,0 +1,1 @@
+"""What an identification says: page, tables, sentences, terminal, identification.json."""

@@ -1,0 +1,54 @@
+"""Which parameters move together: the correlation of a fit as a table of shaded cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from rsea_ros.report import words
+from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
+from rsea_ros.report.page.html import folded, paragraph
+from rsea_ros.signals import FloatArray
+
+STRONG = 0.9
+"""Correlation from which two values are hardly told apart."""
+
+
+def correlation_section(names: Sequence[str], matrix: FloatArray) -> str:
+    """Return the section; empty for fewer than two parameters. matrix: (n, n), nan where not defined."""
+    if len(names) < 2:
+        return ""
+    heads = "".join(f"<th class='number'>{i}</th>" for i in range(1, len(names) + 1))
+    rows = "".join(
+        f"<tr><td>{i + 1} {escape(words.parameter(name))}</td>"
+        + "".join(_cell(float(matrix[i, k])) for k in range(len(names)))
+        + "</tr>"
+        for i, name in enumerate(names)
+    )
+    table = (
+        f"<div class='scroll'><table class='matrix'><thead><tr><th></th>{heads}</tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>"
+    )
+    return folded("How the parameters hang together", paragraph(finding(names, matrix)), table)
+
+
+def finding(names: Sequence[str], matrix: FloatArray) -> str:
+    """Return a sentence on the pair that is told apart least."""
+    apart = np.abs(np.where(np.eye(len(names), dtype=bool), 0.0, np.nan_to_num(matrix)))
+    i, k = (int(v) for v in np.unravel_index(int(np.argmax(apart)), apart.shape))
+    pair = f"{words.parameter(names[i])} and {words.parameter(names[k])}"
+    value = f"{matrix[i, k]:.2f}".replace("-", "−")
+    if apart[i, k] < STRONG:
+        return f"No two are strongly correlated; the strongest pair is {pair} ({value})."
+    return f"Strongly correlated: {pair} ({value}). An error of one is made good by the other."
+
+
+def _cell(value: float) -> str:
+    """Return a cell, the more coloured the stronger the correlation."""
+    if not np.isfinite(value):
+        return "<td class='number'>–</td>"
+    shade = faint(AFTER if value >= 0.0 else BEFORE, 0.6 * min(1.0, abs(value)))
+    text = f"{value:.2f}".replace("-", "−")
+    return f"<td class='number' style='background:{shade}'>{text}</td>"

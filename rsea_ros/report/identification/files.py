@@ -1,0 +1,28 @@
+"""The files of an identification: all of them or none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rsea_ros.identification.result import Identification
+from rsea_ros.model.rig_file import rig_text
+from rsea_ros.new_files import NewFiles, Place
+from rsea_ros.report.identification.json import identification_json
+from rsea_ros.report.identification.page import identification_report
+from rsea_ros.report.json_values import json_text, with_provenance
+from rsea_ros.report.provenance import Provenance
+
+JSON, MODEL, REPORT = NAMES = ("identification.json", "model.yaml", "report.html")
+
+
+def write_results(
+    identification: Identification, out: Place | str | Path, provenance: Provenance | None = None
+) -> Path:
+    """Write identification.json, model.yaml and report.html, and return the report's path.
+
+    Raises OutputError for a name that is taken, OSError where something cannot be written.
+    """
+    with NewFiles(out) as new:
+        new.write(JSON, json_text(with_provenance(identification_json(identification), provenance)))
+        new.write(MODEL, rig_text(identification.rig))
+        return new.write(REPORT, identification_report(identification, provenance))

@@ -1,0 +1,1 @@
+"""The law of what no effect explains: page, sentences, law.json."""

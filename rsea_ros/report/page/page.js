@@ -1,0 +1,161 @@
+"use strict";
+/* Draws the figures of the page. An overlay holds all samples and is drawn anew from them on every zoom. */
+
+const CONFIG = { responsive: true, displaylogo: false, displayModeBar: false };
+const MOST_POINTS = 3000;
+
+async function gunzipped(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
+}
+
+/* What report/figures/packing.py has packed: low bytes, then high bytes, of steps about a line. */
+async function unpacked({ first, slope, step, data }) {
+  const planes = new Uint8Array(await (await gunzipped(data)).arrayBuffer()), n = planes.length / 2;
+  return Float64Array.from({ length: n }, (_, k) => {
+    const whole = planes[k] + 256 * planes[n + k];
+    return whole === 65535 ? NaN : first + slope * k + step * whole;
+  });
+}
+
+/* Least and largest value of each block, in the order in which they come. */
+function coarse(t, y, from, to) {
+  const block = Math.max(1, Math.ceil((2 * (to - from)) / MOST_POINTS));
+  const x = [], v = [];
+  if (block < 3) {
+    for (let i = from; i < to; i++) { x.push(t[i]); v.push(y[i]); }
+    return [x, v];
+  }
+  for (let i = from; i < to; i += block) {
+    let low = i, high = i;
+    for (let k = i; k < Math.min(i + block, to); k++) {
+      if (y[k] < y[low]) low = k;
+      if (y[k] > y[high]) high = k;
+    }
+    for (const k of low < high ? [low, high] : [high, low]) { x.push(t[k]); v.push(y[k]); }
+  }
+  return [x, v];
+}
+
+function below(t, value) {
+  let low = 0, high = t.length;
+  while (low < high) { const middle = (low + high) >> 1; if (t[middle] < value) low = middle + 1; else high = middle; }
+  return low;
+}
+
+async function traces({ t, measured, residuals }) {
+  const y = await unpacked(measured.y);
+  const off = await Promise.all(residuals.map((r) => unpacked(r.y)));
+  return { t: await unpacked(t), all: [
+    { name: "measured", colour: measured.colour, y, axis: "y" },
+    ...residuals.map((r, i) => ({ name: r.name, colour: r.colour, axis: "y", y: y.map((v, k) => v - off[i][k]) })),
+    ...residuals.map((r, i) => ({ name: "residual, " + r.name, colour: r.colour, axis: "y2", y: off[i] })),
+  ] };
+}
+
+async function overlay(node, figure) {
+  const { t, all } = figure.traces = await traces(figure.extra);
+  const drawn = ([from, to]) => {
+    const a = Math.max(0, below(t, from) - 1), b = Math.min(t.length, below(t, to) + 1);
+    return all.map((s) => coarse(t, s.y, a, b));
+  };
+  const data = drawn(figure.layout.xaxis.range).map(([x, y], i) => ({
+    type: "scatter", mode: "lines", x, y, name: all[i].name, yaxis: all[i].axis,
+    line: { color: all[i].colour, width: i === 0 ? 4.5 : all[i].axis === "y" ? 1.4 : 1 },
+    opacity: i === 0 ? 0.55 : 1, hovertemplate: "%{y:.4g} " + figure.extra.unit,
+  }));
+  return Plotly.newPlot(node, data, figure.layout, CONFIG).then(() => {
+    node.on("plotly_relayout", (change) => {
+      const whole = change["xaxis.autorange"];
+      const range = whole ? [t[0], t[t.length - 1]] : [change["xaxis.range[0]"], change["xaxis.range[1]"]];
+      if (!whole && range[0] === undefined) return;
+      const next = drawn(range);
+      Plotly.update(node, { x: next.map((s) => s[0]), y: next.map((s) => s[1]) }, { "xaxis.range": range });
+    });
+  });
+}
+
+/* In the dark the colours of text, grid and background change places; those with a meaning stay. */
+const DARK = { "#1f2933": "#e4e7eb", "#66717d": "#9aa5b1", "#e6e9ec": "#323f4b", "#ffffff": "#1b232b", "#1864ab": "#4dabf7" };
+
+function inTheDark(text) {
+  return matchMedia("(prefers-color-scheme: dark)").matches && !matchMedia("print").matches
+    ? text.replace(/#[0-9a-f]{6}/g, (colour) => DARK[colour] || colour) : text;
+}
+
+function button(text, about, act) {
+  const made = document.createElement("button");
+  made.type = "button"; made.textContent = text; made.title = about;
+  made.addEventListener("click", () => act(made));
+  return made;
+}
+
+/* All samples of an overlay, the drawn points of any other figure: a column pair for each curve. */
+function csv(node, figure) {
+  const curves = figure.kind === "overlay"
+    ? figure.traces.all.map((s) => ({ name: s.name, x: figure.traces.t, y: s.y }))
+    : node.data.filter((d) => d.x && d.y && d.name);
+  const quoted = (s) => '"' + String(s).replace(/<[^>]*>/g, "").replace(/"/g, '""') + '"';
+  const head = curves.flatMap((c) => [quoted(c.name + ", x"), quoted(c.name)]).join(",");
+  const rows = Array.from({ length: Math.max(0, ...curves.map((c) => c.x.length)) }, (_, i) =>
+    curves.flatMap((c) => (i < c.x.length ? [+(+c.x[i]).toPrecision(7), +(+c.y[i]).toPrecision(7)] : ["", ""])).join(","));
+  return [head, ...rows].join("\n") + "\n";
+}
+
+function save(name, text) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+  link.download = name; link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+/* Under a figure: a switch for each named curve, the picture, the numbers. */
+function tools(node, figure) {
+  const bar = document.createElement("div");
+  bar.className = "tools";
+  const names = [...new Set(node.data.map((d) => d.name).filter(Boolean))];
+  if (names.length > 1) for (const name of names) {
+    const curves = node.data.map((d, i) => (d.name === name ? i : -1)).filter((i) => i >= 0);
+    const toggle = button(name.replace(/<[^>]*>/g, ""), "show or hide this curve", (self) => {
+      const hide = self.getAttribute("aria-pressed") === "true";
+      self.setAttribute("aria-pressed", String(!hide));
+      Plotly.restyle(node, { visible: !hide }, curves);
+    });
+    toggle.setAttribute("aria-pressed", "true");
+    bar.append(toggle);
+  }
+  bar.append(
+    button("PNG", "this figure as a picture", () => Plotly.downloadImage(node, {
+      format: "png", scale: 2, width: node.clientWidth, height: node.clientHeight, filename: node.id })),
+    button("CSV", "the numbers of this figure", () => save(node.id + ".csv", csv(node, figure))));
+  node.after(bar);
+}
+
+function draw() {
+  for (const node of document.querySelectorAll(".figure")) {
+    const figure = JSON.parse(inTheDark(document.getElementById(node.id + "-data").textContent));
+    const done = figure.kind === "overlay" ? overlay(node, figure) : Plotly.newPlot(node, figure.data, figure.layout, CONFIG);
+    done.then(() => { tools(node, figure); node.dataset.drawn = "yes"; });
+  }
+}
+
+/* On a narrow screen each row of a table is a card; its cells say of which column they are. */
+function labelCells() {
+  for (const table of document.querySelectorAll("table")) {
+    const heads = [...table.querySelectorAll("thead th")].map((th) => th.textContent);
+    for (const row of table.tBodies[0]?.rows || []) [...row.cells].forEach((cell, i) => { cell.dataset.label = heads[i] || ""; });
+  }
+}
+
+/* plotly.js lies in the page compressed: a third of its size. */
+async function unpackPlotly() {
+  const script = document.createElement("script");
+  script.textContent = await (await gunzipped(document.getElementById("plotly").textContent)).text();
+  document.head.append(script);
+}
+
+labelCells();
+addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => { d.open = true; }));
+if (document.querySelector(".figure")) unpackPlotly().then(draw, (error) => {
+  document.querySelectorAll(".figure").forEach((node) => { node.textContent = "This browser is too old to draw the figures: " + error; });
+});

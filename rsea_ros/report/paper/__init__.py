@@ -1,0 +1,1 @@
+"""The paper recomputed: page, figures, tables, drawings, paper.json."""

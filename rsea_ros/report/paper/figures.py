@@ -1,0 +1,176 @@
+"""Figs. 9, 15, 18 and 20 of the paper, redrawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.model import outputs
+from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
+from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.train import Train
+from rsea_ros.paper import formulas
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS
+from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
+from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
+from rsea_ros.report.figures.figure import Figure
+from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
+from rsea_ros.report.figures.response import Mark, Response, response_figure
+from rsea_ros.report.figures.thinned import thinned
+from rsea_ros.signals import FloatArray
+
+_HZ: FloatArray = np.geomspace(0.1, 140.0, 500)
+
+
+def figure_9() -> list[Figure]:
+    """Return the surface of Eq. (7) and its two views, with the paper's two actuators."""
+    points = []
+    for name, rig_name, colour in (
+        ("platform", "paper_high_impedance", AFTER),
+        ("prototype", "prototype_knee", TRUTH),
+    ):
+        rig = load_rig(rig_name)
+        points.append(Point(name, rig["spring.stiffness"], rig["chassis.inertia"], colour))
+        for train, pole in _senses(rig):
+            turned = replace(rig, train=train)
+            sign = "" if rig.train == "planetary" else f", n = {train_ratio(turned):+.0f}".replace("-", "−")
+            inner = inner_inertia(turned)
+            points.append(Point(f"{name}, with spin{sign}", rig["spring.stiffness"], inner, BEFORE, pole))
+    whole = bandwidth_surface(
+        "Fig. 9 (a): bandwidth over stiffness and inertia, Eq. (7)", points,
+        "Drag to turn. Points: what the paper has (blue, green), and with the rotor's spin (orange). A "
+        "negative n J_r + J_sc stands at its magnitude: T_d/T_p falls to −3 dB there.")  # fmt: skip
+    views = slices(
+        "Fig. 9 (b), (c): ten times the stiffness or a tenth of the inertia are worth √10 = 3.2 in "
+        "bandwidth", points,
+        "The paper prints no number on this figure. On logarithmic axes the surface is a plane.")  # fmt: skip
+    return [whole, views]
+
+
+def _senses(rig: Rig) -> list[tuple[Train, float]]:
+    """Return the trains that an actuator of the paper may have, and the pole of each one's name, Hz."""
+    if rig.train == "planetary":
+        return [(rig.train, 110.0)]
+    return list(zip(PROTOTYPE_TRAINS, (150.0, 100.0), strict=True))
+
+
+def figure_15(measured: FrequencyResponse) -> Figure:
+    """Return the high-impedance test: the printed fit, Table 2, and the test of a simulated bench."""
+    rig = load_rig("paper_high_impedance")
+    c_0, c_1, c_2 = formulas.EQ_10
+    s = 2j * np.pi * _HZ
+    table_2 = frequency_response(rig, outputs.end_torque(rig, "spring_end"), _HZ)
+    element = formulas.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
+    curves = [
+        _measured(measured, "simulated test"),
+        Response("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
+        Response("Eq. (4), Table 2", INK, _HZ, element, 1.4, "dash"),
+        Response("the same, sensor<br>sees K_s + b_s s", AFTER, _HZ, table_2),
+    ]
+    apart = 20 * np.log10(c_0 / c_2)
+    title = f"Fig. 15: printed fit and Table 2 part by {-apart:.2f} dB at rest; lumped and unlumped are one"
+    marks = [Mark(np.sqrt(c_2) / (2 * np.pi), f"{np.sqrt(c_2) / (2 * np.pi):.2f} Hz")]
+    return response_figure(
+        title.replace("-", "−"), curves, marks, "T_d/T_m with both ends clamped.", decibel=(-60, 12)
+    )
+
+
+def figure_18(test: MovingOutput) -> Figure:
+    """Return the moving-output test: the bench's data, both fitted models."""
+    measured = test.responses["spring_end"]
+    curves = [_measured(measured, "data of the<br>simulated bench")]
+    for rival, colour in zip(test.rivals, (AFTER, BEFORE), strict=True):
+        values = frequency_response(rival.rig, outputs.end_torque(rival.rig, "spring_end"), _HZ)
+        share = 100 * rival.judged[0].explained
+        curves.append(
+            Response(f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained", colour, _HZ, values)
+        )
+    shares = [100 * rival.judged[0].explained for rival in test.rivals]
+    title = (
+        f"Fig. 18: the unlumped model explains {shares[0]:.2f} % of the held-out torque, "
+        f"the lumped {shares[1]:.0f} %"
+    )
+    marks = [Mark(19.0, "19 Hz: “out of sync”", "right"), Mark(33.0, "33 Hz: “resonance”", "left")]
+    caption = (
+        "T_ft/T_m, housing with the pendulum free, spring end clamped. White noise of 30 N·m; the first "
+        "half fitted, the second "
+        "held out. At 19 Hz the unlumped model has its own resonance; the paper's resonance at 33 Hz is in "
+        "neither."
+    )
+    return response_figure(title, curves, marks, caption, decibel=(-62, 12))
+
+
+def figure_18_as_printed() -> Figure:
+    """Return both models with Table 2's values, unfitted, as the paper's simulation had them."""
+    rig = load_rig("paper_moving_output")
+    curves = []
+    models = readings(rig)
+    for (name, model), colour, dash in zip(
+        models.items(), (AFTER, BEFORE, BEFORE), ("solid", "solid", "dot"), strict=True
+    ):
+        values = frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ)
+        curves.append(Response(name.replace(", ", ",<br>"), colour, _HZ, values, dash=dash))
+    unlumped, moving, grounded = models.values()
+    own, other = resonance_hz(unlumped), resonance_hz(moving)
+    hz, gap = largest_gap(unlumped, grounded)
+    title = f"Fig. 18 with Table 2 as printed: resonance at {own:.1f} Hz unlumped, at {other:.1f} Hz lumped"
+    caption = (
+        "“Lumped” has two readings: its loads moving (Fig. 16), or the motor pushing against the ground "
+        "(Fig. "
+        f"3), which puts it {gap:.1f} dB above the unlumped model at {hz:.2f} Hz, the pendulum's "
+        "frequency. There "
+        "the pendulum swings by itself and holds no torque: none reaches the spring. In both readings the "
+        "resonance is elsewhere."
+    )
+    marks = [Mark(other, f"{other:.1f} Hz", "right"), Mark(own, f"{own:.1f} Hz", "left")]
+    return response_figure(title, curves, marks, caption, decibel=(-72, 16))
+
+
+def figure_20() -> Figure:
+    """Return the prototype end to end: Eq. (6), and with the rotor's spin."""
+    rig: Rig = load_rig("prototype_knee")
+    hz: FloatArray = np.geomspace(1.0, 300.0, 1500)
+    s = 2j * np.pi * hz
+    k_s, j_sc = rig["spring.stiffness"], rig["chassis.inertia"]
+    curves = [
+        Response(
+            "Eq. (6), b_s = 0.02",
+            AFTER,
+            hz,
+            formulas.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])(s),
+        ),
+    ]
+    marks = [Mark(55.5, "55.5 Hz, printed")]
+    for train, dash in zip(PROTOTYPE_TRAINS, ("solid", "dash"), strict=True):
+        turned = replace(rig, train=train)
+        name = f"with the rotor's spin,<br>n = {train_ratio(turned):+.0f}".replace("-", "−")
+        curves.append(Response(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
+        edge = float(undamped_band(k_s, inner_inertia(turned)))
+        marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))
+    ours = pure_torque_bandwidth(k_s, j_sc)
+    edges = " or ".join(f"{mark.hz:.1f}" for mark in marks[1:])
+    title = (
+        f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); {edges} "
+        "Hz with "
+        "the rotor's spin, by its sense"
+    )
+    caption = (
+        "|T_d/T_p| of the prototype. A harmonic drive with its circular spline held turns backward (n = "
+        "−160): "
+        "no resonance. With the flexspline held n = +161. J_m is our estimate; the paper states neither "
+        "it, nor "
+        "the damping, nor what is held."
+    )
+    return response_figure(title, curves, marks, caption, decibel=(-20, 20))
+
+
+def _measured(response: FrequencyResponse, name: str) -> Response:
+    shown, _ = thinned(response, None)
+    keep = (shown.frequency >= _HZ[0]) & (shown.coherence > 0.02)
+    return Response(name, faint(MEASURED, 0.6), shown.frequency[keep], shown.response[keep], 5.0)

@@ -1,0 +1,204 @@
+"""The tables of the paper's page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from rsea_ros.paper.arrangements import Arrangement, Limit
+from rsea_ros.paper.bands import TOLERANCES, Bands
+from rsea_ros.paper.claims import TABLE_2, Claim
+from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.paper.rivals import Judged
+from rsea_ros.report import words
+from rsea_ros.report.page.html import equation, section
+from rsea_ros.report.page.table import table
+
+EQUATIONS = """\
+(1)   T_d/T_m = K_s / (J_eff s² + b_eff s + K_s)                         lumped
+(2)   T_p/T_m = (J_eff s² + b_s s + K_s) / (J_eff s² + b_eff s + K_s)    lumped
+(3)   T_d/T_p = K_s / (J_eff s² + b_s s + K_s)                           lumped
+(4)   T_d/T_m = K_s / den,                                               the same function as (1)
+      den = (J_rotor N² + J_sc) s² + (b_rotor N² + b_s) s + K_s
+(5)   T_p/T_m = (J_sc s² + b_s s + K_s) / den                            exact: J_sc + n J_r
+(6)   T_d/T_p = K_s / (J_sc s² + b_s s + K_s)                            exact: J_sc + n J_r
+(7)   bandwidth = √(0.292 K_s / J_sc) / 2π                               +3 dB, undamped
+(8)   T = 2 K (R² + r_s²/3) sin θ cos θ                                  at most K_s/2, at 45°
+(9)   K_s = 2 K (R² + r_s²/3) (2 cos² θ − 1)                             slope of (8)
+(10)  1560.436 / (s² + 27.267 s + 1638.783)                              0.952 at rest, not 1"""
+
+TABLE_1 = (
+    ("Stiffness", "K/s", "Capacitance", "1/(C s), C = 1/K"),
+    ("Rotary inertia", "J s", "Inductance", "L s, L = J"),
+    ("Damping", "B", "Resistance", "R = B"),
+    ("Gears", "N²", "Transformer", "Mu²"),
+)
+
+
+def claims_table(claims: Sequence[Claim]) -> str:
+    """Return printed beside ours with the difference; only what the paper's numbers alone make is counted."""
+    recomputed = [c for c in claims if c.status == "found"]
+    agree = sum(c.agrees for c in recomputed)
+    rows = []
+    for c in claims:
+        unit = "°" if c.unit == "deg" else words.unit(c.unit)
+        ours = words.number(c.ours, 5)
+        same = "to the last digit" if c.agrees else f"{100 * c.difference:+.2f} %".replace("-", "−")
+        rows.append([c.where, c.what, c.printed, ours, unit, same, c.status, c.how])
+    head = ["Where", "What", "Printed", "Ours", "", "Difference", "", "Ours comes from"]
+    title = (
+        f"{agree} of the {len(recomputed)} numbers that others of the paper make come out to the last digit"
+    )
+    caption = (
+        "found: the paper's numbers alone make it, and only these count. silent: one that is needed is not "
+        "printed. unclear: tuned by the paper, or only bounded by other sources."
+    )
+    return section(title, table(head, rows, numbers=(2, 3, 5)), caption=caption)
+
+
+def findings_list(findings: Sequence[Finding]) -> str:
+    """Return where the paper contradicts itself or is silent."""
+    counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
+    rows = "".join(
+        "<tr><td "
+        f"style='white-space:nowrap'>{escape(f.where)}<small>{f.status}</small></td><td>{escape(f.text)}</td></tr>"
+        for f in findings
+    )
+    title = (
+        f"{counts['found']} contradictions, {counts['unclear']} statements with two readings, "
+        f"{counts['silent']} things left unsaid"
+    )
+    return section(title, f"<div class='scroll'><table>{rows}</table></div>")
+
+
+def equations_section() -> str:
+    """Return the equations as printed, with what is ours."""
+    return section("The equations as printed, and where the equations of motion differ", equation(EQUATIONS))
+
+
+def table_1(drawings: Sequence[tuple[str, str]]) -> str:
+    """Return Table 1 and the drawings, (caption, SVG)."""
+    head = ["Mechanical", "Impedance", "Electrical", "Impedance"]
+    figures = "".join(f"<h3>{escape(caption)}</h3>{svg}" for caption, svg in drawings)
+    return section(
+        "Table 1 and Figs. 6 to 8: the same machine as a circuit",
+        table(head, TABLE_1),
+        figures,
+        caption="Torque is voltage, velocity is current. The netlist of any rig is solved by nodal "
+        "analysis and agrees with the equations of motion to 1e-9 (test/model/test_circuit.py).",
+    )
+
+
+def table_2(rig_values: Mapping[str, float]) -> str:
+    """Return Table 2 beside what the rigs use."""
+    rows = []
+    for name, (printed, unit) in TABLE_2.items():
+        used = (
+            words.number(rig_values[name], 4)
+            if name in rig_values
+            else "clamped, exact"
+            if printed == "1e8"
+            else "behind the clamp"
+        )
+        rows.append([name, printed, words.unit(unit), used])
+    head = ["Parameter", "Printed", "", "In our rigs"]
+    caption = "The paper's proximal end (lp) is the one fixed to the frame; units without the per-radian."
+    return section(
+        "Table 2, as printed and as simulated here", table(head, rows, numbers=(1, 3)), caption=caption
+    )
+
+
+def bands_table(actuators: Mapping[str, Bands]) -> str:
+    """Return Eq. (7) and the exact bands of the actuators."""
+    tolerances = [f"±{db:g} dB" + (f", ±{deg:g}°" if deg < 90 else "") for db, deg in TOLERANCES]
+    parts = []
+    for name, b in actuators.items():
+        first = ["Eq. (7) as printed", f"{b.eq_7:.1f}", *[""] * (len(tolerances) - 1)]
+        low, high = b.spin_range
+        spin = ["Eq. (7) with the rotor's spin", f"{b.eq_7_spin:.1f}", *[""] * (len(tolerances) - 1)]
+        doubt = ["the same over 90 % of J_m", f"{_hz(low)} to {_hz(high)}", *[""] * (len(tolerances) - 1)]
+        rows = [first, spin, doubt, *([row.what, *(_hz(v) for v in row.hz)] for row in b.rows)]
+        motor = ", ".join(f"{t:.2g} N·m at {f:.3g} Hz" for f, t in b.motor_limit.items())
+        limits = f"Amplitude: {b.spring_limit:.0f} N·m at 5° of the spring; from the motor {motor}."
+        body = table(["|T_d/T_p| within, Hz", *tolerances], rows, numbers=range(1, 5))
+        under = f"<p class='caption under'>{escape(limits)}</p>"
+        parts.append(f"<h3>{escape(name)}</h3>{body}{under}")
+    title = (
+        "Up to where each is a pure torque source depends on the tolerance, the sensor and the rotor's spin"
+    )
+    return section(
+        title,
+        *parts,
+        caption="Exact: roots of polynomials in the frequency. Motor: continuous torque, both ends clamped. "
+        "J_m within the rig's spread: Table 2's for the platform, our estimate for the prototype. Which "
+        "spline "
+        "of the prototype's drive is held is not printed: n = −160 or +161, never +160.",
+    )
+
+
+def _hz(value: float) -> str:
+    return "no limit" if math.isinf(value) else f"{value:.1f}"
+
+
+def arrangements_table(rows: Sequence[Arrangement], limits: Sequence[Limit]) -> str:
+    """Return transfer functions and limits of all arrangements."""
+    body = [
+        [
+            words.train(r.train),
+            f"{r.ratio:+.0f}".replace("-", "−"),
+            f"{r.outer:.4f}",
+            f"{r.inner:+.5f}".replace("-", "−"),
+            "T_d/T_m = (b_s s + K_s)/den",
+            "T_p/T_m = (J_in s² + b_s s + K_s)/den",
+        ]
+        for r in rows
+    ]
+    head = ["Train", "n", "J_out, kg·m²", "J_in, kg·m²", "T-RSEA", ""]
+    reached = [
+        [x.what, x.of.split(",")[0], _values(x), " → ".join(f"{e:.1e}" for e in x.errors)] for x in limits
+    ]
+    return section(
+        "T-RSEA and RT-RSEA, every train, lumped and unlumped: one table",
+        equation(
+            "den = J_out s² + (b_m + b_s) s + K_s\nJ_out = J_sc + n² J_r      J_in = J_sc + n J_r "
+            "(lumped: J_out)      J_r = J_m/N²"
+        ),
+        table(head, body, numbers=range(1, 4)),
+        "<h3>Limits</h3>",
+        table(["Limit", "of", "at", "largest difference, 0.5 to 140 Hz"], reached, numbers=(3,)),
+        caption="Both ends clamped, the platform's values. An RT-RSEA is "
+        "the same machine held by the other end: T_d and T_p change places.",
+    )
+
+
+def _values(limit: Limit) -> str:
+    return " → ".join(words.number(v, 1) if v < 1e4 else f"{v:.0e}" for v in limit.values) if limit.of else ""
+
+
+def moving_table(tests: Mapping[str, MovingOutput]) -> str:
+    """Return how much of the held-out torque each model explains, for every test and sensor."""
+    rows = [
+        _moving_row(name, rival.name, judged)
+        for name, test in tests.items()
+        for rival in test.rivals
+        for judged in rival.judged
+    ]
+    head = ["Bench", "Model", "Sensor", "Variance explained, held out", "RMS error, N·m", "RMS torque, N·m"]
+    return section(
+        "With both ends moving a sensor at the distal end alone cannot tell the models apart; one at the "
+        "other end can",
+        table(head, rows, numbers=(3, 4, 5)),
+        caption="Fitted to the first half of the spring end's record, judged on the second half, and on "
+        "the other sensor, which no fit has seen. The lumped model is fitted with loose priors. The "
+        "benches are unlumped by construction.",
+    )
+
+
+def _moving_row(bench: str, model: str, j: Judged) -> list[str]:
+    end = "spring end" if j.sensor == "spring_end" else "housing end (never fitted)"
+    share = (
+        f"{100 * j.explained:.2f} %" if j.explained > 0.0 else f"none: off by {j.rms_error / j.rms:.0f} times"
+    )
+    return [bench.replace("_", " "), model, end, share, f"{j.rms_error:.3f}", f"{j.rms:.2f}"]

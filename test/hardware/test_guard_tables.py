@@ -1,0 +1,239 @@
+"""The guard as tables: commands with their ages in, torques and faults out, at the edges too."""
+
+from __future__ import annotations
+
+import pytest
+
+from rsea_ros.hardware.device import State
+from rsea_ros.hardware.limits import Fault, Guard, Limits
+
+PERIOD = 1.0 / 64.0
+"""s; a power of two, so that sums of it are exact."""
+
+
+def reading(motor_torque):
+    return State(0, 0.0, 0.0, motor_torque)
+
+
+def guard(period=PERIOD, **limits):
+    return Guard(Limits(**{"torque": 64.0, "slew": 1e9, **limits}), period)
+
+
+def torques(it, *commands):
+    """The torques of commands (wanted, age)."""
+    return [it.allowed(*c) for c in commands]
+
+
+def test_a_new_guard_commands_nothing_and_has_nothing_against_it():
+    new = guard()
+    assert (new.torque, new.limited, new.fault, new.halted) == (0.0, 0, None, False)
+
+
+def test_a_step_of_torque_is_limited_where_nothing_is_said():
+    """40 000 N m/s: 40 N m a ms, which no actuator of this size can follow, and no typing error gets past."""
+    assert Guard(Limits(68.0), 1e-3).allowed(68.0, 0.0) == pytest.approx(40.0)
+
+
+def test_slew_holds_both_ways_and_from_the_torque_before():
+    it = guard(slew=64.0)
+    assert torques(it, *[(9.0, 0.0)] * 3, *[(-9.0, 0.0)] * 5) == [1, 2, 3, 2, 1, 0, -1, -2]
+    assert it.limited == 8
+
+
+def test_commands_within_the_limits_are_not_counted():
+    it = guard()
+    assert torques(it, (64.0, 0.0), (-64.0, 0.0), (3.0, 0.0)) == [64.0, -64.0, 3.0]
+    assert it.limited == 0
+
+
+def test_no_command_is_no_torque_and_no_fault():
+    it = guard()
+    assert torques(it, (9.0, 0.0), (9.0, None), (9.0, None)) == [9.0, 0.0, 0.0]
+    assert it.fault is None
+
+
+@pytest.mark.parametrize(("age", "tripped"), [(0.05, False), (0.0501, True)])
+def test_a_command_counts_for_50_ms_where_nothing_is_said(age, tripped):
+    it = guard()
+    it.allowed(9.0, 0.0)
+    it.allowed(9.0, age)
+    assert (it.fault is not None) == tripped
+
+
+def test_the_fault_of_late_commands_says_how_late_in_ms():
+    it = guard(command_timeout=0.125)
+    it.allowed(9.0, 0.0)
+    it.allowed(9.0, 0.25)
+    assert it.fault == Fault("command_timeout", 250.0, 125.0, "ms")
+
+
+def test_an_end_of_the_program_is_zero_torque_and_no_fault():
+    it = guard()
+    it.allowed(9.0, 0.0)
+    it.halted = True
+    assert torques(it, (9.0, 0.0), (9.0, None)) == [0.0, 0.0]
+    assert it.fault is None
+
+
+def test_any_other_fault_is_zero_torque_at_once():
+    it = guard()
+    it.allowed(9.0, 0.0)
+    it.trip(Fault("ft"))
+    assert torques(it, (9.0, 0.0), (9.0, 9.0), (9.0, None)) == [0.0, 0.0, 0.0]
+    assert it.fault.cause == "ft"
+
+
+def test_the_first_fault_stays_and_so_does_its_ramp():
+    it = guard(ramp=4 * PERIOD)
+    it.allowed(8.0, 0.0)
+    it.trip(Fault("command_timeout"))
+    it.allowed(8.0, 0.0)
+    it.trip(Fault("ft"))
+    assert it.fault.cause == "command_timeout"
+    assert torques(it, (8.0, 0.0), (8.0, 0.0)) == [4.0, 2.0]
+
+
+@pytest.mark.parametrize("age", [None, 0.0])
+@pytest.mark.parametrize(("ramp", "expected"), [
+    (4 * PERIOD, [6, 4, 2, 0, 0]),
+    (PERIOD, [0, 0, 0, 0, 0]),
+    (0.0, [0, 0, 0, 0, 0]),  # a ramp shorter than a cycle takes one
+])  # fmt: skip
+def test_the_ramp_takes_its_time_and_a_cycle_at_least(age, ramp, expected):
+    it = guard(ramp=ramp)
+    it.allowed(-8.0, 0.0)
+    it.trip(Fault("command_timeout"))
+    assert [abs(it.allowed(-8.0, age)) for _ in range(5)] == expected
+
+
+def test_the_ramp_takes_20_ms_where_nothing_is_said():
+    it = guard(period=0.005)
+    it.allowed(8.0, 0.0)
+    it.trip(Fault("command_timeout"))
+    assert [it.allowed(8.0, 0.0) for _ in range(5)] == pytest.approx([6, 4, 2, 0, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("late", "expected"), [(0.0, 6.0), (1.0, 6.0), (1.5, 5.0), (3.0, 2.0), (4.0, 0.0), (9.0, 0.0)]
+)
+def test_what_is_left_of_the_ramp_goes_by_the_age_of_the_command(late, expected):
+    """late: cycles of a ramp of four since the command counted no more."""
+    it = guard(command_timeout=2 * PERIOD, ramp=4 * PERIOD)
+    it.allowed(8.0, 0.0)
+    it.trip(Fault("command_timeout"))
+    assert it.allowed(8.0, (2.0 + late) * PERIOD) == expected
+
+
+def test_a_ramp_shorter_than_a_cycle_is_a_cycle_for_late_commands_too():
+    it = guard(command_timeout=2 * PERIOD, ramp=0.0)
+    it.allowed(8.0, 0.0)
+    assert it.allowed(8.0, 2.5 * PERIOD) == 0.0
+
+
+SOFT = {"soft_start": 128.0}
+"""N m/s: 2 N m a cycle."""
+
+
+def test_a_soft_start_holds_both_ways():
+    assert torques(guard(**SOFT), *[(-5.0, 0.0)] * 4) == [-2.0, -4.0, -5.0, -5.0]
+
+
+def test_a_soft_start_ends_at_the_torque_limit():
+    assert torques(guard(torque=5.0, **SOFT), *[(9.0, 0.0)] * 4) == [2.0, 4.0, 5.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("pause", "expected"),
+    [
+        ((0.0, 0.0), 8.0),  # a zero command is one: the start goes on
+        ((0.0, 0.05), 8.0),  # as long as it counts
+        ((0.0, 0.0501), 2.0),  # commands have ceased: it begins anew
+        ((0.0, None), 2.0),
+    ],
+)
+def test_a_soft_start_begins_anew_when_commands_have_ceased(pause, expected):
+    it = guard(**SOFT)
+    torques(it, (9.0, 0.0), (0.0, 0.0), pause)
+    assert it.allowed(9.0, 0.0) == expected
+
+
+def test_there_is_no_soft_start_where_nothing_is_said():
+    assert guard().allowed(64.0, 0.0) == 64.0
+
+
+def test_a_guard_begins_anew_after_it_was_cleared():
+    it = guard(slew=128.0, **SOFT)
+    torques(it, *[(9.0, 0.0)] * 4)
+    it.trip(Fault("ft"))
+    it.clear()
+    assert (it.fault, it.torque) == (None, 0.0)
+    assert torques(it, *[(9.0, 0.0)] * 2) == [2.0, 4.0]
+
+
+EFFORT = {"effort": 4.0, "effort_time": 3 * PERIOD}
+
+
+def misses(it, *measured, wanted=10.0):
+    """Whether there is a fault after each measured torque, under a constant command."""
+    seen = []
+    for torque in measured:
+        it.allowed(wanted, 0.0)
+        it.look(reading(torque))
+        seen.append(it.fault is not None)
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("measured", "tripped"),
+    [
+        ([5.9] * 5, [False, False, False, True, True]),  # 4.1 N m too little, longer than three cycles
+        ([14.1] * 5, [False, False, False, True, True]),  # too much
+        ([6.0] * 5, [False] * 5),  # 4 N m are allowed
+        ([14.0] * 5, [False] * 5),
+        ([5.9, 5.9, 5.9, 10.0, 5.9, 5.9, 5.9], [False] * 7),  # it counts from the last right one
+    ],
+)
+def test_a_torque_that_is_missed_for_longer_than_allowed_is_a_fault(measured, tripped):
+    assert misses(guard(**EFFORT), *measured) == tripped
+
+
+def test_the_fault_of_a_missed_torque_says_by_how_much():
+    it = guard(**EFFORT)
+    misses(it, *[5.0] * 4)
+    assert it.fault == Fault("effort", 5.0, 4.0, "N m", "between commanded and measured torque")
+
+
+def test_a_torque_shows_in_the_measured_one_within_three_cycles():
+    it = guard(**EFFORT)
+    misses(it, 0.0, 0.0, 0.0, wanted=0.0)
+    assert misses(it, 0.0, 0.0, 0.0, 0.0, 0.0, wanted=10.0) == [False] * 5, "the first miss is the third"
+    assert misses(it, 0.0, wanted=10.0) == [True]
+
+
+def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():
+    it = guard(**EFFORT)
+    misses(it, 0.0, 0.0, 0.0)
+    it.trip(Fault("ft"))
+    it.clear()
+    it.look(reading(-9.0))  # nothing was written yet
+    assert it.fault is None
+    assert misses(it, 0.0, 0.0, 0.0, 0.0) == [False, False, False, True]
+
+
+def test_a_ramp_is_no_missed_torque():
+    it = guard(**EFFORT)
+    it.allowed(10.0, 0.0)
+    it.trip(Fault("ft"))
+    for _ in range(5):
+        it.look(reading(10.0))
+    it.fault = None
+    it.look(reading(10.0))
+    assert it.fault is None
+
+
+def test_a_missed_torque_trips_nothing_where_nothing_is_said():
+    assert misses(guard(), *[1e9] * 30) == [False] * 30
+
+
+def test_a_missed_torque_has_a_tenth_of_a_second_where_nothing_is_said():
+    assert misses(guard(effort=4.0), *[0.0] * 7) == [False] * 6 + [True]  # 7 cycles are 0.109 s

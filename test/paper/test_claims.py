@@ -1,0 +1,118 @@
+"""The paper's numbers beside ours: what agrees, what does not, and every contradiction with its number."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rsea_ros.design.catalogue import unit_named
+from rsea_ros.model import outputs
+from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
+from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
+from rsea_ros.paper.findings import findings
+from rsea_ros.paper.findings_bench import clamp_error
+
+
+@pytest.mark.parametrize(("text", "step"), [("3.14", 0.01), ("7", 1.0), ("6.169e-4", 1e-7), ("1e8", 1e8)])
+def test_last_printed_digit(text, step):
+    assert last_digit(text) == pytest.approx(step)
+
+
+def test_only_what_the_papers_numbers_make_is_counted():
+    """No conversions of inches, no number that is not printed, nothing tuned, nothing from other sources."""
+    counted = {c.what: c.agrees for c in claims() if c.status == "found"}
+    assert counted == {
+        "K_s/J_eff, numerator": False,
+        "J_m": True,
+        "b_m": True,
+        "factor": True,
+        "bandwidth of the prototype": False,
+    }
+    assert {c.what for c in claims() if c.status == "silent"} == {"K_s, nominal", "K_s, prototype"}
+    printed = {c.printed for c in claims()}
+    assert not printed & {"1.000", "0.957", "26.088", "127", "114", "50.8"}
+
+
+def test_what_does_not_come_out():
+    off = {c.what: round(100 * c.difference, 1) for c in claims() if not c.agrees}
+    assert off["K_s/J_eff, numerator"] == 5.0
+    assert off["bandwidth of the prototype"] == 0.6
+    assert off["K_ld, pendulum"] == -7.4
+    assert off["b_m, viscous"] == -85.9
+
+
+@pytest.mark.parametrize(
+    ("status", "where", "number"),
+    [
+        ("found", "Nomenclature and 2.2", "motor chassis"),
+        ("found", "2.2, text on Fig. 7", "not seen"),
+        ("found", "2.3.1, Eqs. (4) and (5)", "N² once more"),
+        ("found", "Eq. (10)", "4.8 %"),
+        ("found", "3.2.1, 3.2.2", "10 N and 30 N"),
+        ("found", "3.2.2, 19 Hz", "19.8 Hz"),
+        ("found", "4.1 and Eq. (8)", "130 N·m"),
+        ("unclear", "Fig. 8, Eqs. (5) to (7)", "43.8 or 73.4 Hz"),
+        ("unclear", "3.1, Eqs. (8) and (9)", "at least 3344 N·m/rad"),
+        ("unclear", "3.2.2, Figs. 16 and 18", "19.8 Hz unlumped, 6.1 Hz lumped"),
+        ("unclear", "3.2.2, Table 2, K_ld", "6.48"),
+        ("unclear", "4.1 and Eqs. (5) to (7)", "19.9 Hz with the circular spline held (n = −160), 15.3 Hz"),
+        ("silent", "Eq. (3) and Eq. (7)", "3.44 Hz where Eq. (6) gives 53.2 Hz"),
+        ("silent", "Eq. (7)", "112.1 Hz"),
+        ("silent", "Table 2, b_m", "3.2 N·m·s/rad"),
+        ("silent", "Eq. (9)", "11.5 mm"),
+        ("silent", "3.2.2", "thermal"),
+        ("silent", "4.1 and 3.1.2", "33°"),
+        ("silent", "4.1", "13.1 mm"),
+    ],
+)
+def test_findings_carry_their_number(status, where, number):
+    assert any(f.status == status and f.where == where and number in f.text for f in findings())
+
+
+def test_contradictions_are_those_that_hold():
+    """What the paper admits, says of the test platform, or what rests on our J_m, is no contradiction."""
+    assert sum(f.status == "found" for f in findings()) == 7
+
+
+def test_both_readings_of_the_lumped_model():
+    """Issue 13: 6.1 Hz against 19.8 Hz; the grounded motor is 62.0 dB off at the pendulum's frequency."""
+    unlumped, moving, grounded = readings(load_rig("paper_moving_output")).values()
+    assert resonance_hz(unlumped) == pytest.approx(19.8, abs=0.05)
+    assert resonance_hz(moving) == pytest.approx(6.1, abs=0.05)
+    assert largest_gap(unlumped, grounded) == pytest.approx((1.34, 62.0), abs=0.05)
+    fine = np.linspace(1.30, 1.38, 2001)
+    ours, theirs = (
+        frequency_response(rig, outputs.end_torque(rig, "spring_end"), fine) for rig in (unlumped, grounded)
+    )
+    assert np.max(20.0 * np.log10(np.abs(theirs / ours))) == pytest.approx(
+        largest_gap(unlumped, grounded)[1], abs=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("hz", "unlumped", "moving"),
+    [
+        (0.5, -21.7, -21.7),
+        (6.1, -21.3, 4.9),
+        (10.0, -18.8, -16.3),
+        (19.8, -8.8, -25.7),
+        (33.0, -24.7, -31.6),
+    ],
+)
+def test_reference_numbers_of_fig_18(hz, unlumped, moving):
+    rigs = list(readings(load_rig("paper_moving_output")).values())
+    for rig, expected in zip(rigs, (unlumped, moving), strict=False):
+        h = frequency_response(rig, outputs.end_torque(rig, "spring_end"), np.array([hz]))[0]
+        assert 20.0 * np.log10(abs(h)) == pytest.approx(expected, abs=0.06)
+
+
+def test_the_catalogue_and_the_paper_leave_the_same_trains_open():
+    assert unit_named("rd85x13-hd_cpl-25a-160").trains == PROTOTYPE_TRAINS
+    knee = load_rig("prototype_knee")
+    assert (knee.train, *knee.other_trains) == PROTOTYPE_TRAINS
+
+
+def test_the_papers_1e8_is_as_good_as_a_clamp():
+    assert clamp_error() < 1e-6

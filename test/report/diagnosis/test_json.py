@@ -1,0 +1,103 @@
+"""diagnosis.json by the contract, and the extended model beside it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.result import Estimate, Experiment
+from rsea_ros.model.prediction import predict
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.report.diagnosis.files import NAMES
+from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.signals import Fault
+
+
+def strict(text: str) -> Any:
+    """Return parsed JSON; NaN and Infinity, which JSON has not, are errors."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(constant)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def test_all_files_are_there_and_nothing_else(diagnosed) -> None:
+    assert sorted(p.name for p in diagnosed.out.iterdir()) == sorted(NAMES)
+    assert (diagnosed.out / "report.html").stat().st_size < 8_000_000
+
+
+def test_json_has_all_that_the_contract_promises(diagnosed) -> None:
+    d = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))
+    assert (d["schema"], d["rig"], d["verdict"]) == (1, "paper_high_impedance", "explained")
+    assert d["data"]["bags"] == ["runs/bench & <friends>"] and d["data"]["faults"] == []
+    assert d["data"]["duration_s"] == pytest.approx(16.0, abs=0.01)
+    assert d["data"]["rate_hz"] == pytest.approx(280.0, rel=1e-6)
+    for channel in ("ft", "position"):
+        for part in (d["baseline"]["residual_rms"], d["baseline"]["noise_rms"], d["baseline"]["fit_percent"],
+                     d["extended"]["residual_rms"], d["extended"]["fit_percent"]):  # fmt: skip
+            assert isinstance(part[channel], float)
+    inertia = d["baseline"]["parameters"]["rotor.reflected_inertia"]
+    assert inertia["unit"] == "kg m^2" and inertia["ci95"][0] < inertia["value"] < inertia["ci95"][1]
+    assert d["extended"]["at_noise_floor"] is True
+    for misfit in d["misfit"]:
+        assert {"what", "from", "to", "unit", "times_noise"} <= set(misfit)
+        assert misfit["from"] < misfit["to"] and misfit["times_noise"] > 1.0
+    for rejected in d["rejected"]:
+        assert {"name", "gain_holdout", "why"} <= set(rejected)
+    assert "next_experiment" in d
+
+
+def test_json_names_the_cause_with_size_and_gain(diagnosed) -> None:
+    (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
+    assert cause["name"] == "coulomb_friction" and cause["evidence"].endswith(".")
+    torque = cause["parameters"]["torque"]
+    assert torque["value"] == pytest.approx(3.0, rel=0.02) and torque["unit"] == "N m"
+    assert torque["ci95"][0] < torque["value"] < torque["ci95"][1]
+    low, high = cause["gain"]["holdout_ci95"]
+    assert low <= cause["gain"]["holdout"] <= high
+    assert cause["gain"]["train"] == pytest.approx(cause["gain"]["holdout"], abs=0.05)
+    assert isinstance(cause["confusable_with"], list)
+
+
+def test_json_keeps_the_noise_and_the_simulation_s_own_error_apart(diagnosed) -> None:
+    """0.25 % of the simulation made nearly every interval, and neither file nor page said so."""
+    (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
+    torque = cause["parameters"]["torque"]
+    noise = torque["statistical_ci95"][1] - torque["value"]
+    assert 0.0 < noise < torque["ci95"][1] - torque["value"]
+    assert np.hypot(noise, 1.96 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
+
+
+def test_what_is_not_a_number_is_null(diagnosed) -> None:
+    unbounded = replace(
+        diagnosed.diagnosis.causes[0],
+        parameters={"torque": Estimate(3.0, "N m", (-np.inf, np.inf))},
+        gain_holdout=np.nan,
+    )
+    odd = replace(
+        diagnosed.diagnosis,
+        causes=(unbounded,),
+        noise_rms={"ft": np.nan},
+        faults=(Fault("clock_jump", "ft", np.nan, "3.7 s"),),
+        next_experiment=Experiment("why", {"kind": "steps", "amplitude": np.inf}),
+    )
+    document = strict(json.dumps(diagnosis_json(odd), allow_nan=False))
+    assert document["causes"][0]["parameters"]["torque"]["ci95"] == [None, None]
+    assert document["causes"][0]["gain"]["holdout"] is None
+    assert document["baseline"]["noise_rms"]["ft"] is None
+    assert document["data"]["faults"][0] == {
+        "kind": "clock_jump", "channel": "ft", "share": None, "detail": "3.7 s"
+    }  # fmt: skip
+    assert document["next_experiment"]["excitation"] == {"kind": "steps", "amplitude": None}
+
+
+def test_the_extended_model_predicts_what_the_nominal_one_does_not(diagnosed) -> None:
+    extended = predict(load_rig(diagnosed.out / "model.yaml"), diagnosed.record)["ft"].rms_error
+    nominal = predict(diagnosed.diagnosis.baseline_rig, diagnosed.record)["ft"].rms_error
+    assert 1.0 - extended / nominal == pytest.approx(diagnosed.diagnosis.causes[0].gain_holdout, abs=0.05)

@@ -1,0 +1,167 @@
+"""What page and terminal say, and where the residual is laid out, against values known beforehand."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
+from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
+from rsea_ros.identification.result import Overlay
+from rsea_ros.report import words
+from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.json import diagnosis_json
+from rsea_ros.report.diagnosis.profile import BINS, Profile, profiles
+from rsea_ros.report.diagnosis.settings import settings_section
+from rsea_ros.report.diagnosis.terminal import terminal_lines
+from rsea_ros.report.diagnosis.where import finding, where_figure
+from rsea_ros.signals import Fault
+
+
+def terminal(diagnosis):
+    """Return what a pipe gets."""
+    console = Console(file=io.StringIO(), width=80)
+    for line in terminal_lines(diagnosis):
+        console.print(line, soft_wrap=True, highlight=False)
+    return console.file.getvalue().splitlines()
+
+
+def test_the_terminal_says_the_essence_in_about_ten_lines(diagnosed):
+    lines = terminal(diagnosed.diagnosis)
+    assert lines[0] == "Coulomb friction (3.00 N·m) is what the simulation lacks; with it, only noise is left"
+    assert lines[1].startswith("residual    F/T torque ")
+    assert lines[2].startswith("cause       coulomb_friction: torque ")
+    assert len(lines) <= 12
+
+
+def test_the_terminal_tells_faults_rivals_and_what_was_rejected(diagnosed):
+    d = diagnosed.diagnosis
+    d = replace(
+        d,
+        causes=(replace(d.causes[0], confusable_with=("stribeck_friction",)),),
+        rejected=(Rejected("backlash", 0.25, "explains_less", "coulomb_friction"),),
+        faults=(Fault("frozen_samples", "ft", 0.05),),
+        misfit=(Misfit("velocity", -0.1, 0.0, "rad/s", 48.0, "ft"),),
+    )
+    lines = terminal(d)
+    assert "rejected    backlash: Coulomb friction explains more" in lines
+    assert "unclear     Coulomb friction: these data do not distinguish it from Stribeck friction." in lines
+    assert "data        frozen samples in F/T torque, 5.0 % of the samples" in lines
+    assert "wrong at    speed −0.10 to 0 rad/s (48 times)" in lines
+
+
+def test_the_terminal_lists_the_fitted_rivals_with_the_largest_gains(diagnosed):
+    """Effects that were only screened came first, for their gain was not exactly zero."""
+    screened = [Rejected(n, 0.001, "far_behind", is_fitted=False) for n in ("hard_stop", "ft_drift")]
+    fitted = [Rejected(n, g, "explains_less", "coulomb_friction") for n, g in (("backlash", 0.25),
+              ("command_delay", 0.1), ("nonlinear_spring", 0.8), ("ft_bias", 0.0))]  # fmt: skip
+    lines = terminal(replace(diagnosed.diagnosis, rejected=(*screened, *fitted)))
+    rejected = [line.split()[1].rstrip(":") for line in lines if line.startswith("rejected")]
+    assert rejected == ["nonlinear_spring", "backlash", "command_delay"]
+
+
+@pytest.mark.parametrize("reason", get_args(Reason))
+def test_every_reason_has_words(reason):
+    assert say.rejection(Rejected("backlash", 0.28, reason, "hard_stop"))
+
+
+def test_a_gain_that_is_too_small_is_not_said_to_be_none():
+    """Beside a gain of 28 % stood: does not lower the residual of data that it was not fitted to."""
+    assert say.rejection(Rejected("backlash", 0.28, "too_small")).startswith("lowers the residual")
+
+
+def test_json_sentence_and_page_speak_of_one_channel(diagnosed):
+    """The sentence spoke of the F/T torque where the headline spoke of the first cause's channel."""
+    d = diagnosed.diagnosis
+    assert d.channel == d.causes[0].channel
+    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in d.sentence
+    elsewhere = terminal(replace(d, channel="position"))
+    assert elsewhere[1].startswith("residual    position ")
+
+
+@pytest.mark.parametrize(
+    ("estimate", "text"),
+    [
+        (Estimate(0.0040045, "rad", (0.0040015, 0.0040075)), ("4.0045", " ± 0.0030", "mrad")),
+        (Estimate(2.5e-4, "s", (2.3e-4, 2.7e-4)), ("250", " ± 20", "µs")),
+        (Estimate(3.0, "N m", (2.5, 3.5)), ("3.00", " ± 0.50", "N·m")),
+        (Estimate(0.95, "1", (0.94, 0.96)), ("0.950", " ± 0.010", "")),
+        (Estimate(3.0, "N m", (2.9, 4.4)), ("3.00", " −0.10/+1.4", "N·m")),
+    ],
+)
+def test_small_angles_and_times_have_a_prefix(estimate, text):
+    assert num.estimate(estimate) == text
+
+
+def test_an_experiment_is_said_with_its_units():
+    run = {"kind": "chirp", "amplitude": 64.311, "unit": "N m", "low": 0.05, "high": 120.0, "duration": 12.0}
+    assert say.excitation(run) == "chirp, amplitude 64.3 N·m, 0.05 to 120 Hz, 12 s"
+    assert say.excitation({"kind": "steps", "periods": 3.0}) == "steps, periods 3"
+    assert say.excitation({}) == ""
+
+
+def test_a_number_without_unit_is_named(diagnosed):
+    cause = replace(diagnosed.diagnosis.causes[0], name="ft_gain_error",
+                    parameters={"gain": Estimate(1.05, "1", (1.04, 1.06))})  # fmt: skip
+    assert say.named([cause]) == "F/T gain error (gain 1.05)"
+
+
+def laid_out(diagnosed, residual):
+    """Return profiles of a residual that is a function of speed and time before, and zero after."""
+    d, channels = diagnosed.diagnosis, diagnosed.record.channels
+    t, speed = channels["ft"].t, channels["velocity"].y
+    before = [Overlay(n, c.t, c.y, c.y) for n, c in channels.items() if n != "command"]
+    shifted = channels["ft"].y - d.noise_rms["ft"] * residual(speed, t - t[0])
+    wrong = [Overlay("ft", t, channels["ft"].y, shifted) if o.channel == "ft" else o for o in before]
+    return {p.what: p for p in profiles(replace(d, before=tuple(wrong), after=tuple(before)), "ft")}
+
+
+def test_a_residual_at_high_speed_is_found_there(diagnosed):
+    limit = float(np.quantile(diagnosed.record["velocity"].y, 1.0 - 1.0 / BINS))
+    found = laid_out(diagnosed, lambda speed, t: np.where(speed > limit, 30.0, 2.0))
+    assert set(found) == {"amplitude", "velocity", "angle", "time"}
+    assert found["velocity"].before[-1] == pytest.approx(30.0, rel=0.05)
+    assert found["velocity"].before[:-2] == pytest.approx(2.0)
+    assert found["velocity"].after == pytest.approx(0.0)
+    assert finding(list(found.values())).startswith("The residual depends most on speed: ")
+
+
+def test_faulty_samples_count_for_nothing(diagnosed):
+    d, t = diagnosed.diagnosis, diagnosed.record["ft"].t
+    faulty = (t > 5.0) & (t < 6.0)
+    diagnosis = replace(d, masked={"ft": faulty})
+    masked = laid_out(replace(diagnosed, diagnosis=diagnosis), lambda speed, t: np.where(faulty, 1e3, 1.0))
+    for profile in masked.values():
+        assert np.nanmax(profile.before) == pytest.approx(1.0)
+
+
+def test_a_residual_alike_everywhere_is_said_to_be(diagnosed):
+    found = laid_out(diagnosed, lambda speed, t: 5.0 + 0.0 * t)
+    assert finding(list(found.values())) == "The residual is alike at every load, speed or rotor angle"
+
+
+def test_a_residual_of_zero_in_a_bin_leaves_the_axis_finite():
+    resting = np.array([0.0, 2.0, 0.0])
+    profile = Profile("time", "s", np.arange(4.0), resting, resting)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = where_figure([profile], changed=True)
+    assert np.isfinite(figure.layout["yaxis"]["range"]).all()
+
+
+def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnosed):
+    changed = DiagnosisSettings(without=("ft_bias",), acceptance=AcceptanceSettings(fall=0.25))
+    diagnosis = replace(diagnosed.diagnosis, settings=changed)
+    written = diagnosis_json(diagnosis)["settings"]
+    assert (written["acceptance.fall"], written["max_causes"]) == (0.25, 4)
+    assert written["without"] == ["ft_bias"]
+    section = settings_section(changed)
+    assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
+    assert section.count("<b>") == 1

@@ -1,0 +1,95 @@
+"""Figures hold what the values say, and no number that JSON cannot hold."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from rsea_ros.identification.result import Identification
+from rsea_ros.report.bars import Bar, bar_figure
+from rsea_ros.report.figures.bode import bode_figure
+from rsea_ros.report.figures.figure import Figure
+from rsea_ros.report.figures.overlay import MOST_SAMPLES, Simulated, overlay_figure, sampled
+from rsea_ros.report.figures.palette import AFTER, BEFORE
+from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
+from rsea_ros.report.figures.thinned import thinned
+
+
+def as_json(figure: Figure) -> str:
+    return json.dumps(asdict(figure), allow_nan=False)
+
+
+def test_density_of_white_noise_is_its_rms_over_the_root_of_half_the_rate() -> None:
+    noise = 0.3 * np.random.default_rng(2).standard_normal(60_000)
+    frequency, values = density(noise, 280.0)
+    assert np.sqrt(np.mean(values**2)) == pytest.approx(0.3 / np.sqrt(140.0), rel=0.01)
+    assert 0.0 < frequency[0] < frequency[-1] < 140.0
+
+
+def test_finding_names_the_band_above_the_noise() -> None:
+    t = np.arange(60_000) / 280.0
+    residual = 0.1 * np.random.default_rng(3).standard_normal(len(t))
+    floor = 0.1 / np.sqrt(140.0)
+    assert finding(*density(residual, 280.0), floor, "torque").endswith(
+        "at the noise floor at all frequencies"
+    )
+    loud = finding(*density(residual + 0.5 * np.sin(2.0 * np.pi * 33.0 * t), 280.0), floor, "torque")
+    assert "most at 33 Hz" in loud
+
+
+def test_thinning_keeps_the_response(identification: Identification) -> None:
+    measured, model = identification.responses[0], identification.models[0]
+    shown, shown_model = thinned(measured, model)
+    assert shown_model is not None
+    assert len(shown.frequency) < len(measured.frequency)
+    there = np.interp(shown.frequency, measured.frequency, np.abs(model))
+    inside = (shown.frequency > 0.5) & (shown.frequency < 100.0)
+    assert np.abs(shown_model)[inside] == pytest.approx(there[inside], rel=0.02)
+
+
+def test_bode_title_says_where_a_wrong_model_parts(identification: Identification) -> None:
+    measured, model = identification.responses[0], identification.models[0]
+    bump = 1.0 + 2.0 * np.exp(-((measured.frequency - 33.0) ** 2))
+    right, wrong = bode_figure(measured, model), bode_figure(measured, model * bump)
+    assert "lies in the measured 95 % circle" in right.title
+    assert "leaves the measured 95 % circle, most at 3" in wrong.title
+    as_json(wrong)
+
+
+def test_long_traces_keep_their_extremes() -> None:
+    y = np.random.default_rng(5).standard_normal(500_000)
+    residual = 0.01 * y
+    y[123_456], residual[333_333] = 50.0, -9.0
+    keep = sampled(y, residual)
+    assert len(keep) <= MOST_SAMPLES
+    assert 123_456 in keep
+    assert 333_333 in keep
+    assert np.all(np.diff(keep) > 0)
+
+
+def test_before_after_and_noise_in_one_figure() -> None:
+    frequency = np.linspace(0.1, 139.0, 500)
+    curves = [Curve("before", BEFORE, 1.0 / frequency), Curve("after", AFTER, np.full(500, 2e-3))]
+    figure = residual_figure("The cause takes it to the noise", "ft", frequency, curves, noise=2e-3)
+    assert [d["name"] for d in figure.data] == ["noise floor", "before", "after"]
+    assert figure.layout["yaxis"]["title"]["text"] == "density, N·m/√Hz"
+    as_json(figure)
+
+
+def test_overlay_of_two_simulations() -> None:
+    t = np.arange(3000) / 280.0
+    simulations = [Simulated("before", BEFORE, np.cos(t)), Simulated("after", AFTER, np.sin(t))]
+    figure = overlay_figure("Before and after", "ft", t, np.sin(t), simulations)
+    assert [r["name"] for r in figure.extra["residuals"]] == ["before", "after"]
+    as_json(figure)
+
+
+def test_bars_carry_their_text_and_interval() -> None:
+    bars = [Bar("coulomb_friction", 0.61, "61 %", (0.58, 0.64), strong=True), Bar("backlash", -0.02, "−2 %")]
+    figure = bar_figure("Friction explains it", bars, "gain on held-out data")
+    assert [a["text"] for a in figure.layout["annotations"]] == ["−2 %", "61 %"]
+    assert figure.data[0]["error_x"]["array"] == pytest.approx([0.0, 0.03])
+    as_json(figure)

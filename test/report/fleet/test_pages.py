@@ -1,0 +1,137 @@
+"""The pages of a fleet: what they say first, where they lead, and that a browser draws them."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "trends"))
+
+from fleet_histories import START, cause, history, recordings
+
+from rsea_ros.errors import OutputError
+from rsea_ros.report.fleet import write_fleet_report
+from rsea_ros.report.fleet.links import page_names
+from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent
+from rsea_ros.trends import alarms
+
+JOINTS = ("hip", "knee <left>", "ankle/1", "elbow")
+WORN = "knee <left>"
+
+
+@pytest.fixture(scope="module")
+def tables():
+    """A joint that wears, one with backlash from day 50 on, one that cannot be determined."""
+    rng = np.random.default_rng(3)
+    made = history(
+        rng, joints=JOINTS, days=100, course=lambda j, d: -2e-3 * np.clip(d - 40, 0, None) * (j == WORN)
+    )
+    made["identifiable"] &= made["joint"] != "elbow"
+    names = recordings(
+        JOINTS, 100, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "hip" and d >= 50 else [],
+        faults=lambda j, d: [{"kind": "outliers", "count": 3, "detail": ""}] if d == 7 else [],
+    )  # fmt: skip
+    return made, names
+
+
+@pytest.fixture(scope="module")
+def pages(tables, tmp_path_factory):
+    """The pages by file name, without the bundle that draws figures."""
+    store = tmp_path_factory.mktemp("store")
+    shown = store / next(a for a in alarms(*tables) if a.joint == "hip").artefacts
+    shown.mkdir(parents=True)
+    (shown / "diagnosis.json").write_text("{}")
+    index = write_fleet_report(*tables, store.parent / "out", store=store)
+    texts = {p.name: p.read_text(encoding="utf-8") for p in index.parent.iterdir()}
+    return {n: re.sub(r'<script type="text/plain" id="plotly">.*?</script>', "", t) for n, t in texts.items()}
+
+
+def test_the_first_sentence_names_how_many_and_the_worst(pages):
+    assert "<h1>2 of 4 joints need a look, hip first: Backlash, 2.00" in pages["index.html"]
+    worn = pages["joint-knee--left-.html"]
+    assert "<h1>knee &lt;left&gt;: Spring stiffness has been falling since 1" in worn
+
+
+def test_what_cannot_be_told_is_said_with_its_reason(pages):
+    assert "One course cannot be determined" in pages["index.html"]
+    assert "Spring stiffness: not enough excitation to tell" in pages["joint-elbow.html"]
+    assert "0 of 200 recordings determine it" in pages["joint-elbow.html"]
+
+
+def test_what_the_latest_recording_names_is_news_before_there_is_a_trend(tmp_path):
+    """Two recordings of two joints, one worn: it was listed as steady."""
+    joints = ("left", "right")
+    made = history(np.random.default_rng(1), joints=joints, days=2)
+    worn = recordings(joints, 2, causes=lambda j, d: [cause("backlash", 4e-3)] if j == "right" and d else [])
+    index = write_fleet_report(made, worn, tmp_path / "out")
+    text = index.read_text(encoding="utf-8")
+    assert "<h1>Too few recordings yet to say what changes; the latest name backlash in right" in text
+    assert "now backlash" in text and "<td>steady</td>" not in text
+    assert "<h1>right: backlash in its latest recording" in (index.parent / "joint-right.html").read_text()
+
+
+def test_links_lead_to_the_joints_and_to_the_diagnosis_that_shows_it(pages, tables):
+    for target in re.findall(r'href="(joint-[^"]*)"', pages["index.html"]):
+        assert target in pages
+    first = next(a for a in alarms(*tables) if a.joint == "hip")
+    assert f'href="../store0/{first.artefacts}/diagnosis.json"' in pages["index.html"]
+
+
+def test_names_of_others_are_escaped(pages):
+    assert not any("<left>" in text for text in pages.values())
+
+
+def test_a_map_has_a_cell_for_each_week_that_was_recorded_and_a_word_for_it(pages):
+    weeks = 15
+    cells = re.findall(r"<title>(hip|elbow), ([^:]*): ([^<]*)</title>", pages["index.html"])
+    stiffness = [c for c in cells if "recordings" not in c[2]]
+    assert len(stiffness) == 2 * weeks
+    assert {c[2] for c in stiffness if c[0] == "elbow"} == {"cannot be determined"}
+
+
+def test_pages_stay_small_and_ask_for_nothing(pages):
+    for text in pages.values():
+        assert len(text) < 120_000
+        assert not re.search(r'(src|href)="(https?:)?//', text)
+
+
+def test_no_page_is_written_over_what_is_there(tables, tmp_path):
+    (tmp_path / "index.html").write_text("mine")
+    with pytest.raises(OutputError):
+        write_fleet_report(*tables, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["index.html"]
+
+
+def test_a_browser_draws_a_joint_without_an_error(tables, opened, tmp_path):
+    write_fleet_report(*tables, tmp_path / "out")
+    document, log = opened((tmp_path / "out" / "joint-hip.html").read_text(encoding="utf-8"), tmp_path)
+    assert "CONSOLE" not in log
+    assert document.count('data-drawn="yes"') == 2
+
+
+def test_joints_whose_names_become_alike_have_pages_of_their_own():
+    names = page_names(("a b", "a-b", "A b"))
+    assert len({n.lower() for n in names.values()}) == 3
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(-0.1512, "−15 %"), (0.021, "+2.1 %"), (-0.00034, "−0.03 %"), (1e-9, "0 %")]
+)
+def test_changes_read_as_people_write_them(share, text):
+    assert percent(share) == text
+
+
+def test_names_and_dates_are_plain():
+    assert day(START) == "1 January 2025"
+    assert name("coulomb_friction.torque") == "Coulomb friction torque"
+    assert name("command_delay.delay") == "Command delay"
+    assert name("spring.stiffness") == "Spring stiffness"
+
+
+def test_the_doubt_of_a_date_says_month_and_year_once(tables):
+    (wear,) = (a for a in alarms(*tables) if a.joint == WORN)
+    assert re.fullmatch(r"\d+ (\w{3} )?to \d+ \w{3} 2025", doubt_of_date(wear))

@@ -1,0 +1,84 @@
+"""Parts of a page: contents, folds, provenance, correlation, sketch."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.identification.result import Identification
+from rsea_ros.report.diagnosis.page import diagnosis_report, final_values
+from rsea_ros.report.diagnosis.sketch import part_of, sketch
+from rsea_ros.report.identification.correlation import correlation_section, finding
+from rsea_ros.report.identification.page import identification_report
+from rsea_ros.report.json_values import with_provenance
+from rsea_ros.report.page.frame import page
+from rsea_ros.report.page.html import folded, section
+from rsea_ros.report.provenance import provenance_of
+
+from ..conftest import Diagnosed
+
+
+def test_every_section_stands_in_the_contents_and_can_be_reached():
+    html = page("t", "k", [section("One & two"), folded("Three", "<p>x</p>")], [])
+    links = re.findall(r'<a href="#(part-\d)">(.*?)</a>', html)
+    assert links == [("part-1", "One &amp; two"), ("part-2", "Three")]
+    assert all(f'<section id="{name}"' in html for name, _ in links)
+
+
+def test_a_page_says_which_software_made_it_from_which_files(identification: Identification, tmp_path: Path):
+    bag = tmp_path / "a <bag>"
+    bag.mkdir()
+    (bag / "x.mcap").write_bytes(b"12")
+    (bag / "metadata.yaml").write_bytes(b"3")
+    provenance = provenance_of(["rsea", "identify", "a <bag>"], [bag])
+    assert provenance.files[str(bag)] == hashlib.sha256(b"312").hexdigest()
+    html = identification_report(identification, provenance)
+    assert "rsea identify &#x27;a &lt;bag&gt;&#x27;" in html and provenance.files[str(bag)][:12] in html
+    assert with_provenance({"schema": 1}, provenance)["provenance"]["sha256"] == provenance.files
+
+
+def test_the_pair_that_is_told_apart_least_is_named():
+    matrix = np.array([[1.0, -0.97, 0.2], [-0.97, 1.0, np.nan], [0.2, np.nan, 1.0]])
+    names = ["rotor.reflected_damping", "spring.damping", "spring.stiffness"]
+    said = finding(names, matrix)
+    assert said.startswith("Strongly correlated: ") and "(−0.97)" in said
+    weak = np.where(np.eye(3, dtype=bool), 1.0, 0.1 * matrix)
+    assert finding(names, weak).startswith("No two are strongly correlated")
+    assert correlation_section(names, matrix).count("<td class='number'") == 9
+    assert correlation_section(names[:1], matrix[:1, :1]) == ""
+
+
+def test_the_values_shown_first_are_those_beside_the_cause(diagnosed: Diagnosed):
+    d = diagnosed.diagnosis
+    html = diagnosis_report(d)
+    assert html.index("beside the causes") < html.index("before any cause was looked for")
+    final = {p.name: p.value for p in final_values(d)}
+    assert final["rotor.reflected_damping"] == d.extended_rig["rotor.reflected_damping"]
+    biased = {p.name: p.value for p in d.baseline}
+    assert abs(final["rotor.reflected_damping"] - biased["rotor.reflected_damping"]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("coulomb_friction", "gear"),
+        ("backlash", "spring"),
+        ("command_delay", "command"),
+        ("torque_constant_error", "motor"),
+        ("ft_gain_error", "F/T sensor"),
+        ("base_compliance", "what holds it"),
+    ],
+)
+def test_the_culprit_is_marked_where_it_sits(name, part):
+    assert part_of(catalogue()[name]) == part
+    drawing = sketch([name])
+    assert drawing.count('class="culprit"') == 1 and f"{name} at the {part}" in drawing
+
+
+def test_nothing_is_marked_without_a_cause():
+    assert sketch([]) == ""
