@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numba
@@ -78,9 +78,9 @@ def _cache_of(function: Callable[..., Any]) -> Any:
         return _caching.NullCache()
 
 
-@lru_cache(maxsize=1)
+@cache
 def warn_once(reason: str) -> None:
-    """Say that nothing is kept."""
+    """Say that nothing is kept, once for each reason."""
     _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
 
 

@@ -62,11 +62,12 @@ def put_back(parent: Path) -> None:
     gets the first free of NAME.old, NAME.old-2, …
     """
     for folder in left(parent, KIND):
-        names = os.listdir(folder.path)
-        for name in names:
-            _put_back(folder.path / name, parent / name, folder)
-        if names or folder.is_old:
-            folder.path.rmdir()
+        with suppress(OSError):  # what cannot be put back stays, and stops nobody
+            names = os.listdir(folder.path)
+            for name in names:
+                _put_back(folder.path / name, parent / name, folder)
+            if names or folder.is_old:
+                folder.path.rmdir()
 
 
 def _put_back(old: Path, target: Path, folder: Left) -> None:

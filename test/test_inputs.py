@@ -21,7 +21,7 @@ from rsea_ros.identification.problem import case_from
 from rsea_ros.model.extent import bounded, check_extent
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.model.simulation import synthesize
+from rsea_ros.model.simulation import drive_of, synthesize
 from rsea_ros.signals import Channel, Record
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
@@ -74,6 +74,9 @@ RESULTS = {
     "one sample a second": ("diagnose", {"rate": 1.0, "duration": 80.0, "sensors": "zero"}),
     "velocity alone": ("diagnose", {"channels": ("velocity",)}),
     "a sample of 1e308": ("predict", {"dead": "1e308"}),
+    "a sample of 1e308 in position and velocity": (
+        "predict", {"dead": "1e308", "channels": ("position", "velocity")}
+    ),
     "a sample of 1e308 of a drive without a spring": ("predict", {"rig": "bare_drive", "dead": "1e308"}),
     "too few samples to compare": ("predict", {"dead": "few"}),
     "a sensor of 1e-300": ("identify", {"channels": ("position", "velocity"), "sensors": "left out",
@@ -87,6 +90,20 @@ def test_what_gives_a_result(played, name):
     status, printed, said = played(verb, "--json", **changes)
     assert status == 0, said
     json.loads(printed, parse_constant=pytest.fail)
+
+
+def test_a_missing_value_leaves_the_start_and_the_angle_as_they_were():
+    """One NaN made a record that begins in motion begin at rest, and the angle had no spline."""
+    rig = load_rig("paper_high_impedance")
+    moving = record(channels=("ft", "position", "velocity"), command="slow").between(1.5, 4.0)
+    k = len(moving["position"]) // 2
+    spoiled = moving.with_channels(
+        **{n: Channel(moving[n].t, np.where(np.arange(len(moving[n])) == k, np.nan, moving[n].y))
+           for n in ("position", "velocity")}
+    )  # fmt: skip
+    whole, holed = drive_of(moving, rig), drive_of(spoiled, rig)
+    assert whole.initial == holed.initial != (0.0, 0.0)
+    assert np.allclose(whole.angle, holed.angle, atol=0.01 * np.ptp(whole.angle))
 
 
 REFUSALS = {

@@ -172,3 +172,18 @@ def test_the_next_results_clear_up_first(tmp_path):
     with NewFiles(Place(tmp_path, force=True)) as new:
         new.write("b", "new")
     assert texts(tmp_path) == {"a": "old", "b": "new"}
+
+
+def test_what_cannot_be_put_back_stays_and_stops_nobody(tmp_path, monkeypatch):
+    path = aside(tmp_path, "a")
+
+    class Refusing:
+        def __getattr__(self, name: str):
+            return getattr(os, name)
+
+        def rename(self, *names):
+            raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(replaced, "os", Refusing())
+    check_free([tmp_path / "b"])
+    assert (path / "a").read_text() == "old"

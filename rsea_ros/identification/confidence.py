@@ -69,7 +69,7 @@ def confidence_of(solution: Solution) -> Confidence:
     if np.linalg.eigvalsh(information * np.outer(doubt, doubt))[0] < _WEAK:
         solution = replace(solution, jacobian=central_jacobian(solution.problem, solution.theta))
         information = solution.jacobian.T @ solution.jacobian
-    inverse = _inverse(information + prior)
+    inverse = inverse_of(information + prior)
     covariance = inverse @ (_block_scores(solution) + prior) @ inverse
     least = np.diag(inverse) * max(_alike(case) for case in solution.problem.cases)
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
@@ -78,7 +78,7 @@ def confidence_of(solution: Solution) -> Confidence:
     return Confidence(solution.theta, covariance, _told(information, doubt), information)
 
 
-def _inverse(matrix: FloatArray) -> FloatArray:
+def inverse_of(matrix: FloatArray) -> FloatArray:
     """Return the inverse of a positive definite matrix whose unknowns may be scaled very differently.
 
     Each unknown is brought to the scale of its own diagonal first: otherwise a value that only wide bounds

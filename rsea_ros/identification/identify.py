@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
+from rsea_ros.identification.clock_doubt import with_even_clocks
 from rsea_ros.identification.confidence import (
     confidence_of,
     torque_scale,
@@ -73,7 +74,8 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
         report("confidence", 0.8)
         outputs = solution.problem.outputs(solution.theta)
         others = alternatives(solution, cases, in_pool(pool)) if misfits else ()
-    result = _result(solution, outputs, records, cases, responses, others)
+    confidence = with_even_clocks(confidence_of(solution), solution, records, steady.records)
+    result = _result(solution, outputs, records, cases, responses, others, confidence)
     report("done", 1.0)
     return replace(
         result,
@@ -102,10 +104,10 @@ def _result(
     cases: Sequence[Case],
     responses: tuple[FrequencyResponse, ...],
     others: Sequence[Alternative],
+    confidence: Confidence,
 ) -> Identification:
     """Gather the result. cases: with their noise, before any weight followed a misfit."""
     problem = solution.problem
-    confidence = confidence_of(solution)
     errors = errors_by_channel(problem, outputs)
     parameters = tuple(
         replace(p, ci95=spanned(p.ci95, p.name, others)) for p in parameters_of(solution, confidence)

@@ -179,9 +179,19 @@ def _ty(channel: Channel) -> tuple[FloatArray, FloatArray]:
     return channel.t, channel.y
 
 
+def _finite(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
+    """Return stamps and values of a channel where it has values; a rest of two samples where it has none."""
+    if name in record:
+        t, y = _ty(record[name])
+        good = np.isfinite(y)
+        if np.count_nonzero(good) > 1:
+            return t[good], y[good]
+    return np.zeros(2), np.zeros(2)
+
+
 def _first(record: Record) -> tuple[float, float]:
     """Return the first position and velocity, zero where there is none."""
-    position, velocity = (record[n].y if n in record else np.zeros(1) for n in ("position", "velocity"))
+    position, velocity = (_finite(record, n)[1] for n in ("position", "velocity"))
     return float(position[0]), float(velocity[0])
 
 
@@ -191,7 +201,7 @@ def _initial(record: Record) -> tuple[float, float]:
     The first sample comes a period after the first command; what the command may have done until then, the
     largest change from sample to sample, is no motion of before.
     """
-    position, velocity = (record[n].y if n in record else np.zeros(2) for n in ("position", "velocity"))
+    position, velocity = (_finite(record, n)[1] for n in ("position", "velocity"))
     moved = _moved(position) or _moved(velocity)
     return (float(position[0]), float(velocity[0])) if moved else (0.0, 0.0)
 
@@ -200,9 +210,11 @@ def _angle(record: Record, ends: FloatArray) -> FloatArray:
     """Return the measured position at some times (s), by cubics where its speed is measured with it."""
     if "position" not in record:
         return np.empty(0)
-    t, q = _ty(record["position"])
-    if "velocity" in record and np.array_equal(record["velocity"].t, t):
-        return _cubics(t, q, record["velocity"].y, np.clip(ends, t[0], t[-1]))
+    t, q = _finite(record, "position")
+    if "velocity" in record and len(t) > 1:
+        at, v = _finite(record, "velocity")
+        if np.array_equal(at, t):
+            return _cubics(t, q, v, np.clip(ends, t[0], t[-1]))
     return np.interp(ends, t, q)
 
 

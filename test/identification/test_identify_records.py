@@ -177,6 +177,21 @@ def test_stamps_that_scatter_about_the_clock_of_a_sensor_are_put_on_it(case):
     agree(result, true)
 
 
+def test_how_well_an_even_clock_is_known_is_in_the_intervals(case):
+    """Its zero is known to 3 µs, which move the dampings by two half-widths: four in five intervals held."""
+    nominal, _, record = case
+    rng = np.random.default_rng(9)
+    clocks = {n: "ft" if n == "ft" else "joint" for n in record.channels if n != "command"}
+    off = {c: rng.uniform(-3e-4, 3e-4, len(record["ft"])) for c in ("ft", "joint")}
+    scattered = {n: Channel(record[n].t + off[c][: len(record[n])], record[n].y) for n, c in clocks.items()}
+    sure, doubtful = (
+        {p.name: p.ci95[1] - p.ci95[0] for p in identify([r], nominal).parameters}
+        for r in (record, record.with_channels(**scattered))
+    )
+    assert doubtful["spring.damping"] > 1.3 * sure["spring.damping"]
+    assert doubtful["spring.stiffness"] < 1.3 * sure["spring.stiffness"]
+
+
 @pytest.mark.parametrize("clocks", [("command",), ("command", "ft", "joint")], ids=["commands", "all"])
 def test_so_are_the_stamps_of_commands(case, clocks):
     """The model was driven at wrong instants: 29 times the noise, and nothing explained it."""
