@@ -68,7 +68,7 @@ def _serve(target: str, tests: Sequence[str], mutants: Sequence[Mutant], outlet:
         for k, mutant in enumerate(mutants if outcome == SURVIVED else ()):
             tree = mutated(source, mutant)
             outcome, _, took = _fork(
-                lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 20.0 * wall + 60.0
+                lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 5.0 * wall + 15.0
             )
             os.write(outlet, f"{k} {outcome} {took:.2f}\n".encode())
         status = 0

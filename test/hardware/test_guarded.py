@@ -344,3 +344,10 @@ def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
     device.reading = now
     joint.read()
     assert (None if joint.fault is None else str(joint.fault)) == fault
+
+
+def test_what_is_disabled_during_a_reboot_stays_without_torque(joint, device):
+    device.during = {"reboot": joint.disable}
+    joint.reboot()
+    assert device.log == ["disable", "beat False", "reboot", "disable", "beat False"]
+    assert not joint.enabled and not joint.away
