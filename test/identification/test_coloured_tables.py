@@ -167,9 +167,9 @@ def shaped(size, density, seed=0):
     ],
 )
 def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
-    """Power of 50 within a band and of 1 elsewhere, over 1024 s."""
-    y = shaped(2**18, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
-    assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.2)
+    """Power of 50 within a band and of 1 elsewhere, over 256 s."""
+    y = shaped(2**16, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
+    assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.35)
 
 
 def test_a_mean_is_not_slow():
@@ -191,15 +191,15 @@ def test_values_too_rare_for_a_hertz_are_not_slow():
 @pytest.mark.parametrize(
     ("values", "excess"),
     [
-        (lambda rng: rng.normal(size=200_000), 0.0),
-        (lambda rng: rng.uniform(-1.0, 1.0, 200_000), -1.2),
-        (lambda rng: rng.laplace(size=200_000), 3.0),
-        (lambda rng: 5.0 + 2.0 * rng.uniform(-1.0, 1.0, 200_000), -1.2),  # whatever mean and size
+        (lambda rng: rng.normal(size=50_000), 0.0),
+        (lambda rng: rng.uniform(-1.0, 1.0, 50_000), -1.2),
+        (lambda rng: rng.laplace(size=50_000), 3.0),
+        (lambda rng: 5.0 + 2.0 * rng.uniform(-1.0, 1.0, 50_000), -1.2),  # whatever mean and size
     ],
 )
 def test_excess_kurtosis_of_known_distributions(values, excess):
     flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
-    assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.1)
+    assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.15)
 
 
 def test_kurtosis_is_that_of_the_whitened_residual():
@@ -252,9 +252,9 @@ def share(a, b):
     [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (2.0, 0.8), (-1.0, 0.5), (1e6, 1.0)],
 )
 def test_the_share_of_the_power_that_is_coherent(gain, expected):
-    witness = white(2**17, seed=1)
-    assert share(white(2**17) + gain * witness, witness) == pytest.approx(expected, abs=0.02)
-    assert share(white(2**17) + gain * witness, 1e3 * witness) == pytest.approx(expected, abs=0.02)
+    witness = white(2**15, seed=1)
+    assert share(white(2**15) + gain * witness, witness) == pytest.approx(expected, abs=0.04)
+    assert share(white(2**15) + gain * witness, 1e3 * witness) == pytest.approx(expected, abs=0.04)
 
 
 def test_chance_is_taken_away_from_coherence():
