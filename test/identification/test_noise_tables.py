@@ -208,6 +208,12 @@ def test_a_channel_slower_than_the_command_has_the_noise_that_is_stated(rate, st
     assert noise_floor(record(white(2**13), rate=rate), "ft", stated) == pytest.approx(floor, rel=0.05)
 
 
+def test_steps_and_noise_that_are_stated_add_up():
+    """5, 12 and 13: a step of 5 sqrt(12) has an RMS of 5."""
+    slow = record(white(2**13), rate=100.0)
+    assert noise_floor(slow, "ft", sensor(12.0, 5.0 * math.sqrt(12.0))) == pytest.approx(13.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("gain", [0.0, 0.5, 20.0])
 def test_what_follows_the_command_linearly_is_no_noise(gain):
     command = white(2**15, seed=5)
