@@ -86,6 +86,19 @@ def test_short_records_do_not_say(measured, size, noise):
     assert passes(white(size)) is noise
 
 
+@pytest.mark.parametrize(("more", "ratio"), [({}, 1.0), ({"ratio": 502.0}, 502.0)])
+def test_measures_are_given_the_rate_of_the_channel_and_the_ratio_of_the_gear(
+    measured, monkeypatch, more, ratio
+):
+    measured()
+    seen = []
+    monkeypatch.setattr(coloured, "_slow", lambda values, rate: seen.append(rate) or 0.0)
+    monkeypatch.setattr(coloured, "witnesses", lambda case, outputs, n, ratio: seen.append(ratio) or [])
+    y = white(2000)
+    assert is_noise(case(y, rate=100.0), {"ft": np.zeros(2000)}, "ft", **more)
+    assert seen == pytest.approx([100.0, ratio])
+
+
 def test_no_residual_is_no_noise(measured):
     measured()
     assert passes(np.zeros(2000)) is False
@@ -267,6 +280,41 @@ def test_the_worst_band_says_what_is_shared():
     witness = white(2**16, seed=1)
     low = shaped(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
     assert share(white(2**16) + 3.0 * low, witness) == pytest.approx(0.9, abs=0.03)
+
+
+NOT_SHARED = -(1.056 / 4) / (1.0 - 1.056 / 4)
+"""Of four segments: what no coherence at all comes to, less what chance makes of it."""
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "expected"),
+    [
+        # lines of half a hertz: 1 to 7 below 4 Hz, 8 to 27 below 14, 28 to 99 below 50, 100 to 245 above
+        (1, 7, 1.0),
+        (1, 1, (1.0 + 6.0 * NOT_SHARED) / 7.0),
+        (8, 27, 1.0),
+        (28, 99, 1.0),
+        (100, 245, 1.0),
+        (0, 0, NOT_SHARED),
+        (246, 256, NOT_SHARED),
+    ],
+)
+def test_lines_that_are_shared_count_in_their_band(first, last, expected):
+    a, b = np.ones((4, 257), complex), np.ones((4, 257), complex)
+    b[2:] = -1.0
+    b[2:, first : last + 1] = 1.0
+    assert coloured._shared(a, b, RATE) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "lines"), [(2, 11, 10), (12, 39, 28), (40, 159, 120), (160, 491, 332), (0, 1, 0)]
+)
+def test_lines_that_are_unsteady_count_in_their_band(first, last, lines):
+    """Lines of a quarter of a hertz, with powers of 3 and 1: off by half of the mean."""
+    spectra = np.ones((10, 513), complex)
+    spectra[:5, first : last + 1] = math.sqrt(3.0)
+    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
+    assert coloured._unsteady(spectra, flat, RATE) == pytest.approx(0.25 * lines / 1.5)
 
 
 def test_no_power_is_not_shared():
