@@ -185,6 +185,33 @@ def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
     assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.35)
 
 
+@pytest.mark.parametrize(
+    ("line", "ratio"),
+    [
+        (0, 1.0),  # a mean
+        (1, 34.0),  # 100, 1 and 1 on average
+        (3, 34.0),
+        (4, 1.0),  # 0.25 Hz
+        (5, 0.1),  # 0.3125 Hz: 100 and ten times 1
+        (15, 0.1),
+        (16, 1.0),  # 1 Hz
+    ],
+)
+def test_which_lines_are_slow_and_which_they_are_compared_with(monkeypatch, line, ratio):
+    """Lines of a sixteenth of a hertz, one of which has a power of 100."""
+    spectra = np.ones((2, 129), complex)
+    spectra[:, line] = 10.0
+    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: spectra)
+    assert coloured._slow(np.zeros(9), 16.0) == pytest.approx(ratio)
+
+
+@pytest.mark.parametrize(("lines", "ratio"), [(101, 1.0), (81, 0.0)])
+def test_two_slow_lines_are_the_fewest(monkeypatch, lines, ratio):
+    """At 20 Hz: lines of 0.1 Hz, and of 0.125."""
+    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: np.ones((2, lines), complex))
+    assert coloured._slow(np.zeros(9), 20.0) == ratio
+
+
 def test_a_mean_is_not_slow():
     y = white(2**15)
     assert coloured._slow(y + 1e3, RATE) == pytest.approx(coloured._slow(y, RATE), rel=1e-6)
