@@ -14,7 +14,7 @@ from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.flexible import Flexible
 from rsea_ros.diagnosis.naming.probability import features
 from rsea_ros.diagnosis.naming.signature import Signature
-from rsea_ros.diagnosis.naming.status import standing
+from rsea_ros.diagnosis.naming.status import probabilities_and_status
 
 OUTSIDE = ("off", "taken_out")
 """Groups, by how their names begin, whose record holds a law that the diagnosis cannot know."""
@@ -100,7 +100,9 @@ def said(
             evidence = [evidence_from(e) for e in place]
             is_late = record["promoted"] and place is record["places"][-1]
             takes_most = record["takes_most"] and not is_late
-            likely, status = standing(evidence, record["at_floor"], takes_most, coefficients=coefficients)
+            likely, status = probabilities_and_status(
+                evidence, record["at_floor"], takes_most, coefficients=coefficients
+            )
             rights = [e.name in record["truth"] for e in evidence]
             rest = any(rights[1:])
             for k, (e, p, right) in enumerate(zip(evidence, likely, rights, strict=True)):

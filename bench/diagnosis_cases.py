@@ -18,7 +18,13 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second
 
 from independent.bench import Bench, drawn_bench, record_run
 from independent.faults import FAULTS
-from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
+from independent.hidden import (
+    BESIDE_THE_CONTRACT,
+    OFF_CATALOGUE,
+    hide,
+    hide_beside_the_contract,
+    hide_off_catalogue,
+)
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
 
 from rsea_ros.effects.catalogue import catalogue
@@ -85,7 +91,9 @@ class Case:
 class Plan:
     """What a case is made from; without: effects that the diagnosis has to do without.
 
-    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair or drawn_triple.
+    group: single, pair, clean, off_catalogue, taken_out, faulty, reading, drawn_pair, drawn_triple, newer, or
+    unsearched (an effect that a diagnosis does not try unless a rig states it).
+    newer: an effect that came after the first 23, and the factor on its main parameter.
     """
 
     name: str
@@ -95,6 +103,7 @@ class Plan:
     hidden: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     values: Mapping[str, float] = field(default_factory=dict)
     off: tuple[str, float] | None = None
+    newer: tuple[str, float] | None = None
     faults: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     duration: float = 60.0
@@ -104,6 +113,8 @@ class Plan:
         bench = drawn_bench(np.random.default_rng(self.seed))
         for effect, parameters in self.hidden.items():
             bench = hide(bench, effect, parameters)
+        if self.newer:
+            bench = hide_beside_the_contract(bench, *self.newer)
         if self.off:
             bench = hide_off_catalogue(bench, *self.off)
         return bench.having(**self.values)
@@ -117,15 +128,24 @@ class Plan:
         for fault in self.faults:
             record = FAULTS[fault](record, rng)
         mimics = OFF_CATALOGUE[self.off[0]][1] if self.off else ()
-        causes = tuple(self.hidden)
+        truth = self.truth()
         return Case(
-            self.name, record, causes, self.hidden, fresh, self.group, mimics, self.faults, self.without
+            self.name, record, tuple(truth), truth, fresh, self.group, mimics, self.faults, self.without
         )
+
+    def truth(self) -> Mapping[str, Mapping[str, float]]:
+        """Return the hidden effects with their parameters in the catalogue's units."""
+        if not self.newer:
+            return self.hidden
+        effect, factor = self.newer
+        parameters = dict(BESIDE_THE_CONTRACT[effect][0])
+        main = next(iter(parameters))
+        return {effect: {**parameters, main: parameters[main] * factor}}
 
 
 def plan(seed: int = 2024) -> tuple[Plan, ...]:
     """Return all cases that a seed makes, each with a seed of its own."""
-    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _drawn)
+    makers = (_singles, _pairs, _clean, _off_catalogue, _faulty, _readings, _taken_out, _drawn, _newer)
     rng = np.random.default_rng(seed)
     return tuple(case for maker in makers for case in maker(rng))
 
@@ -200,6 +220,16 @@ def _drawn(rng: np.random.Generator) -> Iterator[Plan]:
             hidden = {effect: drawn_parameters(effect, severity, rng) for effect in chosen}
             name = f"{'+'.join(chosen)}-{severity}"
             yield Plan(name, group, _seed(rng), _excitation(int(rng.integers(2))), hidden)
+
+
+def _newer(rng: np.random.Generator) -> Iterator[Plan]:
+    """The effects that came after the first 23, at half, full and twice the medium size; drawn last, so that
+    the seeds of all other cases stay."""
+    for effect in BESIDE_THE_CONTRACT:
+        for k, factor in enumerate((0.5, 1.0, 2.0)):
+            name = f"newer-{effect}-{factor:g}"
+            group = "newer" if catalogue()[effect].is_searched else "unsearched"
+            yield Plan(name, group, _seed(rng), _excitation(k), newer=(effect, factor))
 
 
 def _readings(rng: np.random.Generator) -> Iterator[Plan]:

@@ -9,9 +9,11 @@ from math import isfinite
 
 import numpy as np
 from diagnosis_outcome import FLOOR, OUTSIDE, Found, Outcome
-from independent.hidden import CATALOGUE
+from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE
 
-HIDDEN = ("single", "pair", "drawn_pair", "drawn_triple")
+HIDDEN = ("single", "newer", "pair", "drawn_pair", "drawn_triple")
+NAMES = tuple(dict.fromkeys((*CATALOGUE, *BESIDE_THE_CONTRACT)))
+"""Effects that the second bench can hide."""
 NOTHING, UNEXPLAINED, OFF = "nothing wrong", "unexplained", "not in the catalogue"
 
 
@@ -40,6 +42,7 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         _at_least(
             "the same, or a rival that it is confusable with, %", _lenient(groups.get("single", ())), 97.0
         ),
+        _at_least("first cause right, one of the newer effects, %", _right(groups.get("newer", ())), 97.0),
         _at_least("both causes right, two effects, %", _right(groups.get("pair", ())), 90.0),
         _at_least("both causes right, two drawn at random, %", _right(groups.get("drawn_pair", ())), 90.0),
         _at_least("all causes right, three drawn at random, %", _right(groups.get("drawn_triple", ())), 90.0),
@@ -53,6 +56,7 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         _at_least(
             "unexplained, effect taken out of the catalogue, %", _right(groups.get("taken_out", ())), 90.0
         ),
+        _at_least("unexplained, effect that is not searched, %", _right(groups.get("unsearched", ())), 90.0),
         _at_least("fault found and cause right, faulty data, %", _right(groups.get("faulty", ())), 90.0),
         _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
         _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in found], 100.0),
@@ -99,14 +103,14 @@ def _longest(what: str, values: Sequence[float], asked: float) -> Measure:
 
 def table(outcomes: Sequence[Outcome]) -> list[str]:
     """Return a line for each effect: cases, right, errors of every parameter (median, worst), coverage."""
-    singles = [o for o in outcomes if o.group in ("single", "reading") and o.truth]
+    singles = [o for o in outcomes if o.group in ("single", "newer", "reading") and o.truth]
     lines = [f"{'effect':<26}{'right':>8}   parameter: median and worst error %, share in its interval"]
-    for group in ("single", "reading"):
-        for effect in CATALOGUE:
+    for group in ("single", "newer", "reading"):
+        for effect in NAMES:
             of = [o for o in singles if o.truth == (effect,) and o.group == group]
             if of:
                 right = f"{sum(o.right for o in of)}/{len(of)}"
-                name = effect if group == "single" else f"{effect} *"
+                name = f"{effect} *" if group == "reading" else effect
                 lines.append(f"{name:<26}{right:>8}   {_parameters([f for o in of for f in o.found])}")
     return lines
 
@@ -130,7 +134,7 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[str, Counter[str]]:
         truths = o.truth or ((OFF,) if o.group in OUTSIDE else (NOTHING,))
         for truth in truths:
             rows.setdefault(truth, Counter())[_answer(o, truth)] += 1
-    order = (*CATALOGUE, OFF, NOTHING)
+    order = (*NAMES, OFF, NOTHING)
     return {truth: rows[truth] for truth in order if truth in rows}
 
 
@@ -148,15 +152,15 @@ def _answer(outcome: Outcome, truth: str) -> str:
 def markdown(outcomes: Sequence[Outcome]) -> str:
     """Return the measures and the matrix as Markdown: columns are numbered as the rows are."""
     matrix = confusion(outcomes)
-    columns = [*CATALOGUE, UNEXPLAINED, NOTHING]
+    columns = [*NAMES, UNEXPLAINED, NOTHING]
     columns += ["error"] * any("error" in row for row in matrix.values())
     lines = ["| measure | value | asked | values |", "|---|--:|--:|--:|"]
     lines += [f"| {m.what} | {m.value:.2f} | {m.asked} | {m.cases} |" for m in measures(outcomes)]
-    heads = [str(k + 1) if name in CATALOGUE else name for k, name in enumerate(columns)]
+    heads = [str(k + 1) if name in NAMES else name for k, name in enumerate(columns)]
     lines += ["", f"| truth (rows), first cause named (columns) | {' | '.join(heads)} |"]
     lines.append("|---|" + "--:|" * len(columns))
     for truth, row in matrix.items():
-        number = f"{columns.index(truth) + 1} " if truth in CATALOGUE else ""
+        number = f"{columns.index(truth) + 1} " if truth in NAMES else ""
         cells = [_cell(row[name], name == truth) for name in columns]
         lines.append(f"| {number}`{truth}` | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from math import nan, prod
 
 from diagnosis_cases import Case
-from independent.hidden import MAIN_PARAMETER
+from independent.hidden import BESIDE_THE_CONTRACT, MAIN_PARAMETER
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.result import Diagnosis
@@ -20,8 +20,8 @@ from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Record
 
 ERROR = "error"
-OUTSIDE = ("off_catalogue", "taken_out")
-"""Groups whose effect the diagnosis cannot know."""
+OUTSIDE = ("off_catalogue", "taken_out", "unsearched")
+"""Groups whose effect the diagnosis does not have, or does not try unless a rig states it."""
 FLOOR = 1.1
 """A held-out residual at most so many times the noise is at the noise floor."""
 
@@ -44,11 +44,15 @@ class Found:
 
     @property
     def main(self) -> bool:
-        return MAIN_PARAMETER[self.effect] == self.parameter
+        return _main_parameter(self.effect) == self.parameter
 
     @property
     def covered(self) -> bool:
         return self.low <= self.truth <= self.high
+
+
+def _main_parameter(effect: str) -> str:
+    return MAIN_PARAMETER.get(effect) or next(iter(BESIDE_THE_CONTRACT[effect][0]))
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ def _outcome(case: Case, diagnosis: Diagnosis, seconds: float) -> Outcome:
     return Outcome(
         name=case.name,
         group=case.group,
-        truth=() if case.group == "taken_out" else tuple(case.truth_causes),
+        truth=() if case.group in OUTSIDE else tuple(case.truth_causes),
         named=tuple(cause.name for cause in causes),
         verdict=diagnosis.verdict,
         confusable=tuple(causes[0].confusable_with) if causes else (),

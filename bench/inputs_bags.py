@@ -17,7 +17,9 @@ from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.signals import Channel, FloatArray, Record
 
-CHANNELS = ("ft", "position", "velocity", "motor_torque")
+CHANNELS = ("ft", "position", "velocity", "motor_torque", "deflection")
+OF_SPRING = ("ft", "deflection")
+"""What a simulation of a rig without a spring does not give."""
 FEWEST = 10
 """Samples of a command: fewer are refused by the package's excitations, but may stand in a bag."""
 TARGETS = {True: 0.02, False: 1e-3}
@@ -88,7 +90,7 @@ def record_of(case: Mapping[str, Any], rig: Rig) -> Record:
         stamps = (np.arange(max(3, round(len(u) * case["states"]))) + 1.0) / (rate * case["states"])
         blank = np.zeros(len(stamps))
         channels = {"command": Channel(t, u)}
-        names = [n for n in case["channels"] if not (n == "ft" and rig.rigid_spring)]
+        names = [n for n in case["channels"] if not (n in OF_SPRING and rig.rigid_spring)]
         channels |= {n: Channel(t + 1.0 / rate if n == "ft" else stamps, blank[: len(stamps)])
                      for n in names if n != "ft"}  # fmt: skip
         if "ft" in names:

@@ -74,6 +74,7 @@ def read_batch(form: Format, seed: int, folder: Path, log: Path, after: int = -1
             if outcome.is_fault:
                 (folder / f"fault-{number}").write_bytes(data)
             file.write(json.dumps(asdict(outcome)) + "\n")
+            file.flush()
 
 
 def _read(form: Format, folder: Path, data: bytes, number: int) -> Outcome:

@@ -1,4 +1,4 @@
-"""A fork server: this process has imported everything and forks once for each piece of work."""
+"""A fork server: this process has run every verb once and forks once for each piece of work."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import os
 import resource
 import shutil
 import signal
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from inputs_outcome import Outcome, collected, forked
+from inputs_outcome import Outcome, call, collected, forked
 
 from rsea_ros.effects.catalogue import catalogue
 
+RIG = "paper_high_impedance"
 WALL = 600.0
 """s, after which a child that does not even compute is ended."""
 MODULES = (
@@ -25,20 +27,32 @@ MODULES = (
     "rsea_ros.identification.identify", "rsea_ros.diagnosis.diagnose",
     "rsea_ros.report.identification.files", "rsea_ros.report.diagnosis.files",
     "rsea_ros.report.diagnosis.terminal", "rsea_ros.report.identification.terminal",
-    "rsea_ros.report.control.page", "rsea_ros.report.design.page",
-    "rsea_ros.control.study", "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records",
-    "msg_adapters.overlay", "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
+    "rsea_ros.report.control.page", "rsea_ros.report.design.page", "rsea_ros.control.study",
+    "rsea_ros.design.judge", "rsea_ros.design.mjcf", "msg_adapters.records", "msg_adapters.overlay",
+    "scipy.interpolate", "scipy.signal", "scipy.io", "rich.console", "rich.table",
 )  # fmt: skip
+FIRST = (
+    ["simulate", RIG, "--out", "DIR/bag.mcap", "--duration", "5"],
+    ["check", "DIR/bag.mcap", "--rig", RIG],
+    ["identify", "DIR/bag.mcap", "--rig", RIG, "--out", "DIR/identified"],
+    ["diagnose", "DIR/bag.mcap", "--rig", RIG, "--out", "DIR/diagnosed"],
+    ["predict", RIG, "DIR/bag.mcap", "--out", "DIR/predicted.csv", "--json"],
+    ["design", "--out", "DIR/design"],
+)  # fmt: skip
+"""Verbs that are run once before all others."""
 
 Work = tuple[str, Callable[[Path], Outcome]]
 """A name, and what to do in a folder of its own."""
 
 
 def warm() -> None:
-    """Import what the verbs import, and the effects, so that no child pays for it."""
+    """Import what the verbs import and run them: no child pays for that, or for loading compiled code."""
     for name in MODULES:
         importlib.import_module(name)
     catalogue()
+    with tempfile.TemporaryDirectory(prefix="rsea-warm-") as folder:
+        for words in FIRST:
+            call([word.replace("DIR", folder) for word in words])
 
 
 def serve(work: Iterable[Work], folder: Path, jobs: int, wall: float = WALL) -> Iterator[tuple[str, Outcome]]:

@@ -27,6 +27,7 @@ from laws_cases import LawCase, cases
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.identification.identify import fit
 from rsea_ros.identification.problem import simulated
@@ -136,7 +137,7 @@ def _score(fitted: tuple[Rig, object], fresh: Record, rig: Rig) -> Score:
     model, clocks = fitted
     problem = nominal_problem([check(fresh, rig)], rig)
     outputs = simulated(problem.cases, model, clocks)  # type: ignore[arg-type]
-    return score(replace(problem, rig=rig), problem.cases, outputs)
+    return score(replace(problem, rig=rig), problem.cases, outputs, DEFAULT.blocks)
 
 
 def _timed(duration: float) -> int:

@@ -1,7 +1,9 @@
-"""The docs site: `.ci/docs` builds it, warnings are errors. Pages that follow from the code are made here."""
+"""The docs site. `.ci/docs` builds it and treats warnings as errors. Code generates some of its pages."""
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 import sys
 from pathlib import Path
@@ -20,16 +22,17 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 html_theme = "furo"
 html_title = "rsea_ros"
-exclude_patterns = ["figures"]
+exclude_patterns = ["figures", "**.ipynb"]
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
 suppress_warnings = ["myst.xref_missing"]
-"""Links to files of the repository beside the docs, such as SECURITY.md, lead nowhere on the site."""
+"""Links to files outside docs/, such as SECURITY.md, have no target on the site."""
 
 
 def effects_page() -> str:
-    """Return the catalogue: meaning, equation, parameters and source of each effect."""
-    parts = ["# The effects", "", "What a diagnosis can name. `rsea effects NAME` shows the same.", ""]
+    """Return the catalogue of effects: meaning, equation, parameters and source of each."""
+    first = "Every cause that a diagnosis can name. `rsea effects NAME` prints this text."
+    parts = ["# The effects", "", first, ""]
     for name, effect in sorted(catalogue().items()):
         page = EffectPage(effect)
         rows = [
@@ -74,11 +77,51 @@ def decisions_page() -> str:
     return "\n".join(["# Decisions", "", "```{toctree}", ":maxdepth: 1", "", *names, "```", ""])
 
 
-PAGES = {"effects.md": effects_page, "api.md": api_page, "decisions/index.md": decisions_page}
+def gallery_page() -> str:
+    """Return the gallery: title, text, code and picture of each example."""
+    parts = [
+        "# Gallery", "",
+        "Short examples of the Python library. Run one with `./rsea run docs/gallery/NAME.py` in a clone.",
+        "`figure` is a plotly figure; `figure.show()` opens it. Tests run every example.", "",
+    ]  # fmt: skip
+    for path in sorted((ROOT / "docs" / "gallery").glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        title, _, about = (ast.get_docstring(ast.parse(text)) or "").partition("\n\n")
+        code = text.split('"""\n', 2)[-1].strip()
+        parts += [f"## {title.rstrip('.')}", "", about, "", f"![{title}]({path.stem}.png)", "",
+                  f"[{path.name}]({path.name})", "", "```python", code, "```", ""]  # fmt: skip
+    return "\n".join(parts)
+
+
+def tutorial_notebook() -> str:
+    """Return the tutorial as a Jupyter notebook without outputs: text and code alternate as in the page."""
+    page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    parts = re.split(r"```python\n(.*?)```\n", page, flags=re.DOTALL)
+    cells = [cell(part.strip(), k, code=k % 2 == 1) for k, part in enumerate(parts) if part.strip()]
+    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
+    book = {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
+    return json.dumps(book, ensure_ascii=False, indent=1) + "\n"
+
+
+def cell(text: str, number: int, *, code: bool) -> dict[str, object]:
+    """Return a cell of a notebook."""
+    common = {"id": f"cell-{number}", "metadata": {}, "source": text.splitlines(keepends=True)}
+    if code:
+        return {"cell_type": "code", "execution_count": None, "outputs": [], **common}
+    return {"cell_type": "markdown", **common}
+
+
+PAGES = {
+    "effects.md": effects_page,
+    "api.md": api_page,
+    "decisions/index.md": decisions_page,
+    "gallery/index.md": gallery_page,
+    "tutorial.ipynb": tutorial_notebook,
+}
 
 
 def write_pages(app: object) -> None:
-    """Write the pages that follow from the code beside the others."""
+    """Write the generated pages beside the others."""
     for name, text in PAGES.items():
         path = ROOT / "docs" / name
         content = text()
@@ -87,5 +130,5 @@ def write_pages(app: object) -> None:
 
 
 def setup(app: object) -> None:
-    """Have the pages written before Sphinx looks for sources."""
+    """Write the generated pages before Sphinx looks for sources."""
     write_pages(app)

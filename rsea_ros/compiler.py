@@ -1,38 +1,87 @@
 """numba's compiler, keeping what it makes in this package's cache (compiler_cache.py).
 
 The folder is named only while a function of this package is decorated: neither the environment nor numba's
-settings for the functions of others change.
+settings for the functions of others change. Where nothing can be kept, every process compiles what it runs.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from typing import Any
 
 import numba
+from numba.core import caching as numba_caching
+from numba.core import ccallback, sigutils
 from numba.core import config as numba_config
 
 from rsea_ros.compiler_cache import cache_folder
 
-
-def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's decorator for a compiled function, with its options."""
-    return _keeping(numba.njit(**options))
-
-
-def cfunc(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's decorator for a function with an address that compiled code can call."""
-    return _keeping(numba.cfunc(signature, **options))
+_log = logging.getLogger(__name__)
+_caching: Any = numba_caching
+_cfunc: Any = ccallback.CFunc
+_normalized: Any = sigutils.normalize_signature
 
 
-def _keeping(decorator: Callable[..., Any]) -> Callable[[Callable[..., Any]], Any]:
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return numba's decorator for a compiled function, with its options. cache: keep what is compiled."""
+
     def decorate(function: Callable[..., Any]) -> Any:
-        with _own_cache():
-            return decorator(function)
+        made = numba.njit(**options)(function)
+        if cache:
+            made._cache = _cache_of(function)
+        return made
 
     return decorate
+
+
+def cfunc(signature: Any, *, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return numba's decorator for a function with an address that compiled code can call."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        made = _cfunc(function, _normalized(signature), locals={}, options=options)
+        if cache:
+            made._cache = _cache_of(function)
+        made.compile()
+        return made
+
+    return decorate
+
+
+class _Kept(_caching.FunctionCache):  # type: ignore[misc]
+    """The compiled code of one function on the disk; what cannot be read or written costs only time."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # a file that broke off may raise anything
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            warn_once(error.strerror or str(error))
+
+
+def _cache_of(function: Callable[..., Any]) -> Any:
+    """Return where the code of a function is kept."""
+    try:
+        with _own_cache():
+            return _Kept(function)
+    except (OSError, RuntimeError) as error:  # numba's word for a folder that cannot be made
+        warn_once(str(error))
+        return _caching.NullCache()
+
+
+@lru_cache(maxsize=1)
+def warn_once(reason: str) -> None:
+    """Say that nothing is kept."""
+    _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
 
 
 @contextmanager

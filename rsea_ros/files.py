@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -17,9 +16,8 @@ from pathlib import Path
 
 from rsea_ros.errors import OutputError
 from rsea_ros.interrupts import undisturbed
+from rsea_ros.replaced import Replaced, putting_aside
 
-PREFIX = ".rsea-"
-"""Of names that last only while something is written."""
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EMLINK, errno.ENOSYS}
 """What a file system without hard links says (FAT, some network mounts)."""
 NO_SYNC = {errno.EINVAL, errno.ENOTSUP}
@@ -82,20 +80,20 @@ def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> No
         for path in chain(source.iterdir() if source.is_dir() else (), [source]):
             sync(path)
     undo: Undo = []
-    with undisturbed():
+    with undisturbed(), putting_aside() as replaced:
         try:
-            replaced = []
             for source, target in pairs:
                 with naming(target):
-                    replaced.append(_take(source, target, force, undo))
+                    _take(source, target, replaced if force else None, undo)
             for folder in {target.parent for _, target in pairs}:
                 sync(folder)
+            given_up = replaced.give_up()
         except BaseException:
             for step in reversed(undo):
                 with suppress(OSError):
                     step()
             raise
-        for path in filter(None, replaced):
+        for path in given_up:
             remove(path)
 
 
@@ -118,19 +116,19 @@ def remove(path: Path) -> None:
         path.unlink()
 
 
-def _take(source: Path, target: Path, force: bool, undo: Undo) -> Path | None:
-    """Give one file or folder its name; return where what it replaced is now."""
-    if force and os.path.lexists(target):
+def _take(source: Path, target: Path, replaced: Replaced | None, undo: Undo) -> None:
+    """Give one file or folder its name. replaced: where what has the name goes, None where it may not."""
+    if replaced is not None and os.path.lexists(target):
         check_replaceable(target)
         if source.is_dir() != target.is_dir():
             kind = "folder" if source.is_dir() else "file"
             raise OutputError(f"{target}: is no {kind}, expected a new name")
-        return _exchange(source, target, undo)
+        _exchange(source, target, replaced.place(target), undo)
+        return
     try:
         _take_free(source, target, undo)
     except FileExistsError:
         raise taken(target) from None
-    return None
 
 
 def _take_free(source: Path, target: Path, undo: Undo) -> None:
@@ -148,23 +146,22 @@ def _take_free(source: Path, target: Path, undo: Undo) -> None:
         os.rename(source, target)
 
 
-def _exchange(source: Path, target: Path, undo: Undo) -> Path:
-    """Put a file or folder in the place of another; return the new name of the other."""
-    aside = target.with_name(f"{PREFIX}old-{secrets.token_hex(4)}")
+def _exchange(source: Path, target: Path, aside: Path, undo: Undo) -> None:
+    """Put a file or folder in the place of another, which goes aside."""
     if source.is_dir():
         os.rename(target, aside)
         undo.append(lambda: os.rename(aside, target))
         os.rename(source, target)
         undo.append(lambda: os.rename(target, source))
-        return aside
+        return
     if _linked(target, aside):
         undo.append(aside.unlink)
     else:
         os.rename(target, aside)
         undo.append(lambda: os.rename(aside, target))
+    sync(aside.parent)
     os.rename(source, target)
     undo[-1] = lambda: os.rename(aside, target)
-    return aside
 
 
 def _linked(source: Path, target: Path) -> bool:

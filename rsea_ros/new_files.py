@@ -24,6 +24,7 @@ from rsea_ros.files import (
     write_new,
 )
 from rsea_ros.interrupts import undisturbed
+from rsea_ros.replaced import put_back
 from rsea_ros.staging import Stage, make_stage
 
 
@@ -145,8 +146,12 @@ def check_free(
 ) -> None:
     """Refuse, before any work, a name that is taken (unless `force`) and one of the inputs (always).
 
+    What a killed writer put aside gets its name back first.
     force: --force of a verb; None where nothing offers it. Raises OutputError.
     """
+    paths = list(paths)
+    for folder in {path.parent for path in paths}:
+        put_back(folder)
     for path in paths:
         for one in map(Path, inputs):
             if one.exists() and _touches(path, one):

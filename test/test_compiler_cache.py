@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import errno
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -13,7 +15,8 @@ from pathlib import Path
 import pytest
 from numba.core import config
 
-from rsea_ros.compiler import _own_cache
+from rsea_ros import compiler, compiler_cache
+from rsea_ros.compiler import _own_cache, njit
 from rsea_ros.compiler_cache import SHARED, cache_folder, shared_key, trusted_cache
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -193,3 +196,77 @@ def test_functions_of_others_are_kept_where_they_were(monkeypatch):
     with _own_cache():
         assert Path(config.CACHE_DIR) == cache_folder()
     assert config.CACHE_DIR == ""
+
+
+def compiled_anew(limit: int | None = None):
+    """Return what a new compiled function makes of 1.0; limit: bytes that a file may have."""
+
+    @njit(cache=True)
+    def doubled(x):
+        return 2.0 * x
+
+    if limit is None:
+        return doubled(1.0)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+    try:
+        return doubled(1.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def kept_in(tmp_path, monkeypatch):
+    """Return the folder in which code is kept, and forget that a warning was given."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    compiler.warn_once.cache_clear()
+    yield tmp_path
+    compiler.warn_once.cache_clear()
+
+
+def test_a_full_disk_costs_the_cache_and_one_line(kept_in, caplog):
+    assert compiled_anew(limit=100) == compiled_anew(limit=100) == 2.0
+    assert [p for p in kept_in.rglob("*") if p.is_file()] == []
+    (line,) = caplog.messages
+    assert "not kept" in line and "File too large" in line
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("size", [0, 40])
+def test_code_that_broke_off_is_compiled_and_kept_anew(kept_in, caplog, suffix, size):
+    assert compiled_anew() == 2.0
+    (file,) = (p for p in kept_in.rglob("*") if p.suffix == suffix)
+    os.truncate(file, size)
+    assert compiled_anew() == 2.0
+    assert file.stat().st_size > 80
+    assert caplog.messages == []
+
+
+def test_no_folder_at_all_costs_the_cache_and_one_line(kept_in, caplog, monkeypatch):
+    def full(prefix):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    monkeypatch.setattr(compiler_cache, "private", lambda folder, forbidden=0: False)
+    monkeypatch.setattr(tempfile, "mkdtemp", full)
+    compiler._folder.cache_clear()
+    try:
+        assert compiled_anew() == compiled_anew() == 2.0
+    finally:
+        compiler._folder.cache_clear()
+    (line,) = caplog.messages
+    assert "No space left" in line
+
+
+def test_an_effect_is_compiled_on_a_full_disk(kept_in):
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+    try:
+
+        @compiler.cfunc("float64(float64)", cache=True)
+        def tripled(x):
+            return 3.0 * x
+
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert tripled.ctypes(1.0) == 3.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import runpy
 from pathlib import Path
 from types import ModuleType
 
@@ -12,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 MADE = {"api.md", "index.md"}
-"""Pages that the site's build makes."""
+"""Pages that the build of the site writes."""
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +35,7 @@ def test_the_tutorial_runs_and_finds_the_play(capsys):
     assert names["cause"].name == "backlash"
     assert names["cause"].parameters["gap"].value == pytest.approx(4e-3, rel=0.02)
     assert names["after"]["ft"].rms_error < 0.1 * names["before"]["ft"].rms_error
+    assert names["loop"].error(settle=1.0) < 0.25
 
 
 def test_the_catalogue_of_the_docs_is_that_of_the_code(site):
@@ -57,3 +59,37 @@ def test_every_page_stands_in_the_contents():
     index = (DOCS / "index.md").read_text(encoding="utf-8")
     pages = {path.stem for path in DOCS.glob("*.md")} - {"index"}
     assert all(re.search(rf"^{page}$", index, flags=re.MULTILINE) for page in pages), pages
+
+
+def test_the_notebook_is_the_tutorial(site):
+    """`.ci/docs` writes it anew."""
+    assert (DOCS / "tutorial.ipynb").read_text(encoding="utf-8") == site.tutorial_notebook()
+
+
+EXAMPLES = {
+    "identify_a_bench": lambda names: names["stiffness"].value == pytest.approx(1400.0, rel=0.01),
+    "name_a_cause": lambda names: names["cause"].name == "coulomb_friction",
+    "estimate_both_torques": lambda names: (
+        _rms(names["proximal"] - names["distal"]) > 0.1 * _rms(names["distal"])
+    ),
+    "compare_effects": lambda names: all(_rms(change) > 0.1 for change in names["changes"].values()),
+    "choose_a_spring": lambda names: (names["exact"] < names["printed"]).all(),
+    "position_loop": lambda names: names["damping"].value == pytest.approx(0.65, rel=0.02),
+}
+"""Each example of the gallery, and what holds of its variables after it ran."""
+
+
+def _rms(y) -> float:
+    return float((y**2).mean() ** 0.5)
+
+
+def test_every_example_of_the_gallery_is_tested_and_has_a_picture():
+    assert {path.stem for path in (DOCS / "gallery").glob("*.py")} == set(EXAMPLES)
+    assert {path.stem for path in (DOCS / "gallery").glob("*.png")} == set(EXAMPLES)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_examples_of_the_gallery_run(name, capsys):
+    names = runpy.run_path(str(DOCS / "gallery" / f"{name}.py"))
+    assert EXAMPLES[name](names)
+    assert len(names["figure"].data) > 0

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT / top).rglob("*.py"))
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
-FILES = {"interrupts", "files", "staging", "new_files", "processes"}
+FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
 FACTS = {"errors", "fault_kinds", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
@@ -29,9 +29,11 @@ OWN = {
     "plugins": {"errors"},
     "interrupts": set(),
     "processes": set(),
-    "files": {"errors", "interrupts"},
-    "staging": {"files"},
-    "new_files": {"errors", "files", "interrupts", "staging"},
+    "locked_folder": set(),
+    "replaced": {"locked_folder"},
+    "files": {"errors", "interrupts", "replaced"},
+    "staging": {"files", "locked_folder", "replaced"},
+    "new_files": {"errors", "files", "interrupts", "replaced", "staging"},
     "units": set(),
     "decimal_number": set(),
     "keys": set(),
@@ -51,16 +53,19 @@ OWN = {
     "trends": BASE,
     "fleet": CORE | {"trends", "report", "library", "msg_adapters", "one_thread"},
     "exports": BASE | {"effects", "model", "design"},
+    "paper": BASE | {"effects", "model", "identification", "design"},
     "watch": BASE,
     "hardware": BASE,
     "hardware.simulated": BASE | {"model"},
     "msg_adapters": BASE,
     "arrays": {"errors", "signals"},
     "one_thread": set(),
-    "report": CORE | AROUND,
+    "report": CORE | AROUND | {"paper"},
     "library": CORE | AROUND | {"report", "msg_adapters"},
     "nodes": CORE | AROUND | {"hardware", "report", "msg_adapters", "one_thread", "watch"},
-    "cli": CORE | AROUND | {"hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch"},
+    "cli": CORE
+    | AROUND
+    | {"paper", "hardware", "report", "msg_adapters", "nodes", "one_thread", "fleet", "watch"},
     "__main__": {"cli"},
     "__init__": CORE | {"library"},
     "compiler_cache": set(),
@@ -68,8 +73,8 @@ OWN = {
 """Layers of this project that a layer may import beside itself."""
 
 DIAGNOSIS = (
-    {"settings", "screening", "residual_peaks"},
-    {"result", "data_split", "coherence"},
+    {"settings", "residual_peaks"},
+    {"result", "data_split", "coherence", "screening"},
     {"score", "problem_variants", "residual_analysis", "initial_guess"},
     {"candidate", "criteria", "next_experiment"},
     {"selection", "step_fits"},
@@ -86,6 +91,7 @@ NAMING = (
     {"weighing"},
     {"status"},
     {"causes"},
+    {"outcome"},
     {"conclusion"},
 )
 """Layers of its folder naming: how the selected causes are named."""
@@ -119,6 +125,7 @@ FOREIGN = {
     "trends": {"numpy", "scipy", "ruptures"},
     "fleet": {"numpy", "dask", "distributed", "fsspec", "pyarrow", "duckdb", "yaml"},
     "exports": NUMERIC | {"mujoco", "fmpy", "pythonfmu3"},
+    "paper": NUMERIC,
     "watch": {"tornado"},
     "signals": {"numpy"},
     "arrays": {"numpy"},

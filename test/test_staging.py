@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from msg_adapters import BagWriter
-from rsea_ros import staging
-from rsea_ros.files import PREFIX, give_names
+from rsea_ros.files import give_names
+from rsea_ros.locked_folder import LEFT_AFTER, PREFIX, name_of
 from rsea_ros.new_files import NewFiles
-from rsea_ros.staging import LEFT_AFTER, make_stage, remove_left
+from rsea_ros.staging import KIND, make_stage, remove_left
 
 KILLED = (
     "import os, signal, sys; from pathlib import Path; from rsea_ros.staging import make_stage\n"
@@ -98,13 +98,13 @@ def replaced_file(folder: Path) -> Path:
 
 def link_of_that_name(folder: Path) -> Path:
     (folder / "target").mkdir()
-    path = folder / f"{staging._NAME}0123456789abcdef"
+    path = folder / f"{name_of(KIND)}0123456789abcdef"
     path.symlink_to(folder / "target")
     return path
 
 
 def file_of_that_name(folder: Path) -> Path:
-    path = folder / f"{staging._NAME}0123456789abcdef"
+    path = folder / f"{name_of(KIND)}0123456789abcdef"
     path.write_text("of somebody")
     return aged(path)
 
@@ -126,7 +126,7 @@ def test_a_stage_of_another_user_stays(tmp_path, monkeypatch):
     assert path.exists()
 
 
-def test_what_is_put_aside_has_a_name_that_no_sweep_knows(tmp_path, monkeypatch):
+def test_what_is_put_aside_can_be_removed_only_when_all_have_their_names(tmp_path, monkeypatch):
     source, target = tmp_path / "source", tmp_path / "target"
     for path in (source, target):
         path.mkdir()
@@ -135,9 +135,11 @@ def test_what_is_put_aside_has_a_name_that_no_sweep_knows(tmp_path, monkeypatch)
     monkeypatch.setattr("rsea_ros.files.remove", seen.append)
     give_names([(source, target)], force=True)
     (aside,) = seen
+    assert (aside / "target" / "file").read_text() == "target"
+    assert (target / "file").read_text() == "source"
     aged(aside)
     remove_left(tmp_path)
-    assert (aside / "file").read_text() == "target"
+    assert not aside.exists()
 
 
 def test_two_that_remove_at_once_agree(tmp_path):

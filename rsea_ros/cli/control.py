@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.report.control.json import control_json
     from rsea_ros.report.control.page import control_report
-    from rsea_ros.report.identification.files import json_text
+    from rsea_ros.report.json_values import json_text
 
     place = results_place(args, "out/control", (JSON, REPORT), [args.rig, args.free])
     _check_rates(args.rate)

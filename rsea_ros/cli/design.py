@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.design.margins import robust_stiffness
     from rsea_ros.report.design.json import design_json
     from rsea_ros.report.design.page import design_report
-    from rsea_ros.report.identification.files import json_text
+    from rsea_ros.report.json_values import json_text
 
     place = results_place(args, "out/design", (JSON, REPORT), [args.catalogue])
     check_magnitude("stiffness", args.stiffness, "N m/rad")

@@ -125,7 +125,7 @@ def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
     from rsea_ros.experiment.run_file import run_text
     from rsea_ros.report.experiment.json import advice_json
     from rsea_ros.report.experiment.page import advice_page
-    from rsea_ros.report.identification.files import json_text, with_provenance
+    from rsea_ros.report.json_values import json_text, with_provenance
     from rsea_ros.report.provenance import provenance_of
 
     source = provenance_of(["rsea", "experiment", *sys.argv[2:]], [Path(b) for b in args.bag])

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate the tests, recompute the paper, write the results."""
-    from rsea_ros.report.identification.files import json_text
+    from rsea_ros.report.json_values import json_text
     from rsea_ros.report.paper.json import paper_json
     from rsea_ros.report.paper.page import paper_report
 
@@ -110,9 +110,9 @@ def _tests(args: argparse.Namespace, new: NewFiles, tell: Callable[[str, float],
 
     from rsea_ros.identification.excitation import Settings, excitation
     from rsea_ros.identification.frequency_response import estimate_response
-    from rsea_ros.identification.moving_output import RATE, moving_output
     from rsea_ros.model.rig_file import load_rig
     from rsea_ros.model.simulation import synthesize
+    from rsea_ros.paper.moving_output import RATE, moving_output
     from rsea_ros.report.paper.page import PaperTests
     from rsea_ros.signals import Channel
 

@@ -15,7 +15,7 @@ from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, top
 from rsea_ros.model.prediction import Comparison, predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.new_files import check_free, write_text
-from rsea_ros.report.identification.json import fault_json, numbers
+from rsea_ros.report.json_values import fault_json, numbers
 from rsea_ros.stamps import repair_stamps
 
 HELP = "simulate a model on the commands of a bag and say how far off it is, as JSON"

@@ -9,8 +9,7 @@ from rsea_ros.design import mechanism
 from rsea_ros.design.catalogue import MotorGear
 from rsea_ros.design.requirement import Requirement
 from rsea_ros.errors import ParameterError
-from rsea_ros.model.bandwidth import end_over_end, flat_band
-from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
+from rsea_ros.model.bandwidth import PAPER_FACTOR, end_over_end, flat_band, pure_torque_bandwidth
 from rsea_ros.model.rig import END_NAMES, Quantity, Rig
 from rsea_ros.model.spring import spring_rate
 
@@ -70,7 +69,7 @@ def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design
     inner = requirement.inertia + unit.spin
     function = end_over_end(rig_of(requirement, unit, stiffness))
     exact = flat_band(function, requirement.tolerance_db, requirement.tolerance_deg)
-    band = eq_7_bandwidth(stiffness, requirement.inertia)
+    band = pure_torque_bandwidth(stiffness, requirement.inertia)
     theta = float(mechanism.deflection(stiffness, requirement.torque))
     return Design(
         requirement=requirement,

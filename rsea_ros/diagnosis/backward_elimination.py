@@ -83,12 +83,12 @@ class ReducedModels:
         rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
         guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
-        screened = screen(solution, rival, guesses)
+        screened = screen(solution, rival, guesses, self.settings.forward)
         return None if screened is None else self._fit(model, screened.problem, screened.theta)
 
     def _fit(self, model: Candidate, problem: Problem, theta: FloatArray) -> Candidate:
         """Fit a problem as a model was fitted from which it was made."""
-        setup = FitSetup(model.cases, self.settings.fits, self.pools.run, model.validation)
+        setup = FitSetup(model.cases, self.settings, self.pools.run, model.validation)
         return fit_candidate(replace(setup, is_quick=self._is_far(model)), problem, theta)
 
     def _is_far(self, model: Candidate) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks, with_common_clock_in_delay, with_doubled_step
 from rsea_ros.diagnosis.score import Score, score_on
-from rsea_ros.diagnosis.settings import DEFAULT, FitSettings
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
@@ -21,13 +21,14 @@ from rsea_ros.signals import FloatArray
 class Candidate:
     """A fitted model with its simulated channels on every case and its score on the validation blocks.
 
-    cases: every sample, with the noise against which the candidate is scored.
+    cases: every sample, with the noise against which the candidate is scored. settings: of its fit.
     """
 
     solution: Solution
     outputs: list[dict[str, FloatArray]]
     validation: Score
     cases: tuple[Case, ...]
+    settings: DiagnosisSettings = DEFAULT
 
     @property
     def problem(self) -> Problem:
@@ -62,19 +63,20 @@ class Candidate:
     @property
     def is_at_bound(self) -> bool:
         """Whether the newest effect's main parameter has run to its bound: then it is no such effect."""
-        return bool(self.causes) and is_at_bound(self.solution, self.newest)
+        near = self.settings.acceptance.near_bound
+        return bool(self.causes) and is_at_bound(self.solution, self.newest, near)
 
 
 @dataclass(frozen=True)
 class FitSetup:
     """On which samples candidates are fitted, in which units, how far, and by which means.
 
-    weights: a score whose misfit counts as noise. iterations, gain: other limits than those of `limits`.
+    weights: a score whose misfit counts as noise. iterations, gain: other limits than those of the settings.
     run: how derivatives are made, one after another or in a pool. is_quick: on steps twice as long.
     """
 
     cases: tuple[Case, ...]
-    limits: FitSettings = DEFAULT.fits
+    settings: DiagnosisSettings
     run: Map = serial
     weights: Score | None = None
     blocks: tuple[int, ...] = TRAIN
@@ -85,14 +87,15 @@ class FitSetup:
     def masked(self, problem: Problem) -> Problem:
         """Return a problem on the samples and in the units of this setup."""
         misfit = None if self.weights is None else self.weights.ratios
-        masked = on_blocks(problem, self.cases, self.blocks, misfit)
+        masked = on_blocks(problem, self.cases, self.blocks, misfit, self.settings.blocks)
         return with_doubled_step(masked) if self.is_quick else masked
 
     def solve(self, problem: Problem, theta: FloatArray | None, matrix: FloatArray | None = None) -> Solution:
         """Fit the unknowns of a masked problem. matrix: derivatives to begin with."""
-        gain = self.limits.gain if self.gain is None else self.gain
-        iterations = self.limits.iterations if self.iterations is None else self.iterations
-        gain *= _distance(self.weights, self.limits.farthest)
+        rule = self.settings.fits
+        gain = rule.gain if self.gain is None else self.gain
+        iterations = rule.iterations if self.iterations is None else self.iterations
+        gain *= _distance(self.weights, rule.farthest)
         return solve(problem, theta, iterations=iterations, gain=gain, run=self.run, matrix=matrix)
 
 
@@ -109,8 +112,8 @@ def fit_candidate(
     if moved is not None:
         solution = min(solution, setup.solve(masked, moved), key=lambda s: s.cost)
     outputs = solution.problem.outputs(solution.theta)
-    validation = score_on(solution.problem, setup.cases, VALIDATION, outputs)
-    return Candidate(solution, outputs, validation, setup.cases)
+    validation = score_on(solution.problem, setup.cases, VALIDATION, outputs, setup.settings.blocks)
+    return Candidate(solution, outputs, validation, setup.cases, setup.settings)
 
 
 def refit(model: Candidate, setup: FitSetup) -> Candidate:
@@ -128,13 +131,17 @@ def with_noise_reestimated(model: Candidate) -> Candidate:
 
 def scored_against(model: Candidate, cases: tuple[Case, ...]) -> Candidate:
     """Return a candidate with its score against the noise of other cases of the same records."""
-    validation = score_on(model.problem, cases, VALIDATION, model.outputs)
+    validation = score_on(model.problem, cases, VALIDATION, model.outputs, model.settings.blocks)
     return replace(model, cases=cases, validation=validation)
 
 
-def leaves_only_noise(model: Candidate, limit: float = DEFAULT.floor.only_noise) -> bool:
-    """Tell whether the residual of every channel is noise, on all blocks but the test blocks."""
-    score = score_on(model.problem, model.cases, (*TRAIN, *VALIDATION), model.outputs)
+def leaves_only_noise(model: Candidate, limit: float) -> bool:
+    """Tell whether the residual of every channel is noise, on all blocks but the test blocks.
+
+    limit: RMS of the residual over the noise, below which it is.
+    """
+    blocks = (*TRAIN, *VALIDATION)
+    score = score_on(model.problem, model.cases, blocks, model.outputs, model.settings.blocks)
     return score.missed == 0.0 and all(score.ratio(n) < limit for n in score.sums)
 
 
@@ -149,7 +156,7 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
     return float(sum(((t - u.inner(u.start)) / u.doubt) ** 2 for t, u in known))
 
 
-def is_at_bound(solution: Solution, name: str, near: float = DEFAULT.acceptance.near_bound) -> bool:
+def is_at_bound(solution: Solution, name: str, near: float) -> bool:
     """Tell whether an effect's main parameter lies at a bound, within a share `near` of its span."""
     main = effect_named(name).main
     value, span = solution.values[f"{name}.{main.name}"], main.high - main.low

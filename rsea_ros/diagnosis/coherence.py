@@ -9,27 +9,27 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
+from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
 
-_FALSE_ALARM = 0.01
-_CLEAR = 0.3
-"""Coherence^2 above which a model misses a response, however small beside the noise."""
-_SHARE = 0.1
-"""Of the simulated response: a smaller error of it is the simulation's own."""
-_FEWEST_SEGMENTS = 16
 _LOST = 0.5
 """Coherence^2 below which more than half of a channel's power has nothing to do with the command."""
 _MOST = 0.75
 """Share of the lines above an edge that must be lost, and of those below it that must not."""
 _LINES = 1024
+_SEGMENTS = 16
+"""Of a spectrum at least: of fewer, noise alone is coherent."""
 _SHORTEST = 8
 """Samples of a segment: a shorter one has no band to speak of."""
 _LOWEST = 2.0
+"""Hz: below it a drift may hide the command. All of these steer a remark and no verdict."""
 
 
-def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArray) -> float:
+def missed_response(
+    case: Case, output: FloatArray, channel: str, blocks: IntArray, rule: BlockSettings
+) -> float:
     """Return the largest coherence^2 of a residual with the command where the model misses a response, or 0.
 
     blocks: number of the block of each sample of the channel; those with faulty samples are left out.
@@ -38,12 +38,14 @@ def missed_response(case: Case, output: FloatArray, channel: str, blocks: IntArr
         return 0.0
     u = command_at(case.drive, case.t[channel])
     parts = _segments(blocks, case.mask[channel])
-    if len(parts) < _FEWEST_SEGMENTS:
+    if len(parts) < rule.response_blocks:
         return 0.0
     r, y, u_hat = (_spectra(parts, v) for v in (case.measured[channel] - output, output, u))
     coherence = _coherence(r, u_hat)
-    limit = max(_CLEAR, 1.0 - (_FALSE_ALARM / r.shape[1]) ** (1.0 / (len(parts) - 1)))
-    missed = np.abs(np.sum(r * u_hat.conj(), axis=0)) > _SHARE * np.abs(np.sum(y * u_hat.conj(), axis=0))
+    chance = 1.0 - (rule.false_alarm / r.shape[1]) ** (1.0 / (len(parts) - 1))
+    limit = max(rule.response_clear, chance)
+    error, response = (np.abs(np.sum(v * u_hat.conj(), axis=0)) for v in (r, y))
+    missed = error > rule.response_share * response
     return float(np.max(np.where(missed & (coherence > limit), coherence, 0.0)))
 
 
@@ -53,7 +55,7 @@ def lost_above(case: Case, channel: str) -> float | None:
         return None
     t = case.t[channel]
     u, y = command_at(case.drive, t), case.measured[channel]
-    rate, length = 1.0 / float(np.median(np.diff(t))), min(_LINES, len(t) // _FEWEST_SEGMENTS)
+    rate, length = 1.0 / float(np.median(np.diff(t))), min(_LINES, len(t) // _SEGMENTS)
     if length < _SHORTEST:
         return None
     frequency, power = signal.welch(u, rate, nperseg=length)

@@ -205,8 +205,11 @@ def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT)
     """
     levels, unchanged = settings.floor, 1.0 + settings.acceptance.matters
     misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]
-    left = [last.ratio(n) / first.ratio(n) for n in misfitting]
+    shares_left = [last.ratio(n) / first.ratio(n) for n in misfitting]
     is_explained = any(
         first.ratio(n) > levels.large_misfit and last.ratio(n) < levels.misfit for n in misfitting
     )
-    return bool(left) and (max(left) < levels.share_left or (is_explained and max(left) <= unchanged))
+    if not shares_left:
+        return False
+    most_left = max(shares_left)
+    return most_left < levels.share_left or (is_explained and most_left <= unchanged)

@@ -16,16 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.settings import DEFAULT, PieceSettings
+from rsea_ros.diagnosis.settings import DEFAULT, BlockSettings, DiagnosisSettings
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
-_LONGEST, _SHORTEST = 1.0, 0.25
-"""s. Longer than the bench remembers, short enough that every part of a sweep is in every set."""
-_ENOUGH = 120
-"""Blocks: a record with fewer of the longest is cut into shorter ones."""
 TRAIN, VALIDATION, TEST = (0, 1), (2,), (3,)
+"""Half of the blocks train: fits need data most; validation and tests share the rest."""
 _ORDERS = np.array(
     [[0, 1, 2, 3], [0, 1, 3, 2], [2, 0, 1, 3], [3, 0, 1, 2], [2, 3, 0, 1], [3, 2, 0, 1]], dtype=np.int64
 )
@@ -35,9 +32,9 @@ _ROUNDING = 0.05
 """Of a period: up to this much less than a whole number of samples is one, jitter of the stamps."""
 
 
-def block_length(case: Case) -> float:
+def block_length(case: Case, rule: BlockSettings) -> float:
     """Return the length of a block, s: the longest, or less where a record would have too few of them."""
-    return min(max(case.duration / _ENOUGH, _SHORTEST), _LONGEST)
+    return min(max(case.duration / rule.enough, rule.shortest), rule.longest)
 
 
 def set_of(block: IntArray) -> IntArray:
@@ -45,39 +42,41 @@ def set_of(block: IntArray) -> IntArray:
     return np.asarray(_PATTERN[(block // 4) % len(_PATTERN), block % 4])
 
 
-def train_starts(case: Case) -> FloatArray:
+def train_starts(case: Case, rule: BlockSettings) -> FloatArray:
     """Return the times at which the pairs of training blocks begin, s since the case's start."""
-    groups = int(case.duration / block_length(case)) // 4
+    groups = int(case.duration / block_length(case, rule)) // 4
     firsts = np.argmin(_PATTERN[np.arange(groups) % len(_PATTERN)], axis=1)
-    return np.asarray((4 * np.arange(groups) + firsts) * block_length(case))
+    return np.asarray((4 * np.arange(groups) + firsts) * block_length(case, rule))
 
 
-def blocks_of(case: Case, channel: str) -> IntArray:
+def blocks_of(case: Case, channel: str, rule: BlockSettings) -> IntArray:
     """Return the number of the block of each sample of a channel."""
-    return np.maximum(np.floor((case.t[channel] - case.start) / block_length(case)), 0).astype(np.int64)
+    length = block_length(case, rule)
+    return np.maximum(np.floor((case.t[channel] - case.start) / length), 0).astype(np.int64)
 
 
-def part(case: Case, sets: tuple[int, ...]) -> Case:
+def part(case: Case, sets: tuple[int, ...], rule: BlockSettings) -> Case:
     """Return the case with only the samples of some sets."""
-    mask: dict[str, BoolArray] = {n: np.isin(set_of(blocks_of(case, n)), sets) for n in case.t}
+    mask: dict[str, BoolArray] = {n: np.isin(set_of(blocks_of(case, n, rule)), sets) for n in case.t}
     return case.within(mask)
 
 
 def short_pieces_of(
-    case: Case, outputs: Mapping[str, FloatArray], rule: PieceSettings = DEFAULT.pieces
+    case: Case, outputs: Mapping[str, FloatArray], settings: DiagnosisSettings = DEFAULT
 ) -> tuple[Case, ...]:
     """Return pieces of a case, each a run-up and a pair of training blocks, about 14 s of data in all.
 
     Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
-    fit = part(case, TRAIN)
+    rule, blocks = settings.pieces, settings.blocks
+    fit = part(case, TRAIN, blocks)
     thinner = _as_often_as_commands(fit)
     drive = thinner.drive
     if not isinstance(drive, Drive) or drive.duration < 2.0 * rule.enough:
         return (thinner,)
-    length = 2.0 * block_length(case)
-    starts = train_starts(case)[1:]
+    length = 2.0 * block_length(case, blocks)
+    starts = train_starts(case, blocks)[1:]
     half = round(0.5 * rule.enough / length)
     spread = np.unique(np.linspace(0, len(starts) - 1, 2 * half + 1).round().astype(int)[1::2])
     misfit = np.array([_misfit(fit, outputs, float(t), length) for t in starts])

@@ -14,7 +14,8 @@ from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
 from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
-from rsea_ros.diagnosis.naming.conclusion import Examined, conclude
+from rsea_ros.diagnosis.naming.conclusion import conclude
+from rsea_ros.diagnosis.naming.outcome import Examined
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings

@@ -58,12 +58,12 @@ def evaluate(
     """
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
     setup = FitSetup(
-        cases, settings.fits, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
+        cases, settings, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
     )
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
-    train = score_on(model.problem, cases, blocks, model.outputs)
+    train = score_on(model.problem, cases, blocks, model.outputs, settings.blocks)
     if holdout is None:
-        test = score_on(model.problem, cases, TEST, model.outputs)
+        test = score_on(model.problem, cases, TEST, model.outputs, settings.blocks)
     else:
         test = _score(model, holdout, selection.models[0].problem.rig)
     return Evaluated(model.solution, model.outputs, train, test)
@@ -75,4 +75,4 @@ def _score(model: Candidate, holdout: Checked, nominal: Rig) -> Score:
     case = replace(case_from(holdout.record, nominal, holdout.masked), noise=model.cases[0].noise)
     rig, offsets = apply(problem.rig, problem.unknowns, model.solution.theta)
     outputs = simulated((case,), in_phase(rig, holdout.record), offsets, ride=problem.ride)
-    return score(problem, (case,), outputs)
+    return score(problem, (case,), outputs, model.settings.blocks)

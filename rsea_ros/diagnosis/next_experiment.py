@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.result import Experiment
+from rsea_ros.diagnosis.settings import DEFAULT, NextRunSettings
 from rsea_ros.identification.allowed_run import Run, allowed_run, playable_rate
 from rsea_ros.identification.excitation import JOINT, PERIODIC, Settings
 from rsea_ros.identification.problem import Case, Problem
@@ -22,17 +23,6 @@ from rsea_ros.identification.unknowns import apply, start_vector
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import UNITS, FloatArray
-
-_DURATION, _SERIES = 12.0, 60.0
-"""s of a run that tells rivals apart, and of one of an amplitude series."""
-_SERIES_TOP = 60.0
-"""Hz: above it the driver's limit of the slew leaves little amplitude."""
-_ENOUGH = 0.5
-"""RMS of what a rival cannot follow, over the noise, that tells it apart in a run of 12 s beyond doubt."""
-_VISIBLE = 1.1
-"""RMS of a residual over the noise from which on it is seen."""
-_NEARLY = 0.8
-"""Part of the wanted amplitude that limits must leave for an amplitude series to say something."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +36,7 @@ class ExcitationOption:
 
     @property
     def cost(self) -> float:
-        """What it asks of the bench: amplitude first, then bandwidth."""
+        """What it asks of the bench: amplitude first; a decade of bandwidth counts as a tenth more of it."""
         return self.relative * (1.0 + 0.1 * math.log10(self.high / self.low))
 
 
@@ -63,7 +53,9 @@ EXCITATIONS = tuple(
 )
 
 
-def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> Experiment:
+def separating(
+    accepted: Solution, rivals: Sequence[Solution], rate: float, rule: NextRunSettings = DEFAULT.next_run
+) -> Experiment:
     """Return the cheapest allowed run that tells an accepted model from its rivals, or say that none does."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
@@ -74,11 +66,11 @@ def separating(accepted: Solution, rivals: Sequence[Solution], rate: float) -> E
     present = float(np.max(np.abs(case.drive.command)))
     rig, most = _model(accepted), 0.0
     for option in sorted(EXCITATIONS, key=lambda c: c.cost):
-        run = allowed_run(rig, case, option.kind, _settings(option, rate), option.relative * present)
+        run = allowed_run(rig, case, option.kind, _settings(option, rate, rule), option.relative * present)
         if run is None:
             continue
         separation = min(_separation(rival, run.case) for rival in rivals)
-        if separation > _ENOUGH:
+        if separation > rule.separation:
             settings = _as_excited(run, rig) | {"separation_times_noise": round(separation, 3)}
             return replace(undecided, reason="separates", separation=separation, excitation=settings)
         most = max(most, separation)
@@ -90,11 +82,13 @@ def unit_of_commands(rig: Rig) -> str:
     return UNITS["command" if rig.loop is None else "reference"]
 
 
-def _settings(option: ExcitationOption, rate: float) -> Settings:
+def _settings(
+    option: ExcitationOption, rate: float, rule: NextRunSettings = DEFAULT.next_run
+) -> Settings:
     """Return the settings of an option, of any amplitude."""
     rate = playable_rate(rate)
     return Settings(
-        rate=rate, duration=_DURATION, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
+        rate=rate, duration=rule.duration, amplitude=0.5, noise=0.2 if option.kind == "chirp" else 0.0,
         low=option.low, high=min(option.high, 0.45 * rate), period=4.0, seed=7,
     )  # fmt: skip
 
@@ -137,7 +131,9 @@ def _left_over(problem: Problem, theta: FloatArray) -> float:
     return float(min(max(rms), np.sqrt(np.mean(residual**2)) * len(rms)))
 
 
-def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experiment | None:
+def amplitude_series(
+    model: Solution, times_noise: float, rate: float, rule: NextRunSettings = DEFAULT.next_run
+) -> Experiment | None:
     """Return the run that says of an unexplained residual whether it grows with the amplitude.
 
     times_noise: RMS of that residual over the noise. At half the amplitude it must still be seen; else twice
@@ -149,14 +145,14 @@ def amplitude_series(model: Solution, times_noise: float, rate: float) -> Experi
     present = float(np.max(np.abs(case.drive.command)))
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))
     for factor in (0.5, 2.0):
-        if math.hypot(1.0, factor * excess) < _VISIBLE:
+        if math.hypot(1.0, factor * excess) < rule.visible:
             continue
-        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate)), factor * present)
-        if run is not None and run.peak >= _NEARLY * factor * present:
+        run = allowed_run(rig, case, "multisine", _series(rig, playable_rate(rate), rule), factor * present)
+        if run is not None and run.peak >= rule.nearly * factor * present:
             return Experiment("amplitude_series", amplitude=factor, excitation=_as_excited(run, rig))
     return None
 
 
-def _series(rig: Rig, rate: float) -> Settings:
-    high = min(_SERIES_TOP if rig.loop is None else JOINT.high, 0.45 * rate)
-    return Settings(rate=rate, duration=_SERIES, amplitude=0.5, noise=0.0, low=0.1, high=high)
+def _series(rig: Rig, rate: float, rule: NextRunSettings = DEFAULT.next_run) -> Settings:
+    high = min(rule.series_top if rig.loop is None else JOINT.high, 0.45 * rate)
+    return Settings(rate=rate, duration=rule.series_duration, amplitude=0.5, noise=0.0, low=0.1, high=high)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import part
+from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.model.drive import Drive, coarser
@@ -17,10 +18,11 @@ DELAY = "command_delay.delay"
 
 
 def on_blocks(
-    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], misfit: Mapping[str, float] | None
-) -> Problem:
+    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], misfit: Mapping[str, float] | None,
+    rule: BlockSettings,
+) -> Problem:  # fmt: skip
     """Return a problem on some blocks of the cases. misfit: what counts as noise (with_misfit_as_noise)."""
-    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks), misfit) for c in cases))
+    return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks, rule), misfit) for c in cases))
 
 
 def with_misfit_as_noise(case: Case, misfit: Mapping[str, float] | None) -> Case:

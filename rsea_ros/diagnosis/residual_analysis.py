@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from scipy import signal
@@ -24,12 +25,10 @@ def misfits(case: Case, outputs: dict[str, FloatArray], channel: str, rig: Rig) 
     """Return where the residual of a channel is more than its noise, worst first in each respect."""
     residual = np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
     worst = _worst(by_frequency(case.t[channel], residual, case.noise[channel], channel))
-    keep, t = case.mask[channel], case.t[channel]
-    for what, unit, values in _respects(case, channel, rig):
-        worst += _worst(_binned(what, unit, values[keep], residual[keep], case.noise[channel], channel))
-    worst += _worst(
-        _binned("time", "s", (t - case.start)[keep], residual[keep], case.noise[channel], channel, equal=True)
-    )
+    keep = case.mask[channel]
+    for respect in _respects(case, channel, rig):
+        seen = respect._replace(values=respect.values[keep])
+        worst += _worst(_binned(seen, residual[keep], case.noise[channel], channel))
     return tuple(worst)
 
 
@@ -43,16 +42,8 @@ def by_frequency(t: FloatArray, residual: FloatArray, noise: float, channel: str
     for low, high in itertools.pairwise(edges):
         inside = (frequency >= low) & (frequency < high)
         if inside.any():
-            bands.append(
-                Misfit(
-                    "frequency_band",
-                    float(low),
-                    float(high),
-                    "Hz",
-                    float(np.sqrt(level[inside].mean() / white)),
-                    channel,
-                )
-            )
+            over_noise = float(np.sqrt(level[inside].mean() / white))
+            bands.append(Misfit("frequency_band", float(low), float(high), "Hz", over_noise, channel))
     return bands
 
 
@@ -71,41 +62,44 @@ def spectrum(
     )
 
 
-def _respects(case: Case, channel: str, rig: Rig) -> list[tuple[str, str, FloatArray]]:
-    """Return what the residual is laid out against: name, unit, value at each of the channel's samples."""
+class _Respect(NamedTuple):
+    """What a residual is laid out against: a value at each sample. is_even: in bins of equal width."""
+
+    what: str
+    unit: str
+    values: FloatArray
+    is_even: bool = False
+
+
+def _respects(case: Case, channel: str, rig: Rig) -> list[_Respect]:
+    """Return all that the residual of a channel is laid out against."""
     t, respects = case.t[channel], []
-    load = "ft" if "ft" in case.measured else None
-    if load:
-        respects.append(("amplitude", "N m", np.abs(np.interp(t, case.t[load], case.measured[load]))))
+    if "ft" in case.measured:
+        load = np.abs(np.interp(t, case.t["ft"], case.measured["ft"]))
+        respects.append(_Respect("amplitude", "N m", load))
     if "velocity" in case.measured:
-        respects.append(("velocity", "rad/s", np.interp(t, case.t["velocity"], case.measured["velocity"])))
+        velocity = np.interp(t, case.t["velocity"], case.measured["velocity"])
+        respects.append(_Respect("velocity", "rad/s", velocity))
     if isinstance(case.drive, Drive) and "position" in case.measured:
         turns = np.interp(t, case.t["position"], case.measured["position"]) * rig["gear.ratio"]
-        respects.append(("angle", "rad", np.mod(turns, 2.0 * np.pi)))
-    return respects
+        respects.append(_Respect("angle", "rad", np.mod(turns, 2.0 * np.pi)))
+    return [*respects, _Respect("time", "s", t - case.start, is_even=True)]
 
 
-def _binned(
-    what: str,
-    unit: str,
-    values: FloatArray,
-    residual: FloatArray,
-    noise: float,
-    channel: str,
-    equal: bool = False,
-) -> list[Misfit]:
+def _binned(respect: _Respect, residual: FloatArray, noise: float, channel: str) -> list[Misfit]:
+    """Return the residual's level in bins of equal width, or of equally many samples."""
+    values = respect.values
     if len(values) < 4 * _BINS:
         return []
-    edges = (
-        np.linspace(values.min(), values.max(), _BINS + 1)
-        if equal
-        else np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1))
-    )
+    shares = np.linspace(0.0, 1.0, _BINS + 1)
+    even = np.linspace(values.min(), values.max(), _BINS + 1)
+    edges = even if respect.is_even else np.quantile(values, shares)
     which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
     power = np.bincount(which, residual**2, _BINS) / np.maximum(np.bincount(which, minlength=_BINS), 1)
+    levels = np.sqrt(power)
     return [
-        Misfit(what, float(edges[i]), float(edges[i + 1]), unit, float(np.sqrt(power[i])) / noise, channel)
-        for i in range(_BINS)
+        Misfit(respect.what, float(low), float(high), respect.unit, float(level) / noise, channel)
+        for (low, high), level in zip(itertools.pairwise(edges), levels, strict=True)
     ]
 
 

@@ -22,13 +22,17 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
 _FEWEST_PERIODS = 2.0
-"""As often a ripple must have repeated over the rotor's travel to be one."""
+"""As often a ripple must have repeated over the rotor's travel: one period may be anything."""
 _FEWEST, _MOST = 0.5, 60.0
-"""Cycles per revolution of a ripple."""
+"""Cycles per revolution of a ripple that is looked for; the catalogue's bound is 60 too."""
 _REVOLUTIONS = 8
 """After so many every whole multiple of 1/8 cycle repeats."""
 _BINS = 1 << 13
+"""Of these revolutions: 17 in a period of the fastest ripple."""
+_APART = 6
+"""Lines of 1/8 cycle between two peaks that count as two: over one revolution a peak is as wide."""
 _MOST_PEAKS = 2
+"""Each is a guess to simulate, so few. All of these steer where fits begin, and no verdict."""
 
 
 def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
@@ -58,8 +62,8 @@ def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
     cycles, power = _periodogram(angle, values)
     seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
     power = np.where(seen & (cycles < _MOST), power, 0.0)
-    at = [refined(cycles, power, k) for k in peaks(power, apart=6)]
-    return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in at]
+    repeating = [refined(cycles, power, k) for k in peaks(power, apart=_APART)]
+    return [{"cycles_per_revolution": c, **sine_at(angle, values, c)} for c in repeating]
 
 
 def _periodogram(angle: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:

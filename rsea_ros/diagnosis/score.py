@@ -9,11 +9,13 @@ import numpy as np
 
 from rsea_ros.diagnosis.coherence import missed_response
 from rsea_ros.diagnosis.data_split import block_length, blocks_of, part
+from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.signals import FloatArray, IntArray
 
 RESAMPLES = 1000
-"""Draws of a bootstrap over blocks: 25 of them lie beyond each end of a 95 % interval."""
+"""Draws of a bootstrap over blocks. Derived: 25 of them lie beyond each end of a 95 % interval, which is
+then known to a fifth of that share (1 / sqrt(25))."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +55,27 @@ class Score:
 
 
 def score_on(
-    problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], outputs: list[dict[str, FloatArray]]
+    problem: Problem,
+    cases: Sequence[Case],
+    blocks: tuple[int, ...],
+    outputs: list[dict[str, FloatArray]],
+    rule: BlockSettings,
 ) -> Score:
     """Return the score of simulated outputs on some sets of the blocks of `cases`."""
-    return score(problem, tuple(part(c, blocks) for c in cases), outputs)
+    return score(problem, tuple(part(c, blocks, rule) for c in cases), outputs, rule)
 
 
-def score(problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, FloatArray]]) -> Score:
+def score(
+    problem: Problem, cases: tuple[Case, ...], outputs: list[dict[str, FloatArray]], rule: BlockSettings
+) -> Score:
     """Return the score of simulated outputs on the samples of `cases` (the problem's, otherwise masked)."""
     runs = list(zip(cases, outputs, strict=True))
-    missed = [missed_response(c, o["ft"], "ft", blocks_of(c, "ft")) for c, o in runs if _has_ft(c, o)]
+    missed = [
+        missed_response(c, o["ft"], "ft", blocks_of(c, "ft", rule), rule) for c, o in runs if _has_ft(c, o)
+    ]
     sums, counts = {}, {}
     for n in problem.channels:
-        by_case = [_by_block(case, out, n) for case, out in runs]
+        by_case = [_by_block(case, out, n, rule) for case, out in runs]
         sums[n], counts[n] = (np.concatenate(parts) for parts in zip(*by_case, strict=True))
     used = np.sum(list(counts.values()), axis=0) > 0
     present = [n for n in problem.channels if counts[n].sum() > 0]
@@ -77,14 +87,16 @@ def _has_ft(case: Case, outputs: Mapping[str, FloatArray]) -> bool:
     return "ft" in case.measured and "ft" in outputs
 
 
-def _by_block(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> tuple[FloatArray, FloatArray]:
+def _by_block(
+    case: Case, outputs: Mapping[str, FloatArray], channel: str, rule: BlockSettings
+) -> tuple[FloatArray, FloatArray]:
     """Return sums of squares over the noise and numbers of samples of a channel, shape (blocks,) each."""
-    length = int(case.duration / block_length(case)) + 2
+    length = int(case.duration / block_length(case, rule)) + 2
     if channel not in case.t or channel not in outputs:
         return np.zeros(length), np.zeros(length)
     keep = case.mask[channel]
     squares = ((outputs[channel] - case.measured[channel]) / case.noise[channel])[keep] ** 2
-    block = blocks_of(case, channel)[keep]
+    block = blocks_of(case, channel, rule)[keep]
     sums = np.asarray(np.bincount(block, squares, length)[:length], dtype=np.float64)
     return sums, np.bincount(block, minlength=length)[:length].astype(np.float64)
 
@@ -97,11 +109,18 @@ def bootstrap_means(values: FloatArray, resamples: int = RESAMPLES) -> FloatArra
 
 def gain(with_it: Score, without: Score, channel: str) -> tuple[float, tuple[float, float]]:
     """Return 1 - RMS(residual with) / RMS(residual without) of a channel, and its 95 % bootstrap interval."""
-    a, b = with_it.sums[channel], without.sums[channel]
-    draws = _draws(len(a), RESAMPLES)
-    resampled = 1.0 - np.sqrt(a[draws].sum(axis=1) / np.maximum(b[draws].sum(axis=1), 1e-300))
+    return gain_of(with_it.sums[channel], without.sums[channel])
+
+
+def gain_of(after: FloatArray, before: FloatArray) -> tuple[float, tuple[float, float]]:
+    """Return 1 - RMS(after) / RMS(before) and its 95 % bootstrap interval.
+
+    after, before: squared residuals summed by block, shape (blocks,).
+    """
+    draws = _draws(len(after), RESAMPLES)
+    resampled = 1.0 - np.sqrt(after[draws].sum(axis=1) / np.maximum(before[draws].sum(axis=1), 1e-300))
     low, high = np.quantile(resampled, [0.025, 0.975])
-    return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
+    return 1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))), (float(low), float(high))
 
 
 def _draws(blocks: int, resamples: int) -> IntArray:

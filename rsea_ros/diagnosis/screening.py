@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.diagnosis.settings import ForwardSettings
 from rsea_ros.effects.effect import Effect
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.alternatives import extended
@@ -20,11 +21,8 @@ from rsea_ros.identification.solver import Solution, bounded_step, jacobian_colu
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.signals import FloatArray
 
-_STEPS = 2
-_SHARES = (1.0, 0.3)
-"""Of a step that are tried, in turn."""
 _DAMPING = 1e-6
-"""Of the curvature: keeps apart what the data do not."""
+"""Of the curvature: keeps apart what the data do not. Numerical: far below that of any unknown that shows."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,9 @@ class ScreenedEffect:
         return self.effect.name
 
 
-def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]]) -> ScreenedEffect | None:
+def screen(
+    present: Solution, effect: Effect, guesses: Sequence[dict[str, float]], rule: ForwardSettings
+) -> ScreenedEffect | None:
     """Return the best of an effect's guesses after two cheap steps; None for an effect the rig cannot have.
 
     A guess may also name values of the rig: these then differ from where the derivatives were taken.
@@ -54,7 +54,7 @@ def screen(present: Solution, effect: Effect, guesses: Sequence[dict[str, float]
         needs_derivatives = is_mode(effect) or base is not present
         try_guess = _with_new_derivatives if needs_derivatives else _with_present_derivatives
         try:
-            tried = try_guess(base, effect, parameters)
+            tried = try_guess(base, effect, parameters, rule)
         except RseaError:
             continue
         if tried is not None and (best is None or tried.cost < best.cost):
@@ -76,13 +76,16 @@ def is_mode(effect: Effect) -> bool:
     return any(p.name == "damping_ratio" for p in effect.parameters)
 
 
-def _with_new_derivatives(present: Solution, effect: Effect, guess: dict[str, float]) -> ScreenedEffect:
-    solution = solve(*extended(present.problem, present.theta, effect, guess), iterations=_STEPS)
+def _with_new_derivatives(
+    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
+) -> ScreenedEffect:
+    problem, theta = extended(present.problem, present.theta, effect, guess)
+    solution = solve(problem, theta, iterations=rule.screening_steps)
     return ScreenedEffect(effect, solution.problem, solution.theta, solution.cost)
 
 
 def _with_present_derivatives(
-    present: Solution, effect: Effect, guess: dict[str, float]
+    present: Solution, effect: Effect, guess: dict[str, float], rule: ForwardSettings
 ) -> ScreenedEffect | None:
     """Return where two steps lead; None for an effect that shows in no channel, or that runs away."""
     problem, theta = extended(present.problem, present.theta, effect, guess)
@@ -94,8 +97,8 @@ def _with_present_derivatives(
         return None
     step = _Step(problem, np.column_stack([present.jacobian, columns]))
     best = ScreenedEffect(effect, problem, theta, step.cost(theta, residual))
-    for _ in range(_STEPS):
-        better = step.taken(best, residual)
+    for _ in range(rule.screening_steps):
+        better = step.taken(best, residual, (1.0, rule.screening_part))
         if better is None:
             break
         best, residual = better
@@ -116,14 +119,16 @@ class _Step:
         """Return the squared residual and what leaving the priors costs."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
-    def taken(self, at: ScreenedEffect, residual: FloatArray) -> tuple[ScreenedEffect, FloatArray] | None:
-        """Return where a step leads and the residual there; None where neither it nor a part of it helps."""
-        slope = self._matrix.T @ residual + self._prior**2 * (at.theta - self._centre)
-        aim = bounded_step(self._problem, at.theta, self._normal, slope)
-        for share in _SHARES:
-            theta = at.theta + share * (aim - at.theta)
-            left = self._problem.residual(theta)
-            cost = self.cost(theta, left)
-            if cost < at.cost:
-                return replace(at, theta=theta, cost=cost), left
+    def taken(
+        self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
+    ) -> tuple[ScreenedEffect, FloatArray] | None:
+        """Return where a step, or a share of it, leads and the residual there; None where none helps."""
+        slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
+        aim = bounded_step(self._problem, start.theta, self._normal, slope)
+        for share in shares:
+            theta = start.theta + share * (aim - start.theta)
+            stepped = self._problem.residual(theta)
+            cost = self.cost(theta, stepped)
+            if cost < start.cost:
+                return replace(start, theta=theta, cost=cost), stepped
         return None

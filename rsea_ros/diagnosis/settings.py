@@ -1,7 +1,7 @@
 """Every number that steers a verdict: its meaning, its unit, and why it has this value.
 
-The numbers of noise and data stand where they are used: identification/noise.py, noise_level.py and
-coloured.py for the noise of a channel, checks/ for faulty samples, data_split.py for the blocks.
+The numbers of noise and data stand where they are used, each with its reason, and no setting moves them:
+identification/noise.py, noise_level.py and coloured.py (noise of a channel), checks/ (faulty samples).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from rsea_ros.errors import ParameterError
 T = TypeVar("T")
 MOST_CAUSES = 4
 _CHOSEN = "chosen on the benchmark; bench/settings_curve.py shows the outcomes over it"
+_CALIBRATED = "fixed when coefficients.py was fitted: after a change, `bench/calibration.py fit`"
 
 
 class Setting(NamedTuple):
@@ -31,6 +32,38 @@ def number(value: T, unit: str, meaning: str, reason: str = _CHOSEN) -> T:
     """Declare a setting of a group with its meaning, unit and reason."""
     described = {"unit": unit, "meaning": meaning, "reason": reason}
     return field(default=value, metadata=described)
+
+
+@dataclass(frozen=True)
+class BlockSettings:
+    """The blocks of a record, and the coherence over them that shows a missed response (coherence.py)."""
+
+    longest: float = number(
+        1.0, "s", "length of a block", "longer than a bench remembers: blocks are independent of each other"
+    )
+    shortest: float = number(
+        0.25, "s", "length of a block below which short records have fewer blocks",
+        "every part of a short sweep is in training, validation and test",
+    )  # fmt: skip
+    enough: int = number(
+        120, "1", "blocks; a record with fewer of the longest is cut into shorter ones",
+        "a quarter of them, 30, test: enough for a bootstrap over blocks",
+    )  # fmt: skip
+    false_alarm: float = number(
+        0.01, "1", "probability that noise alone passes for a missed response in any line of a record",
+        "sets the least coherence^2 by the number of blocks (Carter 1987)",
+    )  # fmt: skip
+    response_clear: float = number(
+        0.3, "1", "coherence^2 of residual and command above which a response is missed, however small",
+        "with 16 blocks noise alone reaches 0.26 in one line of a hundred",
+    )  # fmt: skip
+    response_share: float = number(
+        0.1, "1", "share of the simulated response up to which an error of it is the simulation's own"
+    )
+    response_blocks: int = number(
+        16, "1", "blocks without faulty samples below which no response counts as missed",
+        "of fewer, noise alone is as coherent as a response",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -131,10 +164,34 @@ class ForwardSettings:
     alike: float = number(0.02, "1", "of the loss: a rival so close is refused for its size, not its fit")
     paired: int = number(3, "1", "effects with which pairs begin, and partners that each is tried with")
     paired_fits: int = number(2, "1", "pairs that are fitted to all training blocks")
+    screening_steps: int = number(2, "1", "Gauss-Newton steps of an effect's screening, with old derivatives")
+    screening_part: float = number(
+        0.3, "1", "share of such a step that is tried where the whole one does not lower the cost"
+    )
     causes_beside_a_pair: int = number(
         1, "1", "causes beside which pairs are tried", "beside more, pairs bend to whatever is left"
     )
     replacements: int = number(2, "1", "steps that may replace a cause, beside those that add one")
+
+
+@dataclass(frozen=True)
+class EvidenceSettings:
+    """What the probability of a cause is computed from (naming/), and which rivals it has."""
+
+    parts: int = number(4, "1", "parts of amplitude and of time, for the shape of a law", _CALIBRATED)
+    bands: int = number(6, "1", "frequency bands, for the shape of a law", _CALIBRATED)
+    least_spread: float = number(
+        3e-3, "1", "spread of lambda that two right simulations of one law have", _CALIBRATED
+    )
+    most_spread: float = number(3.0, "1", "spread of lambda from which more says no more", _CALIBRATED)
+    surest: float = number(
+        4.0, "1", "log odds among rivals from which more says no more: all of them may be wrong", _CALIBRATED
+    )
+    least_weight: float = number(
+        0.02, "1", "weight among all that was tried in a cause's place, from which an effect is a rival",
+        _CALIBRATED,
+    )  # fmt: skip
+    most_rivals: int = number(3, "1", "rivals of a cause that are weighed", _CALIBRATED)
 
 
 @dataclass(frozen=True)
@@ -164,6 +221,46 @@ class NamingSettings:
 
 
 @dataclass(frozen=True)
+class SizeSettings:
+    """The interval of a cause's size, and the channel of which its gain speaks."""
+
+    model_error: float = number(
+        0.0025, "1", "relative error of the simulation itself in every size, one sigma",
+        "measured between the simulation and the second bench in test/independent",
+    )  # fmt: skip
+    fall: float = number(
+        1.02, "1", "ratio by which a channel's residual must fall for the gain to speak of that channel",
+        "less is within what acceptance.matters calls nothing",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NextRunSettings:
+    """The run that is recommended where these data do not decide."""
+
+    duration: float = number(
+        12.0, "s", "of a run that separates a cause from its rivals", "three periods of 4 s"
+    )
+    separation: float = number(
+        0.5, "1", "RMS of what a rival cannot follow, over the noise, that separates it",
+        "the 3360 samples of 12 s at 280 Hz then lie 10 standard deviations above noise",
+    )  # fmt: skip
+    series_duration: float = number(
+        60.0, "s", "of a run at another amplitude", "as long as a usual record"
+    )
+    series_top: float = number(
+        60.0, "Hz", "upper end of its band", "above it the driver's limit of the slew leaves little amplitude"
+    )
+    visible: float = number(
+        1.1, "1", "residual over the noise from which it is seen at that amplitude", "as floor.reached"
+    )
+    nearly: float = number(
+        0.8, "1", "part of the wanted amplitude that the limits must leave",
+        "with less the two amplitudes are too alike to compare",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class DiagnosisSettings:
     """What a diagnosis tries, and every number that steers its verdict.
 
@@ -175,12 +272,16 @@ class DiagnosisSettings:
 
     max_causes: int = MOST_CAUSES
     without: tuple[str, ...] = ()
+    blocks: BlockSettings = BlockSettings()
     floor: FloorSettings = FloorSettings()
     acceptance: AcceptanceSettings = AcceptanceSettings()
     fits: FitSettings = FitSettings()
     pieces: PieceSettings = PieceSettings()
     forward: ForwardSettings = ForwardSettings()
+    evidence: EvidenceSettings = EvidenceSettings()
     naming: NamingSettings = NamingSettings()
+    sizes: SizeSettings = SizeSettings()
+    next_run: NextRunSettings = NextRunSettings()
 
     def __post_init__(self) -> None:
         if self.max_causes < 1:
@@ -189,7 +290,7 @@ class DiagnosisSettings:
 
     def listed(self) -> Iterator[Setting]:
         """Yield every number of the groups with its meaning, unit and reason."""
-        for group in ("floor", "acceptance", "fits", "pieces", "forward", "naming"):
+        for group in (f.name for f in fields(self) if f.name not in ("max_causes", "without")):
             values = getattr(self, group)
             for f in fields(values):
                 yield Setting(f"{group}.{f.name}", getattr(values, f.name), **f.metadata)

@@ -59,7 +59,7 @@ class StepFits:
     def on_pieces(self) -> Solution:
         """The present model fitted to short pieces, with clocks taken as right."""
         runs = zip(self.present.cases, self.present.outputs, strict=True)
-        pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings.pieces))
+        pieces = (p for case, out in runs for p in short_pieces_of(case, out, self.settings))
         cases = tuple(with_misfit_as_noise(p, self.present.validation.ratios) for p in pieces)
         solution = self.present.solution
         problem, theta = without_clocks(replace(solution.problem, cases=cases), solution.theta)
@@ -83,7 +83,7 @@ class StepFits:
 
         def tried(i: int) -> ScreenedEffect | None:
             self.say(effects[i].name, 0.4 * i / len(effects))
-            return screen(solution, effects[i], guesses[effects[i].name])
+            return screen(solution, effects[i], guesses[effects[i].name], self.settings.forward)
 
         screened = self.pools.fits.map(tried, range(len(effects)))
         return sorted((s for s in screened if s is not None), key=lambda s: s.cost)
@@ -119,7 +119,7 @@ class StepFits:
         base, most = self.on_pieces, self.settings.forward.hope_on_angle
         on_angle = replace(base, problem=replace(base.problem, ride=True))
         effects = [e for e in self.effects if ROTOR_ANGLE in e.reads and e.name not in base.problem.acting]
-        screened = (screen(on_angle, e, self.guesses[e.name]) for e in effects)
+        screened = (screen(on_angle, e, self.guesses[e.name], self.settings.forward) for e in effects)
         fitted = [self._fit_pieces(s) for s in screened if s is not None]
         models = [self._fit_all(s) for s in fitted if s.cost < most * base.cost]
         return [m for m in models if not is_far_from_floor(m, self.settings)]
@@ -139,7 +139,7 @@ class StepFits:
         self.say(f"fitting {screened.name} on everything", 0.8)
         present, fits = self.present, self.settings.fits
         setup = FitSetup(
-            present.cases, fits, self.pools.run, present.validation, iterations=fits.full_iterations,
+            present.cases, self.settings, self.pools.run, present.validation, iterations=fits.full_iterations,
             is_quick=self.is_far,
         )  # fmt: skip
         problem, theta = self.complete(screened)
@@ -158,7 +158,8 @@ class StepFits:
         """Tell whether an effect as it was fitted to the pieces does better on the validation blocks."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
-        scores = [score_on(problem, self.present.cases, VALIDATION, simulated) for simulated in outputs]
+        cases, blocks = self.present.cases, self.settings.blocks
+        scores = [score_on(problem, cases, VALIDATION, simulated, blocks) for simulated in outputs]
         extra, rule = len(theta) - self.present.parameters, self.settings.acceptance
         return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
 

@@ -50,13 +50,13 @@ def select_stepwise(
 
     start: a rig whose values the first fit begins with.
     """
-    setup = FitSetup(nominal.cases, settings.fits, pools.run)
+    setup = FitSetup(nominal.cases, settings, pools.run)
     models = [_fitted_nominal(nominal, setup, start)]
     trials: list[Trial] = []
     rivals: dict[str, tuple[Candidate, ...]] = {}
     for number in range(settings.max_causes + settings.forward.replacements):
         present = models[-1]
-        if _is_finished(present, settings):
+        if _is_finished(present):
             break
         forward = ForwardStep(present, effects, number, pools, tell, settings)
         step = forward.run() if len(present.causes) < settings.max_causes else NO_STEP
@@ -81,7 +81,7 @@ def replacement_step(step: ForwardStep) -> StepResult:
         if not rivals:
             continue
         setup = FitSetup(
-            present.cases, settings.fits, step.pools.run, weights=present.validation, is_quick=True
+            present.cases, settings, step.pools.run, weights=present.validation, is_quick=True
         )
         rest = fit_candidate(setup, *without_effect(present.problem, present.solution.theta, name))
         result = replace(step, present=rest, effects=rivals).run()
@@ -93,11 +93,11 @@ def replacement_step(step: ForwardStep) -> StepResult:
 def _fitted_nominal(nominal: Problem, setup: FitSetup, start: Rig | None) -> Candidate:
     """Fit the nominal model, and again with the noise that its residual shows."""
     theta = vector_of(nominal.unknowns, start) if start else None
-    first = fit_candidate(replace(setup, iterations=setup.limits.first_iterations), nominal, theta)
+    first = fit_candidate(replace(setup, iterations=setup.settings.fits.first_iterations), nominal, theta)
     return refit(with_noise_reestimated(first), setup)
 
 
-def _is_finished(model: Candidate, settings: DiagnosisSettings) -> bool:
+def _is_finished(model: Candidate) -> bool:
     """Tell whether only noise is left; coloured noise may hide a cause that a fit still finds."""
     is_coloured = any(case.coloured for case in model.cases)
-    return leaves_only_noise(model, settings.floor.only_noise) and not is_coloured
+    return leaves_only_noise(model, model.settings.floor.only_noise) and not is_coloured

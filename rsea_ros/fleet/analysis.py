@@ -27,8 +27,8 @@ from rsea_ros.model.extent import bounded
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_file import rig_text
-from rsea_ros.report.identification.files import json_text
 from rsea_ros.report.identification.json import identification_json
+from rsea_ros.report.json_values import json_text
 from rsea_ros.signals import UNITS, Fault, Record
 
 _MAIN = ("ft", "deflection", "position", "velocity")

@@ -20,13 +20,13 @@ from rsea_ros.signals import Channel, FloatArray, Record
 _TINY = 1e-300
 TOP_OF_BAND = (0.62, 0.98)
 """Of the Nyquist frequency: where the noise is read off."""
-_FLAT = 2.0
+FLAT = 2.0
 """Ratio of the powers of the two halves of the top of the band, up to which it counts as flat."""
 _LONGEST, _SEGMENTS = 512, 8
 _FEWEST = 64
-_SLOWER = 0.9
+SLOWER = 0.9
 """Of the command's rate: below it a channel is slower than the command."""
-_FILTERED = 0.1
+FILTERED = 0.1
 """Of the noise that a rig states: less at the top of the band is a filter's work, not a better sensor's."""
 _ROUNDING = 1e-9
 """Of a channel's standard deviation: less than this is rounding, not noise."""
@@ -42,7 +42,7 @@ def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
     stated = math.hypot(sensor.noise, sensor.quantum / math.sqrt(12.0))
     if len(y) < _FEWEST:
         return max(float(np.std(np.diff(y, 2))) / math.sqrt(6.0) if len(y) > 3 else 0.0, stated, least)
-    if stated > 0.0 and record[name].rate < _SLOWER * record["command"].rate:
+    if stated > 0.0 and record[name].rate < SLOWER * record["command"].rate:
         return max(stated, least)
     unlike = _unlike(record["command"], t, y)
     level = math.sqrt(float(np.median(unlike[_top(unlike)])))
@@ -57,7 +57,7 @@ def least_noise(values: FloatArray, sensor: Sensor) -> float:
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0
-    stated = max(0.5 * sensor.quantum, _FILTERED * sensor.noise)
+    stated = max(0.5 * sensor.quantum, FILTERED * sensor.noise)
     return max(stated, coarse, _ROUNDING * float(np.std(values)), _TINY)
 
 
@@ -83,7 +83,7 @@ def _is_flat(power: FloatArray) -> bool:
     if len(top) < 2:
         return False
     lower, upper = (float(np.median(half)) for half in np.array_split(top, 2))
-    return max(lower, upper) <= _FLAT * max(min(lower, upper), _TINY)
+    return max(lower, upper) <= FLAT * max(min(lower, upper), _TINY)
 
 
 def _top(lines: FloatArray) -> slice:

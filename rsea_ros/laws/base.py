@@ -11,6 +11,7 @@ from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, part
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.identify import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.problem import Case, Problem
@@ -39,7 +40,7 @@ class Base:
 
     def score(self, sets: tuple[int, ...]) -> Score:
         """Return the base's score on some sets of blocks."""
-        return score_on(self.problem, self.cases, sets, self.outputs)
+        return score_on(self.problem, self.cases, sets, self.outputs, DEFAULT.blocks)
 
 
 def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
@@ -50,7 +51,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
     checked = [replace(c, record=r) for c, r in zip(checked, steady.records, strict=True)]
     problem = nominal_problem(checked, rig)
-    parts = [part(c, FITTED) for c in problem.cases]
+    parts = [part(c, FITTED, DEFAULT.blocks) for c in problem.cases]
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None
     solution, known, _ = fit(parts, rig, start=start)
     cases = tuple(replace(c, noise=_finer(c, k)) for c, k in zip(problem.cases, known, strict=True))
@@ -66,6 +67,6 @@ def levels_of(
     problem: Problem, outputs: Sequence[dict[str, FloatArray]], cases: Sequence[Case]
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Return the RMS of each channel's residual on the test blocks, and its noise."""
-    score = score_on(problem, cases, TEST, list(outputs))
+    score = score_on(problem, cases, TEST, list(outputs), DEFAULT.blocks)
     noise = {n: float(np.mean([c.noise[n] for c in cases if n in c.noise])) for n in score.sums}
     return {n: score.ratio(n) * noise[n] for n in score.sums}, noise

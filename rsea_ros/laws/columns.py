@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from rsea_ros.diagnosis.data_split import blocks_of, set_of
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import jacobian
 from rsea_ros.identification.unknowns import apply
@@ -130,7 +131,7 @@ def rows_of(problem: Problem, theta: FloatArray) -> Rows:
     groups = []
     for i, n in masks:
         case = problem.cases[i]
-        block = blocks_of(case, n)[case.mask[n]]
+        block = blocks_of(case, n, DEFAULT.blocks)[case.mask[n]]
         count = max(int(block.max(initial=0)) + 1, 1)
         groups.append(set_of(block) * GROUPS + np.minimum(block * GROUPS // count, GROUPS - 1))
     sizes = [int(np.count_nonzero(problem.cases[i].mask[n])) for i, n in masks]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from rsea_ros.diagnosis.data_split import TEST
-from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on
+from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.effect import Effect
 from rsea_ros.laws.base import FITTED, Base
 from rsea_ros.laws.file import Draft
@@ -75,7 +75,7 @@ def _least(drafts: Sequence[Draft], refined: Refined, held: frozenset[str]) -> f
 def _score(base: Base, refined: Refined, sets: tuple[int, ...]) -> Score:
     """Return the score of refined laws on some sets of blocks."""
     problem = replace(refined.solution.problem, cases=base.cases)
-    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta))
+    return score_on(problem, base.cases, sets, problem.outputs(refined.solution.theta), DEFAULT.blocks)
 
 
 def gain_on_tests(base: Base, refined: Refined) -> tuple[float, tuple[float, float]]:
@@ -85,11 +85,7 @@ def gain_on_tests(base: Base, refined: Refined) -> tuple[float, tuple[float, flo
 
 def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]:
     """Return 1 - RMS(with) / RMS(without) of all channels together, and its 95 % bootstrap interval."""
-    a, b = with_it.loss(without), without.loss(without)
-    draws = np.random.default_rng(0).integers(0, len(a), (RESAMPLES, len(a)))
-    resampled = 1.0 - np.sqrt(a[draws].sum(axis=1) / np.maximum(b[draws].sum(axis=1), 1e-300))
-    low, high = np.quantile(resampled, [0.025, 0.975])
-    return 1.0 - float(np.sqrt(a.sum() / max(b.sum(), 1e-300))), (float(low), float(high))
+    return gain_of_blocks(with_it.loss(without), without.loss(without))
 
 
 def share_of(before: dict[str, float], after: dict[str, float], noise: dict[str, float]) -> float:

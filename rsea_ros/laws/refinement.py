@@ -13,6 +13,7 @@ import numpy as np
 from rsea_ros.diagnosis.data_split import TRAIN, VALIDATION
 from rsea_ros.diagnosis.problem_variants import on_blocks
 from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import lent
 from rsea_ros.effects.effect import Effect
 from rsea_ros.files import write_new
@@ -76,7 +77,7 @@ def refine(
     creeps = {f"{e.name}.creep_velocity" for e, _ in laws}
     problem = with_laws(base.problem, laws, frozenset(creeps) | held)
     start = np.concatenate([base.theta, start_vector(problem.unknowns[len(base.theta) :])])
-    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights.ratios)
+    blocks = on_blocks(problem, cases, (*TRAIN, *VALIDATION), weights.ratios, DEFAULT.blocks)
     solution = solve(blocks, start, iterations=_ITERATIONS, gain=1e-4)
     confidence = confidence_of(solution)
     sd = np.sqrt(np.diag(confidence.covariance))

@@ -37,6 +37,13 @@ class Diagnosed:
         return self.result.verdict
 
     @property
+    def sentence(self) -> str:
+        """The verdict in a sentence, as in diagnosis.json."""
+        from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
+
+        return diagnosis_sentence(self.result)
+
+    @property
     def causes(self) -> tuple[Cause, ...]:
         """The causes in the order in which they were accepted.
 

@@ -12,7 +12,6 @@ from numpy.polynomial import polynomial
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.model.outputs import Sees
-from rsea_ros.model.paper_formulas import PAPER_FACTOR, eq_7_bandwidth
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import spin_inertia
 from rsea_ros.model.transfer import Fraction, distal_over_proximal, distal_per_proximal
@@ -21,11 +20,19 @@ from rsea_ros.signals import FloatArray
 if TYPE_CHECKING:
     from control import TransferFunction
 
-pure_torque_bandwidth = eq_7_bandwidth
-"""Eq. (7): Hz from K_s (N m/rad) and J_sc (kg m^2)."""
+PAPER_FACTOR = 0.292
+"""The factor printed in Eq. (7); 1 - 10^(-3/20) = 0.29205 rounds to it."""
 
 FALL_FACTOR = 10.0 ** (3.0 / 20.0) - 1.0
 """0.41254, in the place of Eq. (7)'s 0.292 where J_inner is negative: 1 / (1 + 0.41254) is -3 dB."""
+
+
+def pure_torque_bandwidth(k_s: float, j_sc: float, factor: float = PAPER_FACTOR) -> float:
+    """Return sqrt(0.292 K_s / J_sc) / (2 pi), Hz: up to it a pure torque source. Paper, Eq. (7).
+
+    k_s: N m/rad. j_sc: kg m^2.
+    """
+    return math.sqrt(factor * k_s / j_sc) / (2.0 * math.pi)
 
 
 def inner_inertia(rig: Rig) -> float:

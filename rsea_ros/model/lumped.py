@@ -5,7 +5,7 @@ and the motor for a torque between ground and chassis: the housing's motion is l
 clamped this changes T_p, Eqs. (2) and (3), and nothing in T_d, Eq. (1).
 
 A rig with `train: lumped` and a free housing grounds the rotor only; its loads move. Fig. 18 can be read
-either way (paper_moving.readings).
+either way (paper/figure_18.py).
 """
 
 from dataclasses import replace

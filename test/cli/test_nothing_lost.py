@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import rsea_ros.files as files
+import rsea_ros.replaced as replaced
 from msg_adapters import read_record, write_record
 from rsea_ros.checks import usable
 from rsea_ros.cli import paper
@@ -137,6 +138,7 @@ def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> I
         disk = Disk(n, misfire)
         with monkeypatch.context() as patch:
             patch.setattr(files, "os", disk)
+            patch.setattr(replaced, "os", disk)
             status = main(words)
         yield status
         if disk.left > 0:

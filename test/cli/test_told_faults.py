@@ -47,7 +47,7 @@ def test_the_check_before_a_diagnosis_tells(bag):
     from rsea_ros.checks.faults import check
     from rsea_ros.cli.diagnose import readable
     from rsea_ros.model.rig_file import load_rig
-    from rsea_ros.report.identification.json import fault_json
+    from rsea_ros.report.json_values import fault_json
 
     checked = check(readable(str(bag), TopicMap()), load_rig("paper_high_impedance"))
     _assert_told([fault_json(fault) for fault in checked.faults])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from rsea_ros.design import mechanism
-from rsea_ros.design.bands import bands
 from rsea_ros.design.by_train import band_range, by_train
 from rsea_ros.design.catalogue import catalogue, unit_named
 from rsea_ros.design.judge import judge, least_stiffness, rig_of, stiffness_bounds
@@ -18,9 +17,10 @@ from rsea_ros.design.requirement import Requirement, gyration
 from rsea_ros.errors import ParameterError
 from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia, undamped_band
-from rsea_ros.model.paper_formulas import eq_8_spring_torque, eq_9_spring_stiffness
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.bands import bands
+from rsea_ros.paper.formulas import eq_8_spring_torque, eq_9_spring_stiffness
 
 PAPER = Requirement()
 UNIT = unit_named("rd85x13-hd_cpl-25a-160")

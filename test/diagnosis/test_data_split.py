@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, set_of
+from rsea_ros.diagnosis.data_split import TEST, TRAIN, VALIDATION, block_length, set_of
+from rsea_ros.diagnosis.settings import BlockSettings
 
 BLOCKS = np.arange(400)
 
@@ -24,3 +27,18 @@ def test_the_blocks_of_a_fit_are_neighbours():
 def test_every_phase_of_an_excitation_that_repeats_is_in_every_set(period):
     for sets in (TRAIN, VALIDATION, TEST):
         assert set(BLOCKS[np.isin(set_of(BLOCKS), sets)] % period) == set(range(period))
+
+
+@pytest.mark.parametrize(
+    ("duration", "rule", "length"),
+    [
+        (160.0, BlockSettings(), 1.0),
+        (60.0, BlockSettings(), 0.5),
+        (8.0, BlockSettings(), 0.25),
+        (160.0, BlockSettings(longest=0.5), 0.5),
+        (60.0, BlockSettings(enough=60), 1.0),
+        (8.0, BlockSettings(shortest=0.05), 8.0 / 120),
+    ],
+)
+def test_the_length_of_a_block_follows_the_record_and_the_settings(duration, rule, length):
+    assert block_length(SimpleNamespace(duration=duration), rule) == length

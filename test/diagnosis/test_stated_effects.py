@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.diagnosis.diagnose import diagnose
-from rsea_ros.diagnosis.naming import conclusion
+from rsea_ros.diagnosis.naming import outcome
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import catalogue, effect_named
 from rsea_ros.errors import IdentificationError
@@ -60,7 +60,7 @@ def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
 
 def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
     """With the verdict `unexplained` it was in neither list."""
-    monkeypatch.setattr(conclusion, "naming_of", lambda *_: {})
+    monkeypatch.setattr(outcome, "naming_of", lambda *_: {})
     diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())
     dropped = {r.name: r for r in diagnosis.rejected}["backlash"]

@@ -159,6 +159,7 @@ def test_a_diagnosis_names_the_effect_that_was_added(fit, commands, tmp_path):
     assert [cause.name for cause in dx.causes] == ["backlash"]
     assert dx.causes[0].parameters["gap"].value == pytest.approx(4e-3, rel=0.05)
     assert "backlash" in dx.summary().lower() and "backlash" in repr(dx)
+    assert dx.sentence.startswith("Backlash")
     assert [effect.name for effect in dx.rig.effects] == ["backlash"]
     assert dx.write_report(tmp_path / "out").is_file()
     assert len(dx.plot().data) >= 3

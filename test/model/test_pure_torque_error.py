@@ -11,9 +11,9 @@ import pytest
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.bandwidth import end_over_end
 from rsea_ros.model.observer import Estimate
-from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS
 from rsea_ros.model.pure_torque_error import BEYOND, NOTHING, PURE, ErrorFlag, ErrorSettings, edge_of
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 
 RATE = 1000.0
 PLATFORM, KNEE = load_rig("paper_high_impedance"), load_rig("prototype_knee")

@@ -8,16 +8,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rsea_ros.model import bandwidth, outputs, paper_formulas, spring
+from rsea_ros.model import bandwidth, outputs, spring
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper import formulas
 
 K_S, J_SC, B_S, J_M, B_M = 1530.456, 0.0040, 3.0, 0.953, 23.088
 K_S_PROTOTYPE, J_SC_PROTOTYPE = 260.0, 6.169e-4
-J_EFF, B_EFF = paper_formulas.eq_10_inertia_and_damping(K_S)
-EQ_6 = paper_formulas.eq_6_distal_per_proximal(K_S, J_SC, B_S)
-C_0, C_1, C_2 = paper_formulas.EQ_10
+J_EFF, B_EFF = formulas.eq_10_inertia_and_damping(K_S)
+EQ_6 = formulas.eq_6_distal_per_proximal(K_S, J_SC, B_S)
+C_0, C_1, C_2 = formulas.EQ_10
 MOVING = load_rig("paper_moving_output")
 FT = "spring_end"
 
@@ -48,8 +49,8 @@ TABLE = [
     ("damping ratio of Table 2", (B_M + B_S) / (2 * math.sqrt(K_S * (J_M + J_SC))), 0.341, 5e-4),
     ("Eq. (7), platform, Hz", bandwidth.pure_torque_bandwidth(K_S, J_SC), 53.20, 5e-3),
     ("Eq. (7), prototype, Hz", bandwidth.pure_torque_bandwidth(K_S_PROTOTYPE, J_SC_PROTOTYPE), 55.83, 5e-3),
-    ("factor of Eq. (7), +3 dB for sqrt(2)", paper_formulas.EXACT_FACTOR, 0.29289, 5e-6),
-    ("factor of Eq. (7) as printed, +3 dB", 1 - 10 ** (-3 / 20), paper_formulas.PAPER_FACTOR, 5e-4),
+    ("factor of Eq. (7), +3 dB for sqrt(2)", formulas.EXACT_FACTOR, 0.29289, 5e-6),
+    ("factor of Eq. (7) as printed, +3 dB", 1 - 10 ** (-3 / 20), bandwidth.PAPER_FACTOR, 5e-4),
     ("Eq. (6), peak, dB", bandwidth.resonance_peak(EQ_6)[1], 0.316, 5e-4),
     ("Eq. (6), peak, Hz", bandwidth.resonance_peak(EQ_6)[0], 50.7, 5e-2),
     ("Eq. (6), -3 dB, Hz", bandwidth.flat_band(EQ_6, 3.0), 112.1, 5e-2),

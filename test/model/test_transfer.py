@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from random_rigs import RIG_NAMES, WITH_SPRING, rigs
 
 from rsea_ros.errors import RigError
-from rsea_ros.model import outputs, paper_formulas, transfer
+from rsea_ros.model import outputs, transfer
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import PORTS
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper import formulas
 
 HZ = np.geomspace(0.05, 300.0, 60)
 S = 2j * np.pi * HZ
@@ -72,10 +73,10 @@ def test_a_free_end_moves_by_the_torque_on_it(rig):
 def test_high_impedance_is_the_paper_but_for_the_rotors_spin():
     rig = load_rig("paper_high_impedance")
     j = inner_inertia(rig)
-    eq_5 = paper_formulas.eq_5_proximal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, j, B_S)
+    eq_5 = formulas.eq_5_proximal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, j, B_S)
     agree(
         transfer.distal_per_motor(rig, "element")(S),
-        paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S),
+        formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S),
     )
     agree(
         transfer.proximal_per_motor(rig)(S) * (J_EFF * S**2 + B_EFF * S + K_S),
@@ -83,13 +84,13 @@ def test_high_impedance_is_the_paper_but_for_the_rotors_spin():
     )
     agree(
         transfer.distal_per_proximal(rig, "element")(S),
-        paper_formulas.eq_6_distal_per_proximal(K_S, j, B_S)(S),
+        formulas.eq_6_distal_per_proximal(K_S, j, B_S)(S),
     )
 
 
 def test_eq_4_with_rotor_side_values_is_eq_1():
-    eq_4 = paper_formulas.eq_4_distal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, J_SC, B_S)
-    agree(eq_4(S), paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S))
+    eq_4 = formulas.eq_4_distal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, J_SC, B_S)
+    agree(eq_4(S), formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF)(S))
 
 
 @pytest.mark.parametrize("train", ["planetary", "star"])
@@ -99,7 +100,7 @@ def test_the_paper_is_the_limit_of_a_large_ratio(train):
     errors = []
     for ratio in (50.0, 500.0, 5000.0, 50000.0):
         exact = transfer.proximal_per_motor(base.with_values({"gear.ratio": ratio}))(S)
-        eq_5 = paper_formulas.eq_5_proximal_per_motor(
+        eq_5 = formulas.eq_5_proximal_per_motor(
             K_S, 0.953 / ratio**2, 23.088 / ratio**2, ratio, J_SC, B_S
         )
         errors.append(np.abs(exact - eq_5(S)).max())
@@ -126,15 +127,15 @@ def test_lumped_model_is_eqs_1_to_3():
     for ours, printed in (
         (
             transfer.distal_per_motor(rig, "element"),
-            paper_formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF),
+            formulas.eq_1_lumped_distal_per_motor(K_S, J_EFF, B_EFF),
         ),
         (
             transfer.proximal_per_motor(rig),
-            paper_formulas.eq_2_lumped_proximal_per_motor(K_S, J_EFF, B_EFF, B_S),
+            formulas.eq_2_lumped_proximal_per_motor(K_S, J_EFF, B_EFF, B_S),
         ),
         (
             transfer.distal_per_proximal(rig, "element"),
-            paper_formulas.eq_3_lumped_distal_per_proximal(K_S, J_EFF, B_S),
+            formulas.eq_3_lumped_distal_per_proximal(K_S, J_EFF, B_S),
         ),
     ):
         agree(ours(S), printed(S))

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated
+from rsea_ros.diagnosis.naming.rivals import beside_score, trial_score
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
-from rsea_ros.diagnosis.score import gain, score_on
+from rsea_ros.diagnosis.score import Score, gain
 from rsea_ros.diagnosis.selection import Selection, Trial
+from rsea_ros.diagnosis.settings import SizeSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.identify import parameters_of
@@ -23,47 +23,46 @@ from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
 
-MODEL_DOUBT = 0.0025
-"""Relative, one sigma: measured between the simulation and the second bench in test/independent."""
-_FALLS = 1.02
-"""Ratio by which a channel's residual must fall for a cause's gain to speak of that channel."""
 PLAY = "backlash"
 _GAP = f"{PLAY}.gap"
 
 
 def cause_of(
-    selection: Selection,
-    without: Evaluated,
-    with_it: Evaluated,
-    last: Evaluated,
-    channel: str,
-    said: Named,
+    step: tuple[Evaluated, Evaluated], last: Evaluated, channel: str, named: Named, rule: SizeSettings
 ) -> Cause:
-    """Return an accepted cause: its parameters beside all causes, its gain on the test blocks."""
-    effect = effect_named(with_it.added)
-    speaks = (
-        channel
-        if without.test.ratio(channel) > _FALLS * with_it.test.ratio(channel)
-        else max(without.test.sums, key=lambda n: without.test.ratio(n) / max(with_it.test.ratio(n), 1e-12))
-    )
-    held_out, interval = gain(with_it.test, without.test, speaks)
-    train, _ = gain(with_it.train, without.train, speaks)
+    """Return an accepted cause: its parameters beside all causes, its gain on the test blocks.
+
+    step: the models without and with it. last: the model with all causes. channel: of which its gain speaks
+    where that falls.
+    """
+    (without, with_it), effect = step, effect_named(step[1].added)
+    channel = _helped(without.test, with_it.test, channel, rule)
+    held_out, interval = gain(with_it.test, without.test, channel)
+    train, _ = gain(with_it.train, without.train, channel)
     return Cause(
         name=effect.name,
-        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence)),
+        parameters=sizes(effect.name, parameters_of(last.solution, last.confidence), rule),
         gain_train=train,
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
-        times_noise=(without.test.ratio(speaks), with_it.test.ratio(speaks)),
+        times_noise=(without.test.ratio(channel), with_it.test.ratio(channel)),
         equation=effect.equation,
-        channel=speaks,
-        confusable_with=tuple(m.newest for m in selection.rivals_of(effect.name)),
-        status=said.status or "leading",
-        probability=said.probability,
+        channel=channel,
+        status=named.status or "leading",
+        probability=named.probability,
     )
 
 
-def alternative_of(instead_of: str, weighed: Weighed, probability: float) -> Alternative:
+def _helped(without: Score, with_it: Score, channel: str, rule: SizeSettings) -> str:
+    """Return a channel if its residual falls, else the one whose residual falls most."""
+    if without.ratio(channel) > rule.fall * with_it.ratio(channel):
+        return channel
+    return max(without.sums, key=lambda n: without.ratio(n) / max(with_it.ratio(n), 1e-12))
+
+
+def alternative_of(
+    instead_of: str, weighed: Weighed, probability: float, rule: SizeSettings
+) -> Alternative:
     """Return a rival of a cause with its size where it acts in that cause's place."""
     claim, evidence = weighed.claim, weighed.evidence
     solution = solve(claim.problem, claim.theta, iterations=0)
@@ -71,7 +70,7 @@ def alternative_of(instead_of: str, weighed: Weighed, probability: float) -> Alt
     return Alternative(
         name=claim.name,
         instead_of=instead_of,
-        parameters=sizes(claim.name, parameters_of(solution, confidence_of(solution))),
+        parameters=sizes(claim.name, parameters_of(solution, confidence_of(solution)), rule),
         gain_holdout=held_out,
         gain_holdout_ci95=interval,
         channel=evidence.channel,
@@ -79,20 +78,20 @@ def alternative_of(instead_of: str, weighed: Weighed, probability: float) -> Alt
     )
 
 
-def sizes(effect: str, estimates: Sequence[ParameterEstimate]) -> dict[str, Estimate]:
+def sizes(effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSettings) -> dict[str, Estimate]:
     """Return the parameters of an effect among estimates, by their names without the effect's."""
     parameters = [p for p in estimates if p.name.startswith(effect + ".")]
-    return {p.name.split(".")[1]: with_model_uncertainty(p) for p in parameters}
+    return {p.name.split(".")[1]: with_model_uncertainty(p, rule) for p in parameters}
 
 
-def with_model_uncertainty(estimate: ParameterEstimate) -> Estimate:
+def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> Estimate:
     """Return an estimate whose interval also holds what no residual shows.
 
-    The fit's interval speaks of noise alone. Two right simulations of one bench differ by about MODEL_DOUBT
+    The fit's interval speaks of noise alone. Two right simulations of one bench differ by about `model_error`
     in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
     the sensors' clocks. The interval of the noise alone stands beside the whole one.
     """
-    value, sd = estimate.value, MODEL_DOUBT * abs(estimate.value)
+    value, sd = estimate.value, rule.model_error * abs(estimate.value)
     if estimate.unit == "s":
         sd = float(np.hypot(sd, CLOCK_DOUBT))
     low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
@@ -110,23 +109,21 @@ def latest(trials: Sequence[Trial]) -> list[Trial]:
 
 def rejected_of(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
     """Return a trial with its gain, on the test blocks over the model that it was tried beside."""
-    problem = replace(trial.problem, cases=cases)
-    with_it = score_on(problem, cases, TEST, problem.outputs(trial.theta))
-    without = score_on(problem, cases, TEST, trial.beside.outputs)
+    with_it, without = trial_score(trial, cases), beside_score(trial, cases)
     size = gain(with_it, without, channel)[0]
     return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 
 def dropped_of(
-    without: Evaluated, with_it: Evaluated, said: Mapping[str, Named], channel: str
+    without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str
 ) -> Rejected:
     """Return an effect that was accepted and may not be named, with the gain of what it helps most."""
-    weighed = said.get(with_it.added)
-    if weighed is None:
+    named = naming.get(with_it.added)
+    if named is None:
         return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
-    evidence = weighed.cause.evidence
+    evidence = named.cause.evidence
     reason: Reason = "improbable" if evidence.is_sure else "leaves_too_much"
-    return Rejected(with_it.added, evidence.gain, reason, probability=weighed.probability)
+    return Rejected(with_it.added, evidence.gain, reason, probability=named.probability)
 
 
 def undetermined_play(

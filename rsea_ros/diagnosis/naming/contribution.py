@@ -10,6 +10,7 @@ import numpy as np
 from rsea_ros.diagnosis.data_split import TEST, blocks_of, set_of
 from rsea_ros.diagnosis.problem_variants import with_misfit_as_noise, without_effect
 from rsea_ros.diagnosis.score import Score
+from rsea_ros.diagnosis.settings import BlockSettings
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
@@ -37,7 +38,9 @@ def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Prob
     return replace(problem, cases=tuple(with_misfit_as_noise(c, weights.ratios) for c in cases))
 
 
-def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -> Rows | None:
+def rows_of(
+    problem: Problem, theta: FloatArray, name: str, rule: BlockSettings, run: Map = serial
+) -> Rows | None:
     """Return a model's residuals and what a cause of it contributes; None where that runs away."""
     error = problem.residual(theta)
     less, rest = without_effect(problem, theta, name)
@@ -45,7 +48,7 @@ def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
-    block, tests, runs = _places(problem)
+    block, tests, runs = _blocks_of_rows(problem, rule)
     return Rows(
         contribution=error - without,
         residual=-error,
@@ -57,18 +60,20 @@ def rows_of(problem: Problem, theta: FloatArray, name: str, run: Map = serial) -
     )
 
 
-def _places(problem: Problem) -> tuple[IntArray, BoolArray, tuple[slice, ...]]:
+def _blocks_of_rows(
+    problem: Problem, rule: BlockSettings
+) -> tuple[IntArray, BoolArray, tuple[slice, ...]]:
     """Return for every row its block, numbered through all records, and whether it tests; and the runs."""
-    blocks, tests, runs, first, at = [], [], [], 0, 0
+    blocks, tests, runs, first_block, row = [], [], [], 0, 0
     for case in problem.cases:
-        last = 0
+        last_block = 0
         for n in problem.present(case):
-            own = blocks_of(case, n)[case.mask[n]]
-            blocks.append(first + own)
-            tests.append(np.isin(set_of(own), TEST))
-            runs.append(slice(at, at + len(own)))
-            at, last = at + len(own), max(last, int(own.max(initial=0)))
-        first += last + 1
+            block = blocks_of(case, n, rule)[case.mask[n]]
+            blocks.append(first_block + block)
+            tests.append(np.isin(set_of(block), TEST))
+            runs.append(slice(row, row + len(block)))
+            row, last_block = row + len(block), max(last_block, int(block.max(initial=0)))
+        first_block += last_block + 1
     return np.concatenate(blocks), np.concatenate(tests), tuple(runs)
 
 

@@ -15,12 +15,11 @@ from rsea_ros.diagnosis.naming.contribution import rows_of, weighted_by
 from rsea_ros.diagnosis.naming.flexible import Flexible, flexible
 from rsea_ros.diagnosis.naming.signature import Signature, signature
 from rsea_ros.diagnosis.score import Score, gain, score_on
+from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map
 from rsea_ros.signals import FloatArray
-
-_NEAR = 1e-6
 
 
 @dataclass(frozen=True)
@@ -59,43 +58,46 @@ class Claim:
     weight: float
 
 
-def evidence_for(claim: Claim, cases: tuple[Case, ...], run: Map) -> Evidence | None:
+def evidence_for(
+    claim: Claim, cases: tuple[Case, ...], settings: DiagnosisSettings, run: Map
+) -> Evidence | None:
     """Return the evidence for a claim; None where its simulation runs away."""
     everything = replace(claim.problem, cases=cases)
-    weights = score_on(everything, cases, (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta))
+    sets, outputs = (*TRAIN, *VALIDATION, *TEST), everything.outputs(claim.theta)
+    weights = score_on(everything, cases, sets, outputs, settings.blocks)
     problem = weighted_by(claim.problem, cases, weights)
-    rows = rows_of(problem, claim.theta, claim.name, run)
+    rows = rows_of(problem, claim.theta, claim.name, settings.blocks, run)
     if rows is None:
         return None
-    own = [u for u in problem.unknowns if u.name.startswith(claim.name + ".")]
+    parameters = sum(u.name.startswith(claim.name + ".") for u in problem.unknowns)
     channel = min(
         claim.without.sums, key=lambda n: claim.with_it.ratio(n) / max(claim.without.ratio(n), 1e-12)
     )
     gained, (low, _) = gain(claim.with_it, claim.without, channel)
     return Evidence(
         name=claim.name,
-        signature=signature(rows),
+        signature=signature(rows, settings.evidence),
         flexible=flexible(problem, claim.theta, claim.name, rows),
         channel=channel,
         gain=gained,
         gain_low=low,
-        is_sure=preference(claim.with_it, claim.without, len(own)).sure,
+        is_sure=preference(claim.with_it, claim.without, parameters, settings.acceptance).sure,
         weight=claim.weight,
         before=claim.without.ratio(claim.without.worst),
         left=weights.ratio(weights.worst),
-        at_edge=is_at_edge(problem, claim.theta, claim.name),
+        at_edge=is_at_edge(problem, claim.theta, claim.name, settings.acceptance.near_bound),
         siblings=len(problem.added) - 1,
     )
 
 
-def is_at_edge(problem: Problem, theta: FloatArray, name: str) -> bool:
-    """Tell whether a parameter of an effect, optional ones apart, has run to a bound of what it may be."""
+def is_at_edge(problem: Problem, theta: FloatArray, name: str, near: float) -> bool:
+    """Tell whether a parameter of an effect, optional ones apart, lies within a share `near` of a bound."""
     parameters = {f"{name}.{p.name}": p for p in effect_named(name).parameters if not p.optional}
     for unknown, t in zip(problem.unknowns, theta, strict=True):
         p = parameters.get(unknown.name)
         if p is None or (p.unit == "rad" and math.isclose(p.high - p.low, 2.0 * math.pi, rel_tol=0.1)):
             continue
-        margin = _NEAR * (p.high - p.low)
+        margin = near * (p.high - p.low)
         if not p.low + margin < unknown.outer(float(t)) < p.high - margin:
             return True
     return False

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.naming.contribution import Rows
-from rsea_ros.diagnosis.score import RESAMPLES
+from rsea_ros.diagnosis.score import gain_of
 from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.effects.effect import Effect
@@ -25,13 +25,16 @@ from rsea_ros.model.drive import Drive
 from rsea_ros.signals import FloatArray
 
 _KNOTS = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
-"""Quantiles of a regressor's size between which the spline is straight, each sign for itself."""
+"""Quantiles of a regressor's size between which the spline is straight, each sign for itself: six pieces a
+sign, finer at both ends, where friction and stops act. The coefficients are fitted with them."""
 _LAGS = (1, 2, 4, 8)
-"""Samples by which a law of the command's past may look back."""
+"""Samples by which a law of the command's past may look back, doubling. Fixed like the knots."""
 _RIDGE = 1e-6
-"""Of each column's power: keeps parts of the spline apart that the data do not."""
+"""Of each column's power: keeps parts of the spline apart that the data do not. Numerical: a thousandth of a
+column's size."""
 _STEP = 1e-2
-"""Of the largest command: torque at which the responses are taken."""
+"""Of the largest command: torque at which the responses are taken. Numerical: small, so that they are linear,
+and far above rounding."""
 
 
 @dataclass(frozen=True)
@@ -54,14 +57,13 @@ def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flex
     matrix = matrix[:, size > 0.0] / size[size > 0.0]
     fits = ~rows.tests
     normal = matrix[fits].T @ matrix[fits] + _RIDGE * np.eye(matrix.shape[1])
-    left = (
-        rows.residual - matrix @ np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
-    )
-    before, after = (_by_block(rows, v) for v in (rows.residual, left))
+    weights = np.linalg.lstsq(normal, matrix[fits].T @ rows.residual[fits], rcond=None)[0]
+    before, after = (_by_block(rows, v) for v in (rows.residual, rows.residual - matrix @ weights))
     cause = float(np.sum((rows.residual + rows.contribution)[rows.tests] ** 2) - before.sum())
+    gain, ci95 = gain_of(after, before)
     return Flexible(
-        gain=1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300))),
-        ci95=_interval(before, after),
+        gain=gain,
+        ci95=ci95,
         of_cause=float(before.sum() - after.sum()) / max(cause, 1e-300),
     )
 
@@ -70,13 +72,6 @@ def _by_block(rows: Rows, values: FloatArray) -> FloatArray:
     """Return the power of values in each test block."""
     power = np.bincount(rows.block, values**2 * rows.tests)
     return np.asarray(power[np.bincount(rows.block, rows.tests) > 0], np.float64)
-
-
-def _interval(before: FloatArray, after: FloatArray) -> tuple[float, float]:
-    picks = np.random.default_rng(0).integers(0, len(before), (RESAMPLES, len(before)))
-    gains = 1.0 - np.sqrt(after[picks].sum(axis=1) / np.maximum(before[picks].sum(axis=1), 1e-300))
-    low, high = np.quantile(gains, [0.025, 0.975])
-    return float(low), float(high)
 
 
 def _responses(problem: Problem, theta: FloatArray, effect: Effect) -> list[FloatArray]:
@@ -106,16 +101,16 @@ def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArra
         return drive.command
     if effect.port is st.Port.SENSOR:
         return out.get("ft")
-    at = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
+    middles = drive.start + drive.step * (np.arange(len(drive.command)) + 0.5)
     if st.GEAR_VELOCITY in effect.reads and "velocity" in out:
-        return np.asarray(np.interp(at, case.t["velocity"], out["velocity"]))
+        return np.asarray(np.interp(middles, case.t["velocity"], out["velocity"]))
     if st.GEAR_VELOCITY in effect.reads and "position" in out:
         t = case.t["position"]
-        return np.asarray(np.interp(at, t, np.gradient(out["position"], t)))
+        return np.asarray(np.interp(middles, t, np.gradient(out["position"], t)))
     read = next((n for n in ("position", "ft") if n in out), None)
     if effect.port is not st.Port.SPRING or read is None:
         return None
-    return np.asarray(np.interp(at, case.t[read], out[read]))
+    return np.asarray(np.interp(middles, case.t[read], out[read]))
 
 
 def _spline(signal: FloatArray, effect: Effect, hold: int) -> list[FloatArray]:
@@ -167,5 +162,5 @@ def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, Fl
     """Return channels in which the F/T sensor feels what was taken from the spring's torque."""
     if "ft" not in out or not isinstance(case.drive, Drive):
         return out
-    at = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)
-    return {**out, "ft": out["ft"] - np.interp(case.t["ft"], at, pushed.command - case.drive.command)}
+    middles = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)
+    return {**out, "ft": out["ft"] - np.interp(case.t["ft"], middles, pushed.command - case.drive.command)}

@@ -14,20 +14,17 @@ from collections.abc import Mapping
 
 from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.naming.evidence import Evidence
+from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
 from rsea_ros.identification.result import AT_NOISE
 
 INTERCEPT = "intercept"
-_LEAST = 3e-3
-"""Spread of lambda that two right simulations of one law have at least (MODEL_DOUBT in causes.py)."""
-_MOST = 3.0
-"""Spread of lambda from which a larger one says no more."""
 _CERTAIN = 30.0
 """Log odds from which no number of this machine differs from certainty."""
-_SUREST = 4.0
-"""Log odds among rivals: what is more certain says no more, for all of them may be wrong."""
 
 
-def features(e: Evidence, preferred: bool) -> dict[str, float]:
+def features(
+    e: Evidence, preferred: bool, rule: EvidenceSettings = DEFAULT.evidence
+) -> dict[str, float]:
     """Return the numbers that the logistic model weighs, by name. preferred: the search chose it.
 
     shape: how far lambda spreads. rivals: log odds among them, less the farther the noise is, for what is
@@ -38,8 +35,8 @@ def features(e: Evidence, preferred: bool) -> dict[str, float]:
     bent = max(s.amplitude, s.time, s.frequency)
     return {
         INTERCEPT: 1.0,
-        "shape": 0.5 * (_relative(s.overall) + _relative(bent)),
-        "rivals": _log_odds(e.weight) / max(e.left, 1.0),
+        "shape": 0.5 * (_relative(s.overall, rule) + _relative(bent, rule)),
+        "rivals": _log_odds(e.weight, rule.surest) / max(e.left, 1.0),
         "preferred": float(preferred),
         "noise": float(e.left <= AT_NOISE),
         "flexible": flexible.gain if flexible and flexible.ci95[0] > 0.0 else 0.0,
@@ -47,17 +44,22 @@ def features(e: Evidence, preferred: bool) -> dict[str, float]:
     }
 
 
-def _relative(spread: float) -> float:
+def _relative(spread: float, rule: EvidenceSettings) -> float:
     """Return the logarithm of a spread of lambda over 0.1."""
-    return math.log((_LEAST + min(spread, _MOST)) / 0.1)
+    return math.log((rule.least_spread + min(spread, rule.most_spread)) / 0.1)
 
 
-def _log_odds(weight: float) -> float:
+def _log_odds(weight: float, surest: float) -> float:
     inside = min(max(weight, 1e-9), 1.0 - 1e-9)
-    return min(max(math.log(inside / (1.0 - inside)), -_SUREST), _SUREST)
+    return min(max(math.log(inside / (1.0 - inside)), -surest), surest)
 
 
-def probability(e: Evidence, preferred: bool, coefficients: Mapping[str, float] = COEFFICIENTS) -> float:
+def probability(
+    e: Evidence,
+    preferred: bool,
+    coefficients: Mapping[str, float] = COEFFICIENTS,
+    rule: EvidenceSettings = DEFAULT.evidence,
+) -> float:
     """Return the probability that the cause is part of the truth under its name, 0 to 1."""
-    odds = sum(coefficients[name] * value for name, value in features(e, preferred).items())
+    odds = sum(coefficients[name] * value for name, value in features(e, preferred, rule).items())
     return 1.0 / (1.0 + math.exp(-min(max(odds, -_CERTAIN), _CERTAIN)))

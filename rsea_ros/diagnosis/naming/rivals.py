@@ -29,10 +29,6 @@ from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
-LEAST_WEIGHT = 0.02
-"""Of all that was tried in a cause's place: a rival with less is none."""
-MOST_RIVALS = 3
-
 
 @dataclass(frozen=True)
 class Contest:
@@ -66,44 +62,52 @@ def weighed(selection: Selection, claim: Claim, tried: Sequence[Trial], pools: P
 
     Another cause that was accepted too is no rival, whichever of the two came first.
     """
-    cases, last = selection.cases, set(selection.last.causes)
-    tried = [t for t in tried if t.name == claim.name or t.name not in last]
+    cases, accepted = selection.cases, selection.last.causes
+    rule = selection.last.settings.evidence
+    tried = [t for t in tried if t.name == claim.name or t.name not in accepted]
     scores = list(pools.fits.map(lambda t: trial_score(t, cases), tried))
     priors = [prior_cost(t.problem, t.theta) for t in tried]
     weights = _stacked(scores, priors, [effect_size(t.name) for t in tried])
-    of = {t.name: w for t, w in zip(tried, weights, strict=True)}
+    weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
-        Claim(t.name, t.problem, t.theta, s, score_on(t.problem, cases, TEST, t.beside.outputs), of[t.name])
+        Claim(t.name, t.problem, t.theta, s, beside_score(t, cases), weight_of[t.name])
         for t, s in zip(tried, scores, strict=True)
         if t.name != claim.name
     ]
-    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(last)]
-    own, others = of.get(claim.name, 1.0), _weights_of(selection, swapped)
-    for model, weight in zip(swapped, others[1:], strict=True):
+    swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
+    among_tried, among_swapped = weight_of.get(claim.name, 1.0), _weights_of(selection, swapped)
+    for model, weight in zip(swapped, among_swapped[1:], strict=True):
         rivals.append(_in_place(claim, model, cases, weight))
-    heavy = sorted((r for r in rivals if r.weight >= LEAST_WEIGHT), key=lambda r: -r.weight)
+    heavy = sorted((r for r in rivals if r.weight >= rule.least_weight), key=lambda r: -r.weight)
     once = {r.name: r for r in reversed(heavy)}
-    kept = sorted(once.values(), key=lambda r: -r.weight)[:MOST_RIVALS]
-    return Contest(replace(claim, weight=min(own, others[0])), tuple(kept))
+    kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
+    return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
 
 
 def trial_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
     """Return how a trial does on the test blocks."""
     problem = replace(trial.problem, cases=cases)
-    return score_on(problem, cases, TEST, problem.outputs(trial.theta))
+    return score_on(problem, cases, TEST, problem.outputs(trial.theta), trial.beside.settings.blocks)
+
+
+def beside_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
+    """Return how the model does on the test blocks that a trial was made beside."""
+    model = trial.beside
+    return score_on(trial.problem, cases, TEST, model.outputs, model.settings.blocks)
 
 
 def _in_place(claim: Claim, model: Candidate, cases: tuple[Case, ...], weight: float) -> Claim:
     """Return the claim of another effect that does as well in a cause's place."""
     problem, theta = model.solution.problem, model.solution.theta
-    tested = score_on(problem, cases, TEST, model.outputs)
+    tested = score_on(problem, cases, TEST, model.outputs, model.settings.blocks)
     return Claim(model.newest, problem, theta, tested, claim.without, weight)
 
 
 def _weights_of(selection: Selection, rivals: Sequence[Candidate]) -> list[float]:
     """Return the weights of the last model and of those with another effect in a cause's place."""
     models = [selection.last, *rivals]
-    scores = [score_on(m.solution.problem, selection.cases, TEST, m.outputs) for m in models]
+    cases, blocks = selection.cases, selection.last.settings.blocks
+    scores = [score_on(m.problem, cases, TEST, m.outputs, blocks) for m in models]
     return _stacked(scores, [m.prior_cost for m in models], [m.size for m in models])
 
 

@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.diagnosis.naming.contribution import Rows, projected
+from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
 from rsea_ros.signals import FloatArray, IntArray
 
-_PARTS = 4
-"""Parts of equal power into which amplitude and time are divided: enough to show a curve."""
-_BANDS = 6
-"""Bands of equal ratio between a block's lowest line and half the sampling rate."""
 _SHIFTS = 6
-"""Shifts in time by which a contribution is held against a residual that it has nothing to do with."""
+"""Shifts in time by which a contribution is held against a residual that it has nothing to do with.
+
+They steer `chance` alone, which people read and no probability does.
+"""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Signature:
     kept: float
 
 
-def signature(rows: Rows) -> Signature:
+def signature(rows: Rows, rule: EvidenceSettings = DEFAULT.evidence) -> Signature:
     """Return the signature of a cause."""
     c, r = (projected(rows, v) for v in (rows.contribution, rows.residual))
     cc, cr = c * c, c * r
@@ -59,9 +59,9 @@ def signature(rows: Rows) -> Signature:
         spread=_spread(*held_out),
         overall=_spread(*every),
         chance=_by_chance(rows, c, r),
-        amplitude=_spread(*_summed(_parts_by(np.abs(c), cc), cc, cr)),
-        time=_spread(*_summed(_parts_by(rows.block.astype(float), cc), cc, cr)),
-        frequency=_over_frequency(rows, c, r),
+        amplitude=_spread(*_summed(_parts_by(np.abs(c), cc, rule.parts), cc, cr)),
+        time=_spread(*_summed(_parts_by(rows.block.astype(float), cc, rule.parts), cc, cr)),
+        frequency=_over_frequency(rows, c, r, rule.bands),
         share=total / max(float(r @ r), 1e-300),
         kept=total / max(float(rows.contribution @ rows.contribution), 1e-300),
     )
@@ -81,12 +81,12 @@ def _spread(cc: FloatArray, cr: FloatArray) -> float:
     return float(np.sqrt(np.sum(cc * (cr / cc - mean) ** 2) / cc.sum()))
 
 
-def _parts_by(values: FloatArray, cc: FloatArray) -> IntArray:
+def _parts_by(values: FloatArray, cc: FloatArray, parts: int) -> IntArray:
     """Return to which of some parts each row belongs: parts of equal cc in the order of `values`."""
     order = np.argsort(values, kind="stable")
     below = np.cumsum(cc[order])
     part = np.empty(len(values), np.int64)
-    part[order] = np.minimum((_PARTS * below / max(below[-1], 1e-300)).astype(np.int64), _PARTS - 1)
+    part[order] = np.minimum((parts * below / max(below[-1], 1e-300)).astype(np.int64), parts - 1)
     return part
 
 
@@ -99,26 +99,29 @@ def _by_chance(rows: Rows, c: FloatArray, r: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(spreads))))
 
 
-def _over_frequency(rows: Rows, c: FloatArray, r: FloatArray) -> float:
-    """Return the spread of the complex lambda over frequency bands."""
-    cc, cr = np.zeros(_BANDS), np.zeros(_BANDS, complex)
+def _over_frequency(rows: Rows, c: FloatArray, r: FloatArray, bands: int) -> float:
+    """Return the spread of the complex lambda over frequency bands of equal ratio."""
+    cc, cr = np.zeros(bands), np.zeros(bands, complex)
     for run in rows.runs:
-        for length, places in _segments(rows.block[run]):
+        for length, segments in _segments(rows.block[run], 2 * bands):
             window = np.hanning(length + 2)[1:-1]
-            c_hat, r_hat = (np.fft.rfft(v[run][places] * window, axis=1)[:, 1:] for v in (c, r))
+            c_hat, r_hat = (np.fft.rfft(v[run][segments] * window, axis=1)[:, 1:] for v in (c, r))
             lines = c_hat.shape[1]
-            band = (_BANDS * np.log(np.arange(1, lines + 1)) / np.log(lines + 1)).astype(np.int64)
-            cc += np.bincount(band, np.sum(np.abs(c_hat) ** 2, axis=0), _BANDS)
+            band = (bands * np.log(np.arange(1, lines + 1)) / np.log(lines + 1)).astype(np.int64)
+            cc += np.bincount(band, np.sum(np.abs(c_hat) ** 2, axis=0), bands)
             cross = np.sum(c_hat.conj() * r_hat, axis=0)
-            cr += np.bincount(band, cross.real, _BANDS) + 1j * np.bincount(band, cross.imag, _BANDS)
+            cr += np.bincount(band, cross.real, bands) + 1j * np.bincount(band, cross.imag, bands)
     used = cc > 0.0
     return float(np.sqrt(np.sum(np.abs(cr[used]) ** 2 / cc[used]) / max(cc.sum(), 1e-300)))
 
 
-def _segments(block: IntArray) -> Iterator[tuple[int, IntArray]]:
-    """Yield the length of the usual whole block and the rows of all such, shape (blocks, length)."""
+def _segments(block: IntArray, shortest: int) -> Iterator[tuple[int, IntArray]]:
+    """Yield the length of the usual whole block and the rows of all such, shape (blocks, length).
+
+    shortest: rows that a block must have.
+    """
     starts = np.concatenate([[0], np.flatnonzero(np.diff(block)) + 1])
     sizes = np.diff(np.append(starts, len(block)))
     length = int(np.median(sizes)) - 1
-    if length >= 2 * _BANDS:
+    if length >= shortest:
         yield length, starts[sizes >= length][:, None] + np.arange(length)

@@ -44,13 +44,13 @@ def named(
 
 def _named(place: Place, at_floor: bool, takes_most: bool, settings: DiagnosisSettings) -> Named:
     every = [place.cause, *place.rivals]
-    likely, status = standing([w.evidence for w in every], at_floor, takes_most, settings)
+    likely, status = probabilities_and_status([w.evidence for w in every], at_floor, takes_most, settings)
     others = zip(every[1:], likely[1:], strict=True)
     rivals = tuple((w, p) for w, p in others if p >= settings.naming.rival)
     return Named(place.cause, likely[0], status, rivals)
 
 
-def standing(
+def probabilities_and_status(
     evidence: Sequence[Evidence],
     at_floor: bool,
     takes_most: bool,
@@ -61,7 +61,7 @@ def standing(
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
     """
-    likely = [probability(e, k == 0, coefficients) for k, e in enumerate(evidence)]
+    likely = [probability(e, k == 0, coefficients, settings.evidence) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
     is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)

@@ -14,11 +14,10 @@ from functools import partial
 from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
-from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated, evaluate
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
-from rsea_ros.diagnosis.naming.rivals import beside, contests, trial_score
-from rsea_ros.diagnosis.score import Score, score_on
+from rsea_ros.diagnosis.naming.rivals import beside, beside_score, contests, trial_score
+from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.problem import Case
@@ -65,17 +64,17 @@ def weigh(
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
         selection, stages = promoted(selection, stages, holdout, pools, settings)
-    held = contests(selection, stages, pools)
-    claims = [c for contest in held for c in (contest.cause, *contest.rivals)]
-    found = pools.fits.map(partial(evidence_for, cases=selection.cases, run=pools.run), claims)
-    of = {id(c): e for c, e in zip(claims, found, strict=True)}
+    contested = contests(selection, stages, pools)
+    claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
+    weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
+    evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}
 
     def with_evidence(group: Sequence[Claim]) -> tuple[Weighed, ...]:
-        return tuple(Weighed(c, e) for c in group if (e := of[id(c)]) is not None)
+        return tuple(Weighed(c, e) for c in group if (e := evidence_by_claim[id(c)]) is not None)
 
     places = [
         Place(cause[0], with_evidence(contest.rivals), is_late=k >= accepted)
-        for k, contest in enumerate(held, start=1)
+        for k, contest in enumerate(contested, start=1)
         if (cause := with_evidence([contest.cause]))
     ]
     return Weighing(selection, list(stages), places)
@@ -97,7 +96,7 @@ def promoted(
         return selection, list(stages)
     against = min((s for _, s in helpful), key=lambda s: float(s.loss(s).sum()))
     trial, _ = min(helpful, key=lambda item: float(item[1].loss(against).sum()))
-    setup = FitSetup(cases, settings.fits, pools.run, trial.beside.validation)
+    setup = FitSetup(cases, settings, pools.run, trial.beside.validation)
     model = fit_candidate(setup, trial.problem, trial.theta)
     if model.is_at_bound:
         return selection, list(stages)
@@ -108,5 +107,5 @@ def promoted(
 
 def _helps(trial: Trial, score: Score, cases: tuple[Case, ...]) -> bool:
     """Tell whether a trial surely does better than the model that it was tried beside."""
-    without = score_on(trial.problem, cases, TEST, trial.beside.outputs)
-    return preference(score, without, len(trial.theta) - trial.beside.parameters).better
+    extra, rule = len(trial.theta) - trial.beside.parameters, trial.beside.settings.acceptance
+    return preference(score, beside_score(trial, cases), extra, rule).better

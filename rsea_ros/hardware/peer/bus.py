@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from rsea_ros.files import PREFIX
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
 from rsea_ros.hardware.peer.motor import KEPT, LENGTH, UNKNOWN, Motor
 from rsea_ros.hardware.peer.protocol2 import Listener, Request, checksum, status
+from rsea_ros.locked_folder import PREFIX
 
 EVERYONE = 254
 PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08

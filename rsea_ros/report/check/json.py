@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from rsea_ros.checks.finding import Finding, Findings, worst
-from rsea_ros.report.identification.json import fault_json, finite
+from rsea_ros.report.json_values import fault_json, finite
 
 SCHEMA = 1
 

@@ -13,7 +13,8 @@ from rsea_ros.report.control.tables import control_tables, gains_words
 from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH
 from rsea_ros.report.figures.response import Mark, Response, response_figure
-from rsea_ros.report.page.frame import Block, bullets, key_numbers, page, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, key_numbers, section
 
 _COLOURS = (AFTER, BEFORE, TRUTH)
 

@@ -9,7 +9,7 @@ from rsea_ros.control.large_signal import Reach
 from rsea_ros.control.study import Study
 from rsea_ros.control.trials import Trial
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import section
+from rsea_ros.report.page.html import section
 from rsea_ros.report.page.table import table
 
 Rows = list[list[str]]

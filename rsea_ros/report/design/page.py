@@ -12,8 +12,7 @@ import numpy as np
 from rsea_ros.design.by_train import by_train
 from rsea_ros.design.judge import Design, least_for_band, rig_of, stiffness_bounds
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import FALL_FACTOR, end_to_end
-from rsea_ros.model.paper_formulas import PAPER_FACTOR
+from rsea_ros.model.bandwidth import FALL_FACTOR, PAPER_FACTOR, end_to_end
 from rsea_ros.model.response import frequency_response
 from rsea_ros.report import words
 from rsea_ros.report.design.map import Demand, feasible_map
@@ -29,7 +28,8 @@ from rsea_ros.report.design.tables import (
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
 from rsea_ros.report.figures.response import Mark, Response, response_figure
-from rsea_ros.report.page.frame import Block, equation, key_numbers, page, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import equation, key_numbers, section
 from rsea_ros.signals import FloatArray
 
 _COLOURS = (BEFORE, AFTER, TRUTH)

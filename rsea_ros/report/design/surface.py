@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.model.bandwidth import undamped_band
-from rsea_ros.model.paper_formulas import PAPER_FACTOR
+from rsea_ros.model.bandwidth import PAPER_FACTOR, undamped_band
 from rsea_ros.report.figures.figure import Figure, Json, axis, label, layout, line, numbers
 from rsea_ros.report.figures.palette import INK, QUIET, faint
 from rsea_ros.signals import FloatArray

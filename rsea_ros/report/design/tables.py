@@ -10,7 +10,7 @@ from rsea_ros.design.by_train import NINETY_PERCENT, WithTrain, sense_unknown
 from rsea_ros.design.judge import Check, Design, judge
 from rsea_ros.design.margins import Margin, margins, spreads_of
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import section
+from rsea_ros.report.page.html import section
 from rsea_ros.report.page.table import table
 
 

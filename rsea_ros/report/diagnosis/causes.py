@@ -12,9 +12,9 @@ from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import evidence
 from rsea_ros.report.diagnosis.standing import STATUS, standing
-from rsea_ros.report.diagnosis.tables import table
 from rsea_ros.report.figures.palette import AFTER, GRID, MEASURED, QUIET, faint
-from rsea_ros.report.page.frame import bullets, equation, paragraph, section
+from rsea_ros.report.page.html import bullets, equation, paragraph, section
+from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.wording import listed
 
 _WIDTH, _HEIGHT = 180.0, 18.0
@@ -68,7 +68,7 @@ def tried_section(diagnosis: Diagnosis) -> str:
         return ""
     rows = [_row(c.name, c.gain_holdout, STATUS[c.status], strong=True) for c in diagnosis.causes]
     rows += [_row(r.name, r.gain_holdout, say.rejection(r)) for r in fitted_rivals(diagnosis)]
-    shown = table(("Cause", "#Gain", "", "Outcome"), rows) if rows else ""
+    shown = table_of_rows(("Cause", "#Gain", "", "Outcome"), rows) if rows else ""
     others = bullets(_by_reason([r for r in diagnosis.rejected if not r.is_fitted]))
     return section(_tried_title(diagnosis), shown, others, caption=_GAIN)
 

@@ -11,7 +11,7 @@ from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.overlay import overlay_records
 from rsea_ros.report.diagnosis.page import diagnosis_report
-from rsea_ros.report.identification.files import json_text, with_provenance
+from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import Record
 

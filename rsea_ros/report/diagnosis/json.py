@@ -8,8 +8,10 @@ from typing import Any
 from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis, Estimate, Experiment, Misfit, Rejected
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.report.diagnosis import words as say
+from rsea_ros.report.diagnosis.noise_numbers import NOISE_NUMBERS
 from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, next_run
-from rsea_ros.report.identification.json import fault_json, finite, numbers, parameter
+from rsea_ros.report.identification.json import parameter
+from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
 
 SCHEMA = 1
@@ -49,6 +51,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "next_experiment": _experiment(d.next_experiment),
         "statements": list(remark_sentences(d.remarks)),
         "settings": _settings(d.settings),
+        "noise_numbers": {s.name: s.value for s in NOISE_NUMBERS},
     }
 
 

@@ -21,7 +21,8 @@ from rsea_ros.report.diagnosis.where import where_figure
 from rsea_ros.report.fault_words import fault_lines, faults
 from rsea_ros.report.figures.palette import AFTER, BEFORE
 from rsea_ros.report.identification.parameters import parameter_table
-from rsea_ros.report.page.frame import Block, bullets, folded, key_numbers, page, paragraph, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.diagnosis.result import Diagnosis, Experiment
@@ -10,22 +9,12 @@ from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.sentences import next_run
-from rsea_ros.report.page.frame import code, paragraph, section
+from rsea_ros.report.page.html import code, paragraph, section
+from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.signals import UNITS
 
 _EXCITE = ("kind", "amplitude", "noise", "low", "high", "period", "duration", "rate", "seed")
 """Settings that are parameters of the node excite."""
-
-
-def table(head: Sequence[str], rows: Sequence[str]) -> str:
-    """Return a table of finished rows. head: titles of the columns, those of numbers with # in front."""
-    cells = "".join(
-        f"<th class='number'>{h[1:]}</th>" if h.startswith("#") else f"<th>{h}</th>" for h in head
-    )
-    return (
-        f"<div class='scroll'><table><thead><tr>{cells}</tr></thead>"
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
-    )
 
 
 def channel_section(diagnosis: Diagnosis) -> str:
@@ -39,7 +28,7 @@ def channel_section(diagnosis: Diagnosis) -> str:
     reached = "All channels are" if diagnosis.at_noise_floor else "Not all channels are"
     rows = [_channel(diagnosis, name) for name in diagnosis.residual_rms]
     caption = "On data that took no part in any fit or choice."
-    return section(f"{reached} at their noise", table(head, rows), caption=caption)
+    return section(f"{reached} at their noise", table_of_rows(head, rows), caption=caption)
 
 
 def _channel(d: Diagnosis, name: str) -> str:

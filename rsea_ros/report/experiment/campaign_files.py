@@ -13,8 +13,7 @@ from rsea_ros.new_files import NewFiles
 from rsea_ros.report.experiment.campaign_page import campaign_page
 from rsea_ros.report.experiment.campaign_words import end_sentence
 from rsea_ros.report.experiment.json import SCHEMA, proof_json, proposal_json
-from rsea_ros.report.identification.files import json_text, with_provenance
-from rsea_ros.report.identification.json import strict
+from rsea_ros.report.json_values import json_text, strict, with_provenance
 from rsea_ros.report.provenance import Provenance
 
 JSON, MODEL, REPORT = NAMES = ("experiment.json", "model.yaml", "report.html")

@@ -11,7 +11,8 @@ from rsea_ros.report.experiment.page import command_figure, limits_section, spec
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
 from rsea_ros.report.figures.figure import Figure, axis, label, layout, line, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, QUIET, TRUTH
-from rsea_ros.report.page.frame import Block, bullets, key_numbers, page, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, key_numbers, section
 from rsea_ros.report.page.table import table
 from rsea_ros.report.provenance import Provenance
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rsea_ros.diagnosis.naming.causes import MODEL_DOUBT
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.experiment.campaign import Outcome
 from rsea_ros.experiment.hypothesis import NOTHING
@@ -34,7 +34,7 @@ def size(weighing: Weighing, name: str) -> str:
     value = unknown.outer(at)
     noise = abs(unknown.outer(at + sd) - unknown.outer(at - sd)) / 2.0
     clock = CLOCK_DOUBT if main.unit == "s" else 0.0
-    spread = math.hypot(noise, MODEL_DOUBT * value, clock)
+    spread = math.hypot(noise, DEFAULT.sizes.model_error * value, clock)
     unit = "" if main.unit == "1" else f" {main.unit}"
     return f"{main.name.replace('_', ' ')} {value:.4g} ± {spread:.2g}{unit}"
 

@@ -10,7 +10,7 @@ from rsea_ros.experiment.advice import Advice, Proof
 from rsea_ros.experiment.margins import LEVEL
 from rsea_ros.experiment.proposal import Proposal
 from rsea_ros.report.experiment.words import proof_words, verdict
-from rsea_ros.report.identification.json import strict
+from rsea_ros.report.json_values import strict
 
 SCHEMA = 1
 

@@ -10,7 +10,7 @@ import numpy as np
 from rsea_ros.report.fleet.dates_below import months
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import name, percent, short_day
-from rsea_ros.report.page.frame import section
+from rsea_ros.report.page.html import section
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import FleetTrends, Trend

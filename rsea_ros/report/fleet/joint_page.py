@@ -11,9 +11,11 @@ from rsea_ros.report.fleet.cause_figure import cause_figure, share_figure
 from rsea_ros.report.fleet.latest import latest_causes
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.parameter_figure import parameter_figure
-from rsea_ros.report.fleet.tables import alarm_table, parameter_rows, rows_of
+from rsea_ros.report.fleet.tables import alarm_table, parameter_rows
 from rsea_ros.report.fleet.words import finding, sentence, short_day
-from rsea_ros.report.page.frame import Block, folded, key_numbers, page, paragraph, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import folded, key_numbers, paragraph, section
+from rsea_ros.report.page.table import table_of_cells
 from rsea_ros.report.words import sentence as capital
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.causes import Naming
@@ -118,8 +120,7 @@ def _quiet(fleet: FleetTrends, joint: str) -> str:
 
 
 def _recordings(recordings: Table, rows: np.ndarray, links: Links) -> str:
-    head = [("Recording", False), ("Date", False), ("Outcome", False), ("Verdict", False), ("Causes", False),
-            ("Faults", False)]  # fmt: skip
+    head = ["Recording", "Date", "Outcome", "Verdict", "Causes", "Faults"]
     time_s = np.asarray(recordings["time_s"], float)
     latest = rows[np.argsort(-np.nan_to_num(time_s[rows]), kind="stable")][:_LATEST]
     body = [
@@ -133,7 +134,7 @@ def _recordings(recordings: Table, rows: np.ndarray, links: Links) -> str:
         )
         for i in latest
     ]
-    return rows_of(head, body)
+    return table_of_cells(head, body)
 
 
 def _names(items: object, key: str) -> str:

@@ -18,7 +18,8 @@ from rsea_ros.report.fleet.tables import (
 )
 from rsea_ros.report.fleet.timeline import timeline
 from rsea_ros.report.fleet.words import about, day, name, percent
-from rsea_ros.report.page.frame import Block, bullets, folded, key_numbers, page, paragraph, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.ranking import by_joint, worst_first
 from rsea_ros.trends.result import FleetTrends

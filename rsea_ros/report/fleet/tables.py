@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.report import words
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import day, doubt_of_date, name, percent, sentence, value
+from rsea_ros.report.page.table import table_of_cells
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.result import FleetTrends, Trend
 from rsea_ros.trends.series import Table
@@ -23,21 +24,9 @@ _STATES = {
 }
 
 
-def rows_of(head: Sequence[tuple[str, bool]], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of finished HTML cells. head: title of each column, and whether it holds numbers."""
-    kinds = [" class='number'" if number else "" for _, number in head]
-    top = "".join(f"<th{k}>{escape(title)}</th>" for (title, _), k in zip(head, kinds, strict=True))
-    body = "".join(
-        f"<tr>{''.join(f'<td{k}>{cell}</td>' for cell, k in zip(row, kinds, strict=True))}</tr>"
-        for row in rows
-    )
-    return f"<div class='scroll'><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>"
-
-
 def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) -> str:
     """Return the findings with date, size, how sure, and the recording that shows each first."""
-    head = [("Joint", False), ("Finding", False), ("Began", False), ("Size, 95 %", True), ("Sure", True),
-            ("Shown first by", False)]  # fmt: skip
+    head = ["Joint", "Finding", "Began", "#Size, 95 %", "#Sure", "Shown first by"]
     rows = [
         (
             links.joint(a.joint),
@@ -50,7 +39,7 @@ def alarm_table(alarms: Sequence[Alarm], links: Links, with_joint: bool = True) 
         for a in alarms
     ]
     start = 0 if with_joint else 1
-    return rows_of(head[start:], [r[start:] for r in rows])
+    return table_of_cells(head[start:], [r[start:] for r in rows])
 
 
 def joint_table(
@@ -62,8 +51,9 @@ def joint_table(
     links: Links,
 ) -> str:
     """Return a row for each joint. latest: causes that its latest recording names."""
-    head = [("Joint", False), ("State", False), ("Recordings", True), ("Refused or broken", True),
-            ("Parameters determined", True), ("Largest change", True)]  # fmt: skip
+    head = [
+        "Joint", "State", "#Recordings", "#Refused or broken", "#Parameters determined", "#Largest change",
+    ]  # fmt: skip
     of = np.asarray(recordings["joint"], str)
     done = np.asarray(recordings["outcome"], str) == "done"
     rows = []
@@ -82,7 +72,7 @@ def joint_table(
                 percent(moved) if moved == moved else "–",
             )
         )
-    return rows_of(head, rows)
+    return table_of_cells(head, rows)
 
 
 def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
@@ -93,9 +83,10 @@ def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) ->
 
 def parameter_rows(trends: Sequence[Trend]) -> str:
     """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
-    head = [("Parameter", False), ("State", False), ("Now, 95 %", True), ("A year", True),
-            ("A day scatters", True),
-            ("Least step seen", True), ("Determined by", True)]  # fmt: skip
+    head = [
+        "Parameter", "State", "#Now, 95 %", "#A year", "#A day scatters", "#Least step seen",
+        "#Determined by",
+    ]  # fmt: skip
     rows = []
     for t in trends:
         unit, s = t.series.unit, t.series
@@ -113,7 +104,7 @@ def parameter_rows(trends: Sequence[Trend]) -> str:
                 f"{int(np.sum(s.identifiable))} of {len(s.identifiable)}",
             )
         )
-    return rows_of(head, rows)
+    return table_of_cells(head, rows)
 
 
 def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
@@ -123,11 +114,11 @@ def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
 
 def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
     """Return what could not be determined, and why."""
-    head = [("Joint", False), ("Parameter", False), ("Why", False)]
+    head = ["Joint", "Parameter", "Why"]
     rows = [
         (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in undetermined
     ]
-    return rows_of(head, rows)
+    return table_of_cells(head, rows)
 
 
 def _why(trend: Trend) -> str:

@@ -9,7 +9,7 @@ from html import escape
 from rsea_ros.report.fleet.dates_below import months, share
 from rsea_ros.report.fleet.links import Links
 from rsea_ros.report.fleet.words import about, doubt_of_date, short_day
-from rsea_ros.report.page.frame import section
+from rsea_ros.report.page.html import section
 from rsea_ros.trends.alarms import Alarm
 from rsea_ros.trends.weeks import Steps
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, faint
-from rsea_ros.report.page.frame import folded, paragraph
+from rsea_ros.report.page.html import folded, paragraph
 from rsea_ros.signals import FloatArray
 
 STRONG = 0.9

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from rsea_ros.identification.result import Identification
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles, Place
 from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.identification.page import identification_report
+from rsea_ros.report.json_values import json_text, with_provenance
 from rsea_ros.report.provenance import Provenance
 
 JSON, MODEL, REPORT = NAMES = ("identification.json", "model.yaml", "report.html")
@@ -28,13 +26,3 @@ def write_results(
         new.write(JSON, json_text(with_provenance(identification_json(identification), provenance)))
         new.write(MODEL, rig_text(identification.rig))
         return new.write(REPORT, identification_report(identification, provenance))
-
-
-def with_provenance(contents: Mapping[str, Any], provenance: Provenance | None) -> dict[str, Any]:
-    """Return the contents of a result file with where they come from, where that is known."""
-    return {**contents, **({"provenance": provenance.json} if provenance else {})}
-
-
-def json_text(contents: Mapping[str, Any]) -> str:
-    """Return a result file for programs."""
-    return json.dumps(contents, indent=1, allow_nan=False, ensure_ascii=False) + "\n"

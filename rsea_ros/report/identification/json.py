@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
+from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.signals import Fault
 
 SCHEMA = 1
 
@@ -47,13 +45,6 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def fault_json(fault: Fault) -> dict[str, Any]:
-    """Return a fault of the data as it stands in the result files."""
-    size = {} if fault.size is None else {"size": finite(fault.size), "unit": fault.unit}
-    detail = {"detail": fault.detail} if fault.detail else {}
-    return {"kind": fault.kind, "channel": fault.channel, "share": finite(fault.share), **size, **detail}
-
-
 def parameter(p: ParameterEstimate) -> dict[str, Any]:
     """Return a parameter as it stands in the result files."""
     return {
@@ -63,22 +54,3 @@ def parameter(p: ParameterEstimate) -> dict[str, Any]:
         "start": finite(p.start),
         "told_by_data": finite(p.told_by_data),
     }
-
-
-def numbers(values: Mapping[str, float | None]) -> dict[str, float | None]:
-    """Return finite numbers by name, None for others."""
-    return {name: None if value is None else finite(value) for name, value in values.items()}
-
-
-def strict(value: Any) -> Any:
-    """Return what JSON can hold: None for each number that is infinite or NaN, however deep."""
-    if isinstance(value, Mapping):
-        return {key: strict(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [strict(item) for item in value]
-    return finite(value) if isinstance(value, float) else value
-
-
-def finite(value: float) -> float | None:
-    """Return a number as JSON can hold it: None when it is infinite or NaN."""
-    return float(value) if math.isfinite(value) else None

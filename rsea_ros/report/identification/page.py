@@ -16,7 +16,8 @@ from rsea_ros.report.identification.correlation import correlation_section
 from rsea_ros.report.identification.parameters import clock_sentence, parameter_table, told
 from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
-from rsea_ros.report.page.frame import Block, bullets, code, key_numbers, page, paragraph, section
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import UNITS

@@ -9,6 +9,7 @@ from html import escape
 from rsea_ros.identification.result import CLOCKS, ParameterEstimate
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, GRID, QUIET, faint
+from rsea_ros.report.page.table import table_of_rows
 
 _WIDTH, _HEIGHT = 190.0, 26.0
 _TOLD = 0.9
@@ -20,13 +21,9 @@ _LOPSIDED = 1.5
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
     """Return the HTML table of the physical parameters, sensor clocks left out."""
     physical = [p for p in parameters if not p.name.startswith(CLOCKS)]
-    head = (
-        "<tr><th>Parameter</th><th class='number'>Value ± 95 %</th><th>Unit</th>"
-        "<th>Against what the rig stated</th><th class='number'>Rig</th><th class='number'>Change</th>"
-        "<th>Told by the data</th></tr>"
-    )
-    rows = "".join(_row(p) for p in physical)
-    return f"<div class='scroll'><table><thead>{head}</thead><tbody>{rows}</tbody></table></div>"
+    head = ("Parameter", "#Value ± 95 %", "Unit", "Against what the rig stated", "#Rig", "#Change",
+            "Told by the data")  # fmt: skip
+    return table_of_rows(head, (_row(p) for p in physical))
 
 
 def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:

@@ -11,8 +11,7 @@ from rsea_ros.laws.law import Law
 from rsea_ros.laws.result import LawResult
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles, Place
-from rsea_ros.report.identification.files import json_text, with_provenance
-from rsea_ros.report.identification.json import numbers
+from rsea_ros.report.json_values import json_text, numbers, with_provenance
 from rsea_ros.report.law.page import law_report
 from rsea_ros.report.law.words import headline
 from rsea_ros.report.provenance import Provenance

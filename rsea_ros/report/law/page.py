@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -13,17 +12,9 @@ from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
 from rsea_ros.report.law.words import NAMES, UNITS, gain_sentence, headline, parameter_lines
-from rsea_ros.report.page.frame import (
-    Block,
-    bullets,
-    code,
-    equation,
-    folded,
-    key_numbers,
-    page,
-    paragraph,
-    section,
-)
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import bullets, code, equation, folded, key_numbers, paragraph, section
+from rsea_ros.report.page.table import table_of_rows
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.signals import UNITS as CHANNEL_UNITS
 from rsea_ros.signals import FloatArray
@@ -31,7 +22,7 @@ from rsea_ros.signals import FloatArray
 _WINDOWS = 12
 _CURVE = 160
 _MOST_TRIED = 12
-_DEPENDENCE_HEADS = ("", "explains, held out", "of what the law leaves")
+_DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of what the law leaves")
 
 
 def law_report(result: LawResult, provenance: Provenance | None = None) -> str:
@@ -188,15 +179,15 @@ def _depends(result: LawResult) -> str:
     if not result.dependences:
         return ""
     top = [d for d in result.dependences if d.share > 0.005][:10]
-    rows = "".join(
+    rows = [
         f"<tr><td>{escape(d.regressor)}<small>{escape(d.place)}</small></td>"
         f"<td data-label='alone'>{bars_of(d.share)}</td>"
         f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {196 * d.se:.0f} %</td>"
         f"<td class='number' data-label='of what the law leaves'>{100 * max(d.beside, 0.0):.1f} %</td></tr>"
         for d in top
-    )
+    ]
     return section(
-        "What it depends on", _html_table("A function of", _DEPENDENCE_HEADS, rows),
+        "What it depends on", table_of_rows(_DEPENDENCE_HEADS, rows),
         caption="Laws without a form, a spline or a memory each, fitted to some blocks of time and judged on "
         "others: share of the power above the noise that they take.",
     )  # fmt: skip
@@ -213,7 +204,7 @@ def bars_of(share: float) -> str:
 
 
 def _levels(result: LawResult) -> str:
-    rows = "".join(
+    rows = [
         f"<tr><td>{escape(words.channel(n))}</td>"
         + "".join(
             f"<td class='number' data-label='{what}'>{words.quantity(rms, CHANNEL_UNITS[n], 3)}</td>"
@@ -223,13 +214,13 @@ def _levels(result: LawResult) -> str:
         )
         + "</tr>"
         for n in result.before
-    )
+    ]
     text = (
         gain_sentence(result) if result.laws else "Residual, RMS, on blocks of time that took part in no fit."
     )
     return section(
         "What is gained",
-        _html_table("Channel", ("without", "with the law", "noise"), rows),
+        table_of_rows(("Channel", "#without", "#with the law", "#noise"), rows),
         caption=text,
     )
 
@@ -239,22 +230,17 @@ def _tried(result: LawResult) -> str:
         return ""
     ordered = sorted(result.tried, key=lambda t: t.left)[:_MOST_TRIED]
     ordered += [t for t in result.tried if t.chosen and t not in ordered]
-    rows = "".join(
+    rows = [
         f"<tr><td>{'<b>' if t.chosen else ''}{escape(', '.join(t.terms))}{'</b>' if t.chosen else ''}"
         f"<small>{escape(t.place)}</small></td>"
         f"<td class='number' data-label='left'>{100 * t.left:.1f} %</td></tr>"
         for t in ordered
-    )
+    ]
     note = paragraph(
         "The shortest law within one standard error of the best is taken (bold); its terms are then fitted "
         "in the simulation, and those that it does not need fall away."
     )
-    return folded("What else was tried", note, _html_table("Terms", ("left, held out",), rows))
-
-
-def _html_table(first: str, others: Sequence[str], rows: str) -> str:
-    head = f"<th>{first}</th>" + "".join(f"<th class='number'>{name}</th>" for name in others)
-    return f"<div class='scroll'><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+    return folded("What else was tried", note, table_of_rows(("Terms", "#left, held out"), rows))
 
 
 def _files(result: LawResult) -> str:

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.model import outputs
-from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import end_to_end, inner_inertia, undamped_band
+from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
 from rsea_ros.model.lumped import lumped
-from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS
-from rsea_ros.model.paper_moving import readings
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper import formulas
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS
+from rsea_ros.paper.figure_18 import readings
 from rsea_ros.report.figures.palette import AFTER, BEFORE, TRUTH
 from rsea_ros.report.figures.response import Mark, Response
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit
@@ -71,9 +71,9 @@ def _end_to_end() -> str:
     hz: FloatArray = np.geomspace(1.0, 300.0, 400)
     rig = load_rig("prototype_knee")
     k_s, j_sc = rig["spring.stiffness"], rig["chassis.inertia"]
-    eq_6 = paper.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])
+    eq_6 = formulas.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])
     curves = [Response("Eq. (6)", AFTER, hz, eq_6(2j * np.pi * hz))]
-    edge = paper.eq_7_bandwidth(k_s, j_sc)
+    edge = pure_torque_bandwidth(k_s, j_sc)
     marks = [Mark(edge, f"{edge:.1f} Hz")]
     for train, colour, anchor in zip(PROTOTYPE_TRAINS, (BEFORE, TRUTH), ("start", "end"), strict=True):
         turned = replace(rig, train=train)

@@ -6,18 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.identification.moving_output import MovingOutput
 from rsea_ros.identification.result import FrequencyResponse
 from rsea_ros.model import outputs
-from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import end_to_end, inner_inertia, undamped_band
+from rsea_ros.model.bandwidth import end_to_end, inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.equations import train_ratio
-from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS
-from rsea_ros.model.paper_moving import largest_gap, readings, resonance_hz
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.train import Train
+from rsea_ros.paper import formulas
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS
+from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
+from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
@@ -63,10 +63,10 @@ def _senses(rig: Rig) -> list[tuple[Train, float]]:
 def figure_15(measured: FrequencyResponse) -> Figure:
     """Return the high-impedance test: the printed fit, Table 2, and the test of a simulated bench."""
     rig = load_rig("paper_high_impedance")
-    c_0, c_1, c_2 = paper.EQ_10
+    c_0, c_1, c_2 = formulas.EQ_10
     s = 2j * np.pi * _HZ
     table_2 = frequency_response(rig, outputs.end_torque(rig, "spring_end"), _HZ)
-    element = paper.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
+    element = formulas.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
     curves = [
         _measured(measured, "simulated test"),
         Response("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
@@ -143,7 +143,7 @@ def figure_20() -> Figure:
             "Eq. (6), b_s = 0.02",
             AFTER,
             hz,
-            paper.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])(s),
+            formulas.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])(s),
         ),
     ]
     marks = [Mark(55.5, "55.5 Hz, printed")]
@@ -153,7 +153,7 @@ def figure_20() -> Figure:
         curves.append(Response(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))
-    ours = paper.eq_7_bandwidth(k_s, j_sc)
+    ours = pure_torque_bandwidth(k_s, j_sc)
     edges = " or ".join(f"{mark.hz:.1f}" for mark in marks[1:])
     title = (
         f"Fig. 20: {ours:.1f} Hz by Eq. (7), 55.5 Hz printed ({100 * (ours / 55.5 - 1):+.1f} %); {edges} "

@@ -6,12 +6,12 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from rsea_ros.design.bands import TOLERANCES, Bands
-from rsea_ros.identification.moving_output import MovingOutput
-from rsea_ros.model.arrangements import arrangements, limits
-from rsea_ros.model.paper_claims import TABLE_2, claims
-from rsea_ros.model.paper_findings import findings
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.arrangements import arrangements, limits
+from rsea_ros.paper.bands import TOLERANCES, Bands
+from rsea_ros.paper.claims import TABLE_2, claims
+from rsea_ros.paper.findings import findings
+from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.report.paper.page import PaperTests, actuator_bands
 
 

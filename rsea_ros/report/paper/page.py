@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from rsea_ros.design.bands import Bands, bands
-from rsea_ros.identification.moving_output import MovingOutput
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.model.arrangements import arrangements, limits
-from rsea_ros.model.bandwidth import inner_inertia
+from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth
 from rsea_ros.model.lumped import lumped as lumped_model
-from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS, claims
-from rsea_ros.model.paper_findings import findings
-from rsea_ros.model.paper_formulas import eq_7_bandwidth
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.arrangements import arrangements, limits
+from rsea_ros.paper.bands import Bands, bands
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims
+from rsea_ros.paper.findings import findings
+from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import Block, key_numbers, page
+from rsea_ros.report.page.frame import Block, page
+from rsea_ros.report.page.html import key_numbers
 from rsea_ros.report.paper import figures, tables
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 
@@ -90,7 +90,8 @@ def _title(test: MovingOutput) -> str:
 def _keys() -> list[tuple[str, str]]:
     recomputed = [c for c in claims() if c.status == "found"]
     platform, backward, forward = actuator_bands().values()
-    lumped = eq_7_bandwidth(platform_rig()["spring.stiffness"], inner_inertia(lumped_model(platform_rig())))
+    rig = platform_rig()
+    lumped = pure_torque_bandwidth(rig["spring.stiffness"], inner_inertia(lumped_model(rig)))
     senses = f"{backward.eq_7_spin:.1f} or {forward.eq_7_spin:.1f}"
     return [
         (f"{sum(c.agrees for c in recomputed)} of {len(recomputed)}", "numbers to the last digit"),

@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
-from rsea_ros.design.bands import TOLERANCES, Bands
-from rsea_ros.identification.moving_output import MovingOutput
-from rsea_ros.identification.rivals import Judged
-from rsea_ros.model.arrangements import Arrangement, Limit
-from rsea_ros.model.paper_claims import TABLE_2, Claim
-from rsea_ros.model.paper_finding import Finding
+from rsea_ros.paper.arrangements import Arrangement, Limit
+from rsea_ros.paper.bands import TOLERANCES, Bands
+from rsea_ros.paper.claims import TABLE_2, Claim
+from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.moving_output import MovingOutput
+from rsea_ros.paper.rivals import Judged
 from rsea_ros.report import words
-from rsea_ros.report.page.frame import equation, section
+from rsea_ros.report.page.html import equation, section
 from rsea_ros.report.page.table import table
 
 EQUATIONS = """\

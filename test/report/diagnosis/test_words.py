@@ -13,12 +13,14 @@ from rich.console import Console
 
 from rsea_ros.diagnosis.result import Estimate, Misfit, Reason, Rejected
 from rsea_ros.diagnosis.settings import AcceptanceSettings, DiagnosisSettings
+from rsea_ros.identification import coloured, noise_level
 from rsea_ros.identification.result import Overlay
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
 from rsea_ros.report.diagnosis import words as say
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.diagnosis.profile import BINS, Profile, profiles
+from rsea_ros.report.diagnosis.sentences import diagnosis_sentence
 from rsea_ros.report.diagnosis.settings import settings_section
 from rsea_ros.report.diagnosis.terminal import terminal_lines
 from rsea_ros.report.diagnosis.where import finding, where_figure
@@ -81,7 +83,7 @@ def test_json_sentence_and_page_speak_of_one_channel(diagnosed):
     """The sentence spoke of the F/T torque where the headline spoke of the first cause's channel."""
     d = diagnosed.diagnosis
     assert d.channel == d.causes[0].channel
-    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in d.sentence
+    assert diagnosis_json(d)["channel"] == d.channel and words.channel(d.channel) in diagnosis_sentence(d)
     elsewhere = terminal(replace(d, channel="position"))
     assert elsewhere[1].startswith("residual    position ")
 
@@ -165,3 +167,10 @@ def test_the_settings_are_in_json_and_page_and_a_changed_one_stands_out(diagnose
     section = settings_section(changed)
     assert "<b>0.25</b> (default 0.1)" in section and "Not tried: ft_bias." in section
     assert section.count("<b>") == 1
+
+
+def test_the_numbers_of_the_noise_are_shown_beside_the_settings(diagnosed):
+    written = diagnosis_json(diagnosed.diagnosis)["noise_numbers"]
+    assert (written["noise.above"], written["noise.fewest"]) == (noise_level.ABOVE, coloured.FEWEST)
+    section = settings_section(DiagnosisSettings())
+    assert all(f"<code>{name}</code>" in section for name in written)

@@ -14,9 +14,10 @@ from rsea_ros.identification.result import Identification
 from rsea_ros.report.diagnosis.page import diagnosis_report, final_values
 from rsea_ros.report.diagnosis.sketch import part_of, sketch
 from rsea_ros.report.identification.correlation import correlation_section, finding
-from rsea_ros.report.identification.files import with_provenance
 from rsea_ros.report.identification.page import identification_report
-from rsea_ros.report.page.frame import folded, page, section
+from rsea_ros.report.json_values import with_provenance
+from rsea_ros.report.page.frame import page
+from rsea_ros.report.page.html import folded, section
 from rsea_ros.report.provenance import provenance_of
 
 from ..conftest import Diagnosed

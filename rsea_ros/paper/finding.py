@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rsea_ros.model.paper_claims import Status
+from rsea_ros.paper.claims import Status
 
 
 @dataclass(frozen=True)

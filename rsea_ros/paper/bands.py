@@ -11,10 +11,16 @@ from control import TransferFunction
 
 from rsea_ros.design.by_train import band_range
 from rsea_ros.model import outputs
-from rsea_ros.model.bandwidth import end_to_end, flat_band, inner_inertia, undamped_band
-from rsea_ros.model.paper_formulas import eq_6_distal_per_proximal, eq_7_bandwidth
+from rsea_ros.model.bandwidth import (
+    end_to_end,
+    flat_band,
+    inner_inertia,
+    pure_torque_bandwidth,
+    undamped_band,
+)
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import END_NAMES, Rig
+from rsea_ros.paper.formulas import eq_6_distal_per_proximal
 
 TOLERANCES = ((3.0, 90.0), (1.0, 90.0), (3.0, 10.0), (1.0, 5.0))
 """dB and degrees; 90 degrees leave the phase out of account."""
@@ -57,7 +63,7 @@ def bands(rig: Rig, motor_torque: float, deflection: float = math.radians(5.0)) 
     inner, spread = inner_inertia(rig), rig.spread("rotor.reflected_inertia")
     edge = float(undamped_band(k_s, inner))
     return Bands(
-        eq_7=eq_7_bandwidth(k_s, j_sc),
+        eq_7=pure_torque_bandwidth(k_s, j_sc),
         eq_7_spin=edge,
         spin_range=band_range(k_s, j_sc, inner - j_sc, spread),
         rows=tuple(BandRow(what, _edges(function)) for what, function in functions.items()),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from msg_adapters import read_record, write_record
-from rsea_ros.identification.moving_output import drawn, moving_output
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.moving_output import drawn, moving_output
 
 RIGS = {
     "paper_moving_output": ("ft",),

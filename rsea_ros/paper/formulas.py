@@ -1,7 +1,9 @@
-"""The paper's formulas as printed, Eqs. (1) to (10); the model itself is in `equations.py`, which is exact.
+"""The paper's formulas as printed, Eqs. (1) to (10); the model in `model/equations.py` is exact.
+
+Eq. (7) is in `model/bandwidth.py`: the design method needs it too.
 
 k_s: N m/rad; j_*: kg m^2; b_*: N m s/rad, at the gear output, but for `*_rotor`, which are at the rotor
-(times N^2 at the output). What the paper leaves out of Eqs. (5) to (7) is told in docs/physics.md.
+(times N^2 at the output). What the paper leaves out of Eqs. (5) to (7) is in docs/physics.md.
 """
 
 from __future__ import annotations
@@ -12,11 +14,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from control import TransferFunction
 
-PAPER_FACTOR = 0.292
-"""The factor printed in Eq. (7); 1 - 10^(-3/20) = 0.29205 rounds to it."""
-
 EXACT_FACTOR = 1.0 - math.sqrt(0.5)
-"""0.29289: where an undamped |T_d / T_p| has risen by the factor sqrt(2)."""
+"""0.29289: in the place of 0.292: where an undamped |T_d / T_p| has risen by the factor sqrt(2)."""
 
 
 def _over(numerator: list[float], denominator: list[float]) -> TransferFunction:
@@ -57,11 +56,6 @@ def eq_5_proximal_per_motor(
 def eq_6_distal_per_proximal(k_s: float, j_sc: float, b_s: float) -> TransferFunction:
     """Return T_d / T_p = K_s / (J_sc s^2 + b_s s + K_s). Paper, Eq. (6)."""
     return _over([k_s], [j_sc, b_s, k_s])
-
-
-def eq_7_bandwidth(k_s: float, j_sc: float, factor: float = PAPER_FACTOR) -> float:
-    """Return sqrt(0.292 K_s / J_sc) / (2 pi), Hz: up to it a pure torque source. Paper, Eq. (7)."""
-    return math.sqrt(factor * k_s / j_sc) / (2.0 * math.pi)
 
 
 def eq_8_spring_torque(k: float, radius: float, spring_radius: float, theta: float) -> float:

@@ -9,19 +9,18 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.model import outputs
-from rsea_ros.model import paper_claims as claims
-from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import inner_inertia, undamped_band
-from rsea_ros.model.paper_finding import Finding
-from rsea_ros.model.paper_moving import largest_gap, readings, resonance_hz
+from rsea_ros.model.bandwidth import inner_inertia, pure_torque_bandwidth, undamped_band
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import END_NAMES, Quantity
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
+from rsea_ros.paper import claims, formulas
+from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
+from rsea_ros.paper.finding import Finding
 
 
 def identification() -> Iterator[Finding]:
-    c_0, _, c_2 = paper.EQ_10
+    c_0, _, c_2 = formulas.EQ_10
     k_s = claims.table_2("K_s")
     yield Finding(
         "found",
@@ -166,7 +165,7 @@ def prototype() -> Iterator[Finding]:
         f"{rig['rotor.reflected_inertia'] / rig['gear.ratio'] / j_sc:.0f} times J_sc: {backward:.1f} Hz "
         "with the "
         f"circular spline held (n = −160), {forward:.1f} Hz with the flexspline held (n = +161), instead of "
-        f"{paper.eq_7_bandwidth(k_s, j_sc):.1f} Hz.",
+        f"{pure_torque_bandwidth(k_s, j_sc):.1f} Hz.",
     )
     radius = spring_radius(k_s, claims.PROTOTYPE_RATE, claims.PROTOTYPE_ARM)
     yield Finding(

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from rsea_ros.model import paper_formulas as paper
+from rsea_ros.model.bandwidth import pure_torque_bandwidth
 from rsea_ros.model.train import Train
+from rsea_ros.paper import formulas
 
 TABLE_2: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -93,9 +94,9 @@ def claims() -> tuple[Claim, ...]:
 
 
 def _recomputed() -> Iterator[Claim]:
-    c_2 = paper.EQ_10[2]
+    c_2 = formulas.EQ_10[2]
     yield Claim("Eq. (10)", "K_s/J_eff, numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator")
-    j_eff, b_eff = paper.eq_10_inertia_and_damping(table_2("K_s"))
+    j_eff, b_eff = formulas.eq_10_inertia_and_damping(table_2("K_s"))
     j_m, b_m = j_eff - table_2("J_sc"), b_eff - table_2("b_s")
     averaged = "Eq. (10), both K_s/J_eff averaged as the paper says"
     yield Claim("Table 2", "J_m", TABLE_2["J_m"][0], j_m, "kg m^2", f"{averaged}, less J_sc")
@@ -104,7 +105,7 @@ def _recomputed() -> Iterator[Claim]:
     yield Claim(
         "Eq. (7)", "factor", "0.292", factor, "1", "+3 dB of an undamped Eq. (6); √2 would make 0.293"
     )
-    band = paper.eq_7_bandwidth(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA)
+    band = pure_torque_bandwidth(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA)
     yield Claim("4.1, Fig. 20", "bandwidth of the prototype", "55.5", band, "Hz", "Eq. (7)")
 
 
@@ -114,7 +115,7 @@ def _from_the_springs() -> Iterator[Claim]:
         ("3.2.1", "K_s, nominal", "1690.5", SPRING_RATE, ARM),
         ("4.1", "K_s, prototype", "260", PROTOTYPE_RATE, PROTOTYPE_ARM),
     ):
-        ours = paper.eq_9_spring_stiffness(rate, arm, 0.0)
+        ours = formulas.eq_9_spring_stiffness(rate, arm, 0.0)
         yield Claim(where, what, printed, ours, "N m/rad", missing, "silent")
 
 

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from rsea_ros.model import paper_claims as claims
-from rsea_ros.model import paper_formulas as paper
-from rsea_ros.model.bandwidth import flat_band, inner_inertia, resonance_peak, undamped_band
-from rsea_ros.model.paper_finding import Finding
+from rsea_ros.model.bandwidth import (
+    flat_band,
+    inner_inertia,
+    pure_torque_bandwidth,
+    resonance_peak,
+    undamped_band,
+)
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
+from rsea_ros.paper import claims, formulas
+from rsea_ros.paper.finding import Finding
 
 
 def circuit() -> Iterator[Finding]:
@@ -42,15 +47,15 @@ def circuit() -> Iterator[Finding]:
         "J_sc alone: "
         f"J_m/N is {spin:.4f} kg·m², {100 * spin / j_sc:.0f} % of J_sc, so {forward:.1f} or {backward:.1f} "
         "Hz for "
-        f"the {paper.eq_7_bandwidth(k_s, j_sc):.1f} Hz of Eq. (7).",
+        f"the {pure_torque_bandwidth(k_s, j_sc):.1f} Hz of Eq. (7).",
     )
 
 
 def equations() -> Iterator[Finding]:
     k_s, j_sc, b_s = (claims.table_2(n) for n in ("K_s", "J_sc", "b_s"))
-    eq_6 = paper.eq_6_distal_per_proximal(k_s, j_sc, b_s)
+    eq_6 = formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s)
     peak_hz, peak_db = resonance_peak(eq_6)
-    lumped = paper.eq_7_bandwidth(k_s, claims.table_2("J_m") + j_sc)
+    lumped = pure_torque_bandwidth(k_s, claims.table_2("J_m") + j_sc)
     yield Finding(
         "found",
         "2.3.1, Eqs. (4) and (5)",
@@ -69,7 +74,7 @@ def equations() -> Iterator[Finding]:
         "silent",
         "Eq. (3) and Eq. (7)",
         f"The rule of Eq. (7) on the lumped Eq. (3) gives {lumped:.2f} Hz where Eq. (6) gives "
-        f"{paper.eq_7_bandwidth(k_s, j_sc):.1f} Hz: the strongest number for the unlumped model, and not "
+        f"{pure_torque_bandwidth(k_s, j_sc):.1f} Hz: the strongest number for the unlumped model, and not "
         "printed.",
     )
     yield Finding(
@@ -80,7 +85,7 @@ def equations() -> Iterator[Finding]:
         f"peaks at {peak_db:+.2f} dB ({peak_hz:.1f} Hz), never reaches +3 dB and falls below −3 dB at "
         f"{flat_band(eq_6):.1f} Hz; its phase passes −10° at {flat_band(eq_6, 3.0, 10.0):.1f} Hz.",
     )
-    nominal = paper.eq_9_spring_stiffness(claims.SPRING_RATE, claims.ARM, 0.0)
+    nominal = formulas.eq_9_spring_stiffness(claims.SPRING_RATE, claims.ARM, 0.0)
     yield Finding(
         "unclear",
         "3.1, Eqs. (8) and (9)",

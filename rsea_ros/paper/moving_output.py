@@ -15,10 +15,10 @@ import numpy as np
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.frequency_response import estimate_response
 from rsea_ros.identification.result import FrequencyResponse
-from rsea_ros.identification.rivals import Rival, compare
 from rsea_ros.model.lumped import lumped
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import synthesize
+from rsea_ros.paper.rivals import Rival, compare
 from rsea_ros.signals import Channel, Record
 
 NOISE = 30.0

@@ -7,12 +7,12 @@ import pytest
 
 from rsea_ros.design.catalogue import unit_named
 from rsea_ros.model import outputs
-from rsea_ros.model.paper_claims import PROTOTYPE_TRAINS, claims, last_digit
-from rsea_ros.model.paper_findings import findings
-from rsea_ros.model.paper_findings_bench import clamp_error
-from rsea_ros.model.paper_moving import largest_gap, readings, resonance_hz
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.paper.claims import PROTOTYPE_TRAINS, claims, last_digit
+from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
+from rsea_ros.paper.findings import findings
+from rsea_ros.paper.findings_bench import clamp_error
 
 
 @pytest.mark.parametrize(("text", "step"), [("3.14", 0.01), ("7", 1.0), ("6.169e-4", 1e-7), ("1e8", 1e8)])

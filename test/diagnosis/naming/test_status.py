@@ -12,7 +12,7 @@ from rsea_ros.diagnosis.naming.evidence import Evidence
 from rsea_ros.diagnosis.naming.flexible import Flexible
 from rsea_ros.diagnosis.naming.probability import features, probability
 from rsea_ros.diagnosis.naming.signature import Signature
-from rsea_ros.diagnosis.naming.status import standing, status_of
+from rsea_ros.diagnosis.naming.status import probabilities_and_status, status_of
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.settings import DEFAULT
 
@@ -41,7 +41,7 @@ RIGHT = Evidence(
 
 @given(st.lists(EVIDENCE, min_size=1, max_size=4), st.booleans(), st.booleans())
 def test_a_cause_and_its_rivals_share_one_probability(evidence, at_floor, takes_most):
-    likely, _ = standing(evidence, at_floor, takes_most)
+    likely, _ = probabilities_and_status(evidence, at_floor, takes_most)
     assert all(0.0 <= p <= 1.0 for p in likely)
     assert sum(likely) <= 1.0 + 1e-9
 
@@ -59,7 +59,7 @@ def test_only_what_is_likely_is_confirmed(p, rivals, at_floor):
 @given(EVIDENCE)
 def test_what_the_data_speak_against_is_not_named(evidence):
     """Not at the floor and taking less than most: improbable, or no sure help, is no cause."""
-    (p,), status = standing([evidence], at_floor=False, takes_most=False)
+    (p,), status = probabilities_and_status([evidence], at_floor=False, takes_most=False)
     brings = evidence.gain_low >= 0.1 and not evidence.at_edge
     assert (status is None) == (not evidence.is_sure or p < (0.2 if brings else 0.5))
 

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.model import outputs, paper_formulas
+from rsea_ros.model import outputs
 from rsea_ros.model.bandwidth import inner_inertia
 from rsea_ros.model.equations import rotor_inertia, train_ratio
 from rsea_ros.model.response import frequency_response
 from rsea_ros.model.rig import END_NAMES, Rig
 from rsea_ros.model.train import TRAINS, Train
+from rsea_ros.paper import formulas
 from rsea_ros.signals import ComplexArray, FloatArray
 
 HZ: FloatArray = np.geomspace(0.5, 140.0, 60)
@@ -94,7 +95,7 @@ def _off(rig: Rig, other: Rig) -> float:
 def _off_eq_5(rig: Rig) -> float:
     ratio = rig["gear.ratio"]
     rotor = rig["rotor.reflected_inertia"] / ratio**2, rig["rotor.reflected_damping"] / ratio**2
-    eq_5 = paper_formulas.eq_5_proximal_per_motor(
+    eq_5 = formulas.eq_5_proximal_per_motor(
         rig["spring.stiffness"], *rotor, ratio, rig["chassis.inertia"], rig["spring.damping"]
     )
     return _worst(_proximal(rig), eq_5(2j * np.pi * HZ))

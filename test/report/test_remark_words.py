@@ -1,0 +1,46 @@
+"""Facts of a fit and a diagnosis in words: every code has its sentence, and the sentence has its numbers."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from rsea_ros.identification.remark import Code, Remark
+from rsea_ros.report.remark_words import remark_sentences
+
+SAID = {
+    Remark("even_clocks", ("command", "ft"), (1.7e-4, 2.5e-3)): "by 0.17 ms RMS and ft by 2.5 ms RMS.",
+    Remark("clocks_taken_as_right", ("spring.stiffness",), (3.04,)): "of spring.stiffness 3.0 times as wide.",
+    Remark("torque_by_motor_constant"): "only through the motor constant:",
+    Remark("torque_by_loop_gains"): "only through the loop's gains,",
+    Remark("at_bound", ("backlash.gap",), (0.05,), "rad"): "backlash.gap ran to its bound, 0.05 rad:",
+    Remark("not_shown", ("torque_saturation.limit",)): "data: they do not show it. Measure it apart",
+    Remark("only_prior", ("spring.damping",)): "the rig's prior. Excitation above the resonance,",
+    Remark("only_ratios", ("a", "b")): "Only ratios of a and b are identifiable",
+    Remark("only_together", ("a", "b", "c")): "a, b and c are identifiable from these data only together",
+    Remark("play_undetermined", values=(4e-3, 0.012)): "with 4 mrad, which fits best, the residual of data "
+    "that took no part changes by -1.2 %.",
+    Remark("also_in_model", ("ft_bias",)): "The extended model also has ft bias:",
+    Remark("coherence_lost", ("ft",), (83.2,), "Hz"): "Above 83.2 Hz the coherence of the F/T torque",
+    Remark("on_measured_angle"): "on the measured rotor angle:",
+    Remark("coloured_noise", ("ft", "position")): "The noise of the F/T torque and position is coloured:",
+}
+
+
+@pytest.mark.parametrize(("remark", "text"), SAID.items(), ids=lambda item: getattr(item, "code", ""))
+def test_a_remark_is_said_with_its_names_and_numbers(remark, text):
+    (sentence,) = remark_sentences([remark])
+    assert text in sentence and sentence.endswith(".")
+
+
+def test_every_code_has_its_words():
+    assert {remark.code for remark in SAID} == set(get_args(Code))
+
+
+def test_a_loops_gains_are_fixed_by_other_measurements_than_a_spring():
+    spring, loop = remark_sentences([
+        Remark("only_ratios", ("spring.stiffness", "rotor.reflected_inertia")),
+        Remark("only_ratios", ("controller.k_p", "rotor.reflected_inertia")),
+    ])  # fmt: skip
+    assert "A measured spring stiffness" in spring and "a gain known from the firmware" in loop
