@@ -32,7 +32,8 @@ class World:
         monkeypatch.setattr(elimination, "initial_guesses", lambda effect, view: [{"from": "residual"}])
         monkeypatch.setattr(elimination, "screen", self.screen)
 
-    def screen(self, solution, rival, guesses):
+    def screen(self, solution, rival, guesses, rule):
+        assert rule is DEFAULT.forward
         self.guesses[rival.name] = guesses
         if rival.name in self.impossible:
             return None
