@@ -7,6 +7,7 @@ it one for each mutant, in which the module is imported with its fault and the t
 from __future__ import annotations
 
 import ast
+import gc
 import importlib.machinery
 import importlib.util
 import os
@@ -48,7 +49,10 @@ def outcomes(
             if place == "baseline":
                 if outcome != SURVIVED:
                     os.waitpid(pid, 0)
-                    raise BenchError(f"{target}: its tests do not pass without a fault: {outcome}")
+                    raise BenchError(
+                        f"{target}: its tests do not pass without a fault ({outcome}), expected that of"
+                        f" ./rsea test {' '.join(f'test/{test}' for test in tests)} -n 0"
+                    )
                 continue
             tell(mutants[int(place)], outcome, float(seconds))
     if os.waitpid(pid, 0)[1] != 0:
@@ -62,13 +66,14 @@ def _serve(target: str, tests: Sequence[str], mutants: Sequence[Mutant], outlet:
         name, path = f"rsea_ros.{target.replace('/', '.')}", ROOT / "rsea_ros" / f"{target}.py"
         files = [ROOT / "test" / test for test in tests]
         warm(name, files)
+        gc.freeze()
         source = path.read_text()
         outcome, cpu, wall = _fork(lambda: _play(name, path, ast.parse(source), files), 600.0, 600.0)
         os.write(outlet, f"baseline {outcome} {cpu}\n".encode())
         for k, mutant in enumerate(mutants if outcome == SURVIVED else ()):
             tree = mutated(source, mutant)
             outcome, _, took = _fork(
-                lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 20.0 * wall + 60.0
+                lambda tree=tree: _play(name, path, tree, files), 3.0 * cpu + 3.0, 5.0 * wall + 15.0
             )
             os.write(outlet, f"{k} {outcome} {took:.2f}\n".encode())
         status = 0
@@ -103,14 +108,14 @@ def _play(name: str, path: Path, tree: ast.Module, files: Sequence[Path]) -> int
     import pytest
 
     quiet = os.open(os.devnull, os.O_WRONLY)
-    if not os.environ.get("MUTANTS_LOUD"):
-        os.dup2(quiet, 1)
-        os.dup2(quiet, 2)
-    sys.dont_write_bytecode = True
+    os.dup2(quiet, 1)
+    os.dup2(quiet, 2)
     sys.meta_path.insert(0, _Finder(name, path, tree))
     os.chdir(ROOT)
-    flags = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestWarning"]
-    return int(pytest.main([*flags, *map(str, files)]))
+    without = ("cacheprovider", "unraisableexception", "threadexception")  # the last two collect garbage
+    flags = [flag for name in without for flag in ("-p", f"no:{name}")]
+    flags += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of plugins that are imported already
+    return int(pytest.main(["-x", "-q", *flags, *map(str, files)]))
 
 
 class _Loader(importlib.machinery.SourceFileLoader):

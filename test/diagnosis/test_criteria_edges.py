@@ -54,7 +54,8 @@ def settings(**acceptance):
     return replace(DEFAULT, acceptance=replace(DEFAULT.acceptance, **acceptance))
 
 
-RULE = settings(matters=0.5, fall=0.5, fall_in_doubt=0.5, room=0.25)
+HALF = settings(matters=0.5)
+RULE = settings(fall=0.5, fall_in_doubt=0.5, room=0.25)
 A, B, C = "coulomb_friction", "backlash", "hard_stop"
 
 
@@ -69,12 +70,12 @@ A, B, C = "coulomb_friction", "backlash", "hard_stop"
     ],
 )
 def test_what_just_meets_the_limit_does_not_matter(now, before, matters):
-    assert preference(now, before, rule=RULE.acceptance).matters is matters
+    assert preference(now, before, rule=HALF.acceptance).matters is matters
 
 
 def test_better_is_sure_and_matters():
     for now, better in ((1.9, False), (0.9, True), (4.0, False)):
-        assert preference(score(ft=now), score(ft=2.0), rule=RULE.acceptance).better is better
+        assert preference(score(ft=now), score(ft=2.0), rule=HALF.acceptance).better is better
 
 
 def test_models_with_as_many_parameters_pay_nothing():
@@ -121,7 +122,7 @@ def test_far_from_the_floor_the_simplest_of_the_nearly_equal_is_accepted():
     best = model(A, size=3, ft=8.0)
     nearly, worse = model(B, ft=11.875), model(C, ft=12.0)
     present = score(ft=40.0)
-    assert break_tie([worse, best, nearly], present, settings(room=0.25)) == (nearly, ())
+    assert break_tie([worse, best, nearly], present, RULE) == (nearly, ())
 
 
 def test_of_as_simple_ones_what_a_model_loses_counts_as_much_as_its_prior():

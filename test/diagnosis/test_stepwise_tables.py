@@ -203,9 +203,10 @@ def test_a_more_detailed_effect_takes_a_place_where_it_brings_enough(world, befo
         assert setup.weights.ratio("ft") == before and setup.cases == it.fits.cases
 
 
-def test_a_place_is_offered_to_nothing_simpler_and_to_nothing_that_acts(world):
-    it = world(script({f"{STRIBECK}+{LUGRE}": 20.0}))
+def test_a_place_is_offered_to_nothing_as_simple_and_to_nothing_that_acts(world):
+    it = world(script({f"{STRIBECK}+{LUGRE}": 20.0, DELAY: 20.0}))
     assert replacing(it, STRIBECK, LUGRE) is None
+    assert replacing(it, DELAY, effects=[effect_named(LAG)]) is None
     assert it.runs == it.fits.log == []
 
 

@@ -200,7 +200,7 @@ def test_what_somebody_else_talks_to_is_left_alone(joint, device):
     joint.away = True
     assert joint.cycle(9.0, 0.0) is None
     for refused in (joint.enable, joint.reboot):
-        with pytest.raises(DeviceError, match="under way, expected it to be over"):
+        with pytest.raises(DeviceError, match=r"^clear_fault or reboot is under way"):
             refused()
     joint.guard.torque = 4.0
     joint.disable()
@@ -344,3 +344,10 @@ def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
     device.reading = now
     joint.read()
     assert (None if joint.fault is None else str(joint.fault)) == fault
+
+
+def test_what_is_disabled_during_a_reboot_stays_without_torque(joint, device):
+    device.during = {"reboot": joint.disable}
+    joint.reboot()
+    assert device.log == ["disable", "beat False", "reboot", "disable", "beat False"]
+    assert not joint.enabled and not joint.away

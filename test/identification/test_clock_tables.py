@@ -95,8 +95,8 @@ def test_a_second_clock_is_asked_for_beside_the_first(doubt, z):
     [
         (math.inf, [], math.sqrt((16 + 25) / 4)),  # the fit takes the 3
         (math.inf, [(0, 1, 0, 0)], math.sqrt(25 / 4)),  # and the clock the 4
-        (1.0, [], math.sqrt((1.5**2 + 16 + 25) / 4)),  # half of it where zero is known as well
-        (1.0, [(0, 1, 0, 0)], math.sqrt((1.5**2 + 2.0**2 + 25) / 4)),
+        (0.5, [], math.sqrt((2.4**2 + 16 + 25) / 4)),  # a fifth of it where zero is known to a half
+        (0.5, [(0, 1, 0, 0)], math.sqrt((2.4**2 + 3.2**2 + 25) / 4)),
     ],
 )
 def test_what_a_fit_with_clocks_would_leave(doubt, taken, left):
