@@ -11,6 +11,7 @@ import numpy as np
 from rsea_ros.identification.alternatives import Alternative, alternatives, spanned
 from rsea_ros.identification.clock_doubt import with_even_clocks
 from rsea_ros.identification.confidence import (
+    Confidence,
     confidence_of,
     torque_scale,
     undetermined,
