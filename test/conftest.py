@@ -41,7 +41,7 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 DEAREST = (
     "test_realdata", "cli/test_demo", "diagnosis/test_hidden_effects", "nodes/test_driver_on_wire",
-    "diagnosis/test_two_causes", "cli/test_bad_input", "model/test_pure_torque", "nodes/test_loop",
+    "diagnosis/test_two_causes", "cli/test_bad_", "model/test_pure_torque", "nodes/test_loop",
     "diagnosis/test_puzzle", "nodes/test_controller_on_wire", "cli/test_nothing_lost", "hardware/test_faults",
     "test_inputs", "nodes/test_experiment_node", "identification/test_identify", "nodes/test_watch",
     "paper/test_moving_output", "nodes/test_driver_honest", "cli/test_paper", "test_launcher",

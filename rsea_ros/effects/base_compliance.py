@@ -90,7 +90,7 @@ EFFECT = Effect(
     structure=change,
     guesses=guesses,
     tags=("mode",),
-    part="what holds it",
+    part="support",
     about="the clamped end of the spring gives",
     equation=equation_of(__doc__),
 )

@@ -56,7 +56,7 @@ EFFECT = Effect(
     states=4,
     guesses=at_lines("ft"),
     tags=("mode",),
-    part="what holds it",
+    part="support",
     about="a mode of the structure that the F/T sensor sees beside the spring",
     equation=equation_of(__doc__),
 )

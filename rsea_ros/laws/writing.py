@@ -17,6 +17,7 @@ from rsea_ros.laws.reading import READS, letters_of, words_of
 
 _WIDE = 10.0
 """Times the fitted value: bounds of another fit."""
+_REASON = "bounds lie about the fitted value, wide enough for another machine of its kind"
 _LETTERS = {"w": "the speed ω, rad/s", "q": "the angle q, rad", "theta": "the rotor's angle θ, rad",
             "d": "the deflection d, rad", "T": "the load T, N m", "u": "the command u, N m",
             "h": "the load's angle φ, rad"}  # fmt: skip
@@ -53,7 +54,7 @@ def _docstring(law: Law, provenance: Provenance) -> str:
         f'"""{kind}: {"angle error" if law.place == "encoder" else "torque"} by {law.regressor}.',
         "", f"    {equation_of(law)}", "",
         *reach,
-        provenance.gain, f"Written by rsea law {provenance.version} on {provenance.date} from", bags, '"""',
+        provenance.gain, f"Source: rsea law {provenance.version} on {provenance.date}, from", bags, '"""',
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
@@ -114,7 +115,7 @@ def _parameter_rows(law: Law) -> list[str]:
         size = _WIDE * abs(part.coefficient)
         low = 0.0 if part.term.is_drag else -size
         rows.append(f'Parameter("{c}", "{part.term.unit}", null=0.0, low={low:.6g}, high={size:.6g}, '
-                    f"typical={part.coefficient:.6g})")  # fmt: skip
+                    f"typical={part.coefficient:.6g}, reason={_REASON!r})")  # fmt: skip
         if s and s not in seen:
             seen.add(s)
             near = {"cycles_per_revolution": 1.02, "frequency": 1.02, "mode_frequency": 1.5}.get(
@@ -123,5 +124,5 @@ def _parameter_rows(law: Law) -> list[str]:
             rows.append(f'Parameter("{s}", "{part.term.shape_unit}", null={part.shape:.6g}, '
                         f"low={part.shape / near:.6g}, high={part.shape * near:.6g}, "
                         f"typical={part.shape:.6g}, "
-                        f"logarithmic=True)")  # fmt: skip
+                        f"logarithmic=True, reason={_REASON!r})")  # fmt: skip
     return [*rows, *(["PRESLIDING"] if law.is_friction else [])]

@@ -158,4 +158,4 @@ def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch
     told = capsys.readouterr().out.splitlines()
     assert len(told) == lines and all(line.startswith("this machine was too busy (") for line in told)
     assert not told or told[0].endswith("once more")
-    assert lines < 2 or told[1].endswith("of a run that was disturbed")
+    assert lines < 2 or told[1].endswith("the results come from a disturbed run")

@@ -63,7 +63,7 @@ def test_a_node_that_fails_ends_the_others(capfd):
 def test_without_ros_one_line_says_what_is_needed(words, monkeypatch, capsys):
     monkeypatch.setattr("rsea_ros.cli._ros.find_spec", lambda name: None)
     assert cli.main(words) == 2
-    assert "no rclpy here" in capsys.readouterr().err
+    assert "rclpy is missing" in capsys.readouterr().err
 
 
 def rsea(*words: str) -> list[str]:

@@ -8,6 +8,7 @@ import pytest
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.diagnose import nominal_problem
 from rsea_ros.diagnosis.evaluation import HeldOut
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.identification.unknowns import start_vector
 from rsea_ros.model.rig_file import load_rig
@@ -27,9 +28,9 @@ def checked(stiffer=1.0, seed=1):
 def test_a_held_out_record_takes_the_place_of_the_test_blocks():
     nominal = nominal_problem([checked()], RIG)
     theta = start_vector(nominal.unknowns)
-    on_blocks = HeldOut(nominal.cases, RIG, None).score(nominal, theta)
-    alike = HeldOut(nominal.cases, RIG, checked(seed=2)).score(nominal, theta)
-    stiffer = HeldOut(nominal.cases, RIG, checked(1.05, seed=2)).score(nominal, theta)
+    on_blocks = HeldOut(nominal.cases, RIG, None, DEFAULT.blocks).score(nominal, theta)
+    alike = HeldOut(nominal.cases, RIG, checked(seed=2), DEFAULT.blocks).score(nominal, theta)
+    stiffer = HeldOut(nominal.cases, RIG, checked(1.05, seed=2), DEFAULT.blocks).score(nominal, theta)
     assert on_blocks.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert alike.ratio("position") == pytest.approx(1.0, abs=0.1)
     assert stiffer.ratio("position") > 5.0
@@ -39,6 +40,6 @@ def test_a_held_out_record_takes_the_place_of_the_test_blocks():
 def test_what_was_simulated_on_the_cases_serves_for_their_test_blocks():
     nominal = nominal_problem([checked()], RIG)
     theta = start_vector(nominal.unknowns)
-    held_out = HeldOut(nominal.cases, RIG, None)
+    held_out = HeldOut(nominal.cases, RIG, None, DEFAULT.blocks)
     again = held_out.score(nominal, theta, nominal.outputs(theta))
     assert again.sums["ft"] == pytest.approx(held_out.score(nominal, theta).sums["ft"])

@@ -20,6 +20,7 @@ from similar_machine import factor, record_with, similar
 from rsea_ros.diagnosis.diagnose import searched_effects
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.diagnosis.screening import screen
+from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Problem, case_from
@@ -41,7 +42,7 @@ def screened(name: str, times: float):
     (effect,) = (e for e in searched_effects(present.problem, ()) if e.name == name)
     fitted, _ = apply(present.problem.rig, present.problem.unknowns, present.theta)
     view = RecordView(case, fitted, present.problem.outputs(present.theta)[0])
-    return screen(present, effect, initial_guesses(effect, view))
+    return screen(present, effect, initial_guesses(effect, view), DEFAULT.forward)
 
 
 @pytest.mark.parametrize("times", [4.0**-5, 16.0])

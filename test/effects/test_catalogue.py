@@ -121,6 +121,10 @@ def test_described_for_people_and_fits(effect: Effect):
         assert all(p.low <= v <= p.high for v in (p.typical, *p.starts)), p.name
         assert not p.logarithmic or p.low > 0.0
         assert 15 < len(p.reason) < 110 or p.reason == "a share", p.name
+
+
+@every_effect
+def test_it_names_its_source(effect: Effect):
     assert "Source:" in EffectPage(effect).description
 
 

@@ -82,7 +82,7 @@ EFFECT = Effect(
     guesses=guesses,
     tags=("friction",),
     compensation=against(level, creep=1),
-    part="what holds it",
+    part="support",
     about="a paddle in oil",
     equation="T = -coefficient · √|ω| · sign(ω), smooth below creep_velocity",
 )
@@ -132,7 +132,7 @@ def test_a_diagnosis_names_it(record):
     diagnosis = diagnose([record], RIG, settings=settings)
     assert [cause.name for cause in diagnosis.causes] == ["paddle"]
     assert diagnosis.causes[0].parameters["coefficient"].value == pytest.approx(8.0, rel=0.1)
-    assert part_of(effect_named("paddle")) == "what holds it"
+    assert part_of(effect_named("paddle")) == "support"
 
 
 def test_a_law_is_looked_for_beside_it(record):

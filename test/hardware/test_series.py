@@ -79,7 +79,7 @@ def test_the_docs_have_every_model_with_its_constant():
     for table in TABLES.values():
         (row,) = [row for row in rows if row.startswith(f"| {table.name} | {table.model} |")]
         constant = table.torque_constant
-        assert (f"| {constant.value:g} |" in row) if constant else ("to be given" in row)
+        assert (f"| {constant.value:g} |" in row) if constant else ("not known, set it" in row)
 
 
 def test_every_model_is_on_the_bench_too_with_the_same_units():

@@ -13,6 +13,7 @@ from rsea_ros.model.rig import Sensor
 from rsea_ros.model.rig_document import rig_from_document
 from rsea_ros.model.rig_to_document import rig_to_document
 from rsea_ros.model.simulation import simulate
+from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.signals import Channel, Record
 
 
@@ -33,7 +34,9 @@ def test_right_clocks_are_left_alone_and_their_cost_is_said():
     result = identify([recorded(true, 1, 20.0)], nominal)
     assert clocks(result) == {}
     (note,) = result.clocks
-    assert "taken as right" in note and "times as wide" in note
+    assert note.code == "clocks_taken_as_right"
+    (sentence,) = remark_sentences([note])
+    assert "taken as right" in sentence and "times as wide" in sentence
     damping = next(p for p in result.parameters if p.name == "rotor.reflected_damping")
     assert (damping.ci95[1] - damping.ci95[0]) / 2 < 5e-4 * damping.value
 

@@ -47,7 +47,9 @@ SPRING = law("law_of_deflection", ("cubic_spring", 4e6, 0.0), ("hysteresis", 1.0
 def written(request):
     """Return an effect as its file makes it, with its measured claims, known to the catalogue."""
     made = request.param
-    with lent(effect_from(source_of(made, NOTHING, WHERE), made.name)) as _:
+    text = source_of(made, NOTHING, WHERE)
+    assert "Source: rsea law" in text
+    with lent(effect_from(text, made.name)) as _:
         record = synthesize(RIG, chirp(280.0, 10.0))
         case = nominal_problem([check(record, RIG)], RIG).cases[0]
         claims = claims_of(made, effect_named(made.name), RIG, case)

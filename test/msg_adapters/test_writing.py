@@ -148,7 +148,7 @@ BAD_TOPICS = {
 
 @pytest.mark.parametrize("name", BAD_TOPICS)
 def test_a_topic_that_ros_cannot_have_is_not_written(tmp_path, record, name):
-    says = r"^topic .*/.*: is (no name of ROS, expected|both \w+ and \w+, expected)"
+    says = r"^topic .*/.*: is (not a name of ROS, expected|both \w+ and \w+, expected)"
     with pytest.raises(BagError, match=says):
         write_record(record, tmp_path / "bag", BAD_TOPICS[name])
     assert list(tmp_path.iterdir()) == []
