@@ -14,6 +14,8 @@ from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 from test.nodes.test_driver import Spy
 
 JOINTS = ("hip", "knee", "ankle")
+STALLS = ("no_reply", "heldup", "ft", "effort", "velocity", "power")
+"""What a machine that stands still for a while latches; no test here provokes one of them."""
 X = {
     "torque_limit": 3.0, "current_limit": 3.2, "voltage_limit": 10.0, "effort_limit": 0.0, "ft_limit": 0.0,
     "power_limit": 20.0, "deflection_limit": 0.0, "ft_host": "", "rig": "bare_drive",
@@ -76,20 +78,34 @@ class Leg:
         self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
+        self.clearing = {
+            j: listener.node.create_client(Trigger, f"/leg/driver/{j}/clear_fault") for j in JOINTS
+        }
         self.commands = {
             j: listener.node.create_publisher(JointState, f"/leg/{j}/torque_command", COMMAND) for j in JOINTS
         }
 
     def push(self, torques, condition):
-        """Command torques until the condition holds."""
+        """Command torques until the condition holds; clear what a machine that stands still has latched."""
+        looked = time.monotonic()
 
         def pushed():
+            nonlocal looked
             assert self.process.running(), self.process.output[-5:]
+            if time.monotonic() - looked > 2.0:
+                looked = time.monotonic()
+                self.clear_stalls()
             for joint, torque in torques.items():
                 self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
             return condition()
 
         self.listener.until(pushed)
+
+    def clear_stalls(self):
+        """Clear the faults of joints that no test here provokes."""
+        for joint, client in self.clearing.items():
+            if (self.value(joint, "fault") or "").startswith(STALLS):
+                client.call_async(Trigger.Request())
 
     def together(self):
         """The stamps of the hip (ns) that the other joints have too, to 50 us."""
