@@ -22,11 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run pytest on the tree with three workers, since nodes wait, and return its exit status."""
+    """Run pytest on the tree with two workers and return its exit status."""
     root = Path(__file__).resolve().parents[2]
     if not (root / "test" / "conftest.py").is_file():
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
-    workers = ["-n", "3", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
+    workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
     pytest = subprocess.Popen([sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on], cwd=root)
     while True:
         try:
