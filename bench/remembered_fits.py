@@ -32,17 +32,23 @@ class Remembered:
         key = self._key("solve", problem, theta, sorted(limits.items()), matrix)
         return self._result(key, partial(_SOLVE, problem, theta, run=run, matrix=matrix, **limits))
 
-    def screen(self, present, effect, guesses):
+    def screen(self, present, effect, guesses, rule):
         """Return what screening.screen returns."""
-        key = self._key("screen", present.problem, present.theta, effect.name, guesses, present.jacobian)
-        return self._result(key, lambda: _SCREEN(present, effect, guesses))
+        limits = (rule.smaller_guess, rule.screening_steps, rule.screening_part)
+        key = self._key(
+            "screen", present.problem, present.theta, effect.name, guesses, present.jacobian, limits
+        )
+        return self._result(key, lambda: _SCREEN(present, effect, guesses, rule))
 
-    def evidence_for(self, claim, cases, run):
+    def evidence_for(self, claim, cases, settings, run):
         """Return what evidence.evidence_for returns."""
         scores = (claim.with_it.sums, claim.without.sums, claim.with_it, claim.without)
+        rules = (settings.blocks, settings.evidence, settings.acceptance)
         digests = [self._digest(c) for c in cases]
-        key = self._key("evidence", claim.problem, claim.theta, claim.name, claim.weight, *scores, *digests)
-        return self._result(key, lambda: _EVIDENCE(claim, cases, run))
+        key = self._key(
+            "evidence", claim.problem, claim.theta, claim.name, claim.weight, *scores, *rules, *digests
+        )
+        return self._result(key, lambda: _EVIDENCE(claim, cases, settings, run))
 
     def confidence_of(self, solution):
         """Return what confidence.confidence_of returns."""

@@ -150,7 +150,8 @@ def _print(advice: Advice, report: Path) -> None:
                 if i != j:
                     print(f"separates   {plain_name(a)} over {plain_name(b)}: S = {p.table[i, j]:.3g}")
         for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
-            print(f"asks        {name} {expected}, at most {level} of {limit} {unit}")
+            allowed = f"of {limit} {unit}" if limit != "none" else f"{unit} (no limit stated)"
+            print(f"asks        {name} {expected}, at most {level} {allowed}")
         print(f"run         {report.parent / COMMANDS}")
     for proof in advice.proofs:
         print(f"no run      {proof_words(proof)}")

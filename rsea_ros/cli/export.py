@@ -107,7 +107,7 @@ def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Dif
     players: Mapping[str, Callable[..., Any]] = {"mjcf": play_mujoco, "fmu": play_fmu}
     why = "--no-play" if args.no_play else ""
     if made.target not in players:
-        why = f"{TARGETS[made.target].partition(',')[0]} does not run here"
+        why = "only --mjcf and --fmu are verified by simulation"
     if not why:
         command = _excitation(rig, args, RATE)
         try:

@@ -24,7 +24,7 @@ from rsea_ros.signals import Fault, FloatArray, Record
 
 @dataclass(frozen=True)
 class Examined:
-    """What a diagnosis is of: the records as read and as checked, the held-out one as checked, the rig."""
+    """What is diagnosed: the records as read and as checked, the held-out one as checked, the rig."""
 
     records: Sequence[Record]
     checked: Sequence[Checked]
@@ -66,7 +66,7 @@ class Evaluated:
 class HeldOut:
     """What models are tested on: the test blocks of the cases, or a record that takes their place.
 
-    nominal: the rig without causes, by which the record is made ready. rule: of the blocks.
+    nominal: the rig without causes, by which the record is made ready. rule: how records are cut into blocks.
     """
 
     cases: tuple[Case, ...]

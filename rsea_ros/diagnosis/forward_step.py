@@ -78,7 +78,7 @@ class ForwardStep:
     def _finalists(self, screened: Sequence[ScreenedEffect]) -> list[ScreenedEffect]:
         """Return the best on the pieces, and the effects that are said to be confused with the very best."""
         rule, present = self.settings.forward, self.fits.on_pieces.cost
-        worth = screened[: rule.piece_fits]  # two steps from a poor guess may lead uphill
+        worth = screened[: rule.piece_fits]  # also where no step helped: the guess may have been poor
         close = sorted(self.fits.fit_pieces(worth), key=lambda s: s.cost)
         if not close:
             return []

@@ -27,7 +27,6 @@ from rsea_ros.identification.machine_scale import torque_size
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
-from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -168,30 +167,3 @@ class RecordView:
     def repeating_angle(self) -> list[Guess]:
         """Return the same of the measured angle's error, amplitude in rad."""
         return angle_errors(self.case, self.rig, self.outputs)
-
-
-def torque_scale(case: Case, rig: Rig) -> float:
-    """Return the largest torque of a position loop's motor, N m: measured, or asked for by its errors."""
-    if "motor_torque" in case.measured:
-        keep = case.mask["motor_torque"]
-        return float(np.quantile(np.abs(case.measured["motor_torque"][keep]), _OUTLIERS))
-    if "position" not in case.measured or not isinstance(case.drive, Drive):
-        return 0.0
-    keep, drive = case.mask["position"], case.drive
-    steps = ((case.t["position"][keep] - drive.start) / drive.step).astype(np.int64)
-    error = drive.command[np.clip(steps, 0, len(drive.command) - 1)] - case.measured["position"][keep]
-    _, position, _, velocity, *_ = loop_parameters(rig)
-    gain = position if rig.loop == "pd" else position * velocity
-    return gain * float(np.quantile(np.abs(error), _OUTLIERS))
-
-
-def joint_starts(effect: Effect, scale: float) -> list[dict[str, float]]:
-    """Return where fits of an effect begin whose main parameter is a torque. scale: largest torque, N m."""
-    main = effect.main
-    shares = _LIMITS if main.name == "limit" else _SHARES
-    sizes = {min(max(share * scale, main.low), main.high) for share in shares}
-    torques = [p.name for p in effect.parameters if p.unit == "N m"]
-    return [
-        {**effect.typical, **{name: size * effect.typical[name] / main.typical for name in torques}}
-        for size in sorted(sizes)
-    ]

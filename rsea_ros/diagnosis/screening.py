@@ -50,18 +50,26 @@ def screen(
     """
     best = _best_of(present, effect, guesses, rule)
     if best is None or best.cost >= present.cost:
-        smaller = [_smaller(effect, guess, rule.smaller_guess) for guess in guesses]
-        second = _best_of(present, effect, [guess for guess in smaller if guess is not None], rule)
+        second = _best_of(present, effect, _other_guesses(effect, guesses, rule.smaller_guess), rule)
         best = min((b for b in (best, second) if b is not None), key=lambda b: b.cost, default=None)
     return best
 
 
-def _smaller(effect: Effect, guess: Mapping[str, float], share: float) -> dict[str, float] | None:
-    """Return a guess of a share of its size, where an effect is nearly linear; None without a null size."""
+def _other_guesses(
+    effect: Effect, guesses: Sequence[Mapping[str, float]], share: float
+) -> list[dict[str, float]]:
+    """Return guesses of a share of their size, where an effect is nearly linear; none without a null size.
+
+    A mode's main parameter, its frequency, is no size: where the peaks of the residual do not show one, its
+    typical values are tried.
+    """
     main = effect.main
-    if main.name not in guess or not math.isfinite(main.null):
-        return None
-    return {**guess, main.name: main.null + share * (guess[main.name] - main.null)}
+    if "mode" in effect.tags:
+        return [dict(effect.typical)] if guesses else []
+    if not math.isfinite(main.null):
+        return []
+    sized = [guess for guess in guesses if main.name in guess]
+    return [{**guess, main.name: main.null + share * (guess[main.name] - main.null)} for guess in sized]
 
 
 def _best_of(

@@ -32,7 +32,7 @@ _NULL = 1e-9
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""
 _INVOLVED = 0.2
-"""A parameter moves along with an untold direction when it moves at least so much of the largest."""
+"""A parameter moves along with an undetermined direction when it moves at least so much of the largest."""
 _ALIKE = 0.8
 """Values share a factor when the one that moves least moves so much of the one that moves most."""
 
@@ -42,12 +42,11 @@ class Confidence:
     """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
     told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
-    unknowns free: 0 where only a ratio with others is told. information: J'J, shape (n, n).
+    unknowns free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
     theta: where the fit ended, shape (n,).
     """
 
     theta: FloatArray
-
     covariance: FloatArray
     told: FloatArray
     information: FloatArray
@@ -188,7 +187,7 @@ def _at_bound(unknown: Unknown, coordinate: float) -> Remark:
 
 
 def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:
-    """Return what cannot be told of unknowns that move together. moved: how far each, relatively."""
+    """Return what is undetermined of unknowns that move together. moved: how far each, relatively."""
     names = tuple(u.name for u in unknowns)
     if len(names) == 1:
         return Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)

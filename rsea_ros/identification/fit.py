@@ -76,7 +76,7 @@ def _with_noise_of(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -
 
 
 def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
-    """Tell whether the noise of any channel has changed by more than a fit would notice."""
+    """Return whether the noise of any channel has changed by more than a fit would notice."""
     ratios = [b.noise[n] / a.noise[n] for a, b in zip(before, after, strict=True) for n in a.noise]
     return any(not 1.0 / _OTHER_NOISE < r < _OTHER_NOISE for r in ratios)
 
@@ -103,8 +103,7 @@ def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:
 
 
 def _stated_effects(rig: Rig, cases: Sequence[Case]) -> Iterator[tuple[Effect, Mapping[str, float]]]:
-    """Yield the effects that a rig states with their parameters, bounds as the machine and these have it."""
+    """Yield the effects that a rig states with their parameters; bounds suit the machine and hold these."""
     scale = scale_of(cases, rig) if rig.effects else Scale()
     for e in rig.effects:
         yield effect_named(e.name).at(scale).reaching(e.parameters), e.parameters
-

@@ -32,10 +32,10 @@ def scale_of(cases: Sequence[Case], rig: Rig) -> Scale:
 def torque_size(case: Case, rig: Rig) -> float:
     """Return the largest torque of a run, N m: commanded, or measured in the motor or by the F/T sensor.
 
-    Of a position loop whose current was not measured: what it asks for by its errors. 0 where none shows it.
+    Of a position loop: measured in the motor, else what it asks for by its errors. 0 where none shows it.
     """
-    shown = [_largest(case, n) for n in ("motor_torque", "ft") if n in case.measured]
     if rig.loop is None:
+        shown = [_largest(case, n) for n in ("motor_torque", "ft") if n in case.measured]
         asked = [_quantile(case.drive.command)] if isinstance(case.drive, Drive) else []
         return max([*asked, *shown], default=0.0)
     if "motor_torque" in case.measured:

@@ -113,7 +113,7 @@ class Unknown:
         return math.log(value) if self.logarithmic else value
 
     def outer(self, coordinate: float) -> float:
-        """Return the value in SI, inside the bounds; 0 where that is one and only rounding is left."""
+        """Return the value in SI, inside the bounds; 0 where 0 is allowed and only rounding is left."""
         value = math.exp(min(coordinate, 700.0)) if self.logarithmic else coordinate
         value = min(max(value, self.low), self.high)
         return 0.0 if abs(value) < LEAST_SIZE and self.low <= 0.0 else value

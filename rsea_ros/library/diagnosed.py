@@ -107,7 +107,7 @@ def diagnose(
     """Find the causes of the simulation error of a rig in records, and measure the gain of each cause.
 
     data: one record, or several of the same bench. rig: a Rig, a file, or the name of a rig in config/rigs.
-    holdout: a record for testing only; without it, every fourth second of the records. progress: called with
+    holdout: a record for testing only; without it, a quarter of their blocks. progress: called with
     the name of a step and the share done, 0 to 1. Raises IdentificationError for records that cannot be
     diagnosed, RigError for the rig. Method: docs/diagnosis.md.
     Not to be confused with identify, which trusts the structure of the rig and fits only its values.

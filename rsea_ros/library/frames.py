@@ -13,7 +13,8 @@ from rich.table import Table
 from rsea_ros.errors import ParameterError
 from rsea_ros.identification.result import ParameterEstimate
 
-_WIDTH = 100
+_WIDTH = 140
+"""Characters: the width at which `rsea check` prints its table into a file."""
 
 
 def parameter_frame(parameters: Sequence[ParameterEstimate]) -> Any:

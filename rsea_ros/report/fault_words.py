@@ -48,9 +48,13 @@ def _by_channel(items: Sequence[Fault]) -> str:
 
 
 def _size(f: Fault) -> str:
-    size = "" if f.size is None else f", {words.number(f.size, 3)} {words.unit(f.unit)}".rstrip()
+    size = "" if f.size is None else f", {_number(f.size)} {words.unit(f.unit)}".rstrip()
     share = f", {words.number(100.0 * f.share, 2)} % of the samples" if math.isfinite(f.share) else ""
     return size + share
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if float(value).is_integer() else words.number(value, 3)
 
 
 def _kind(f: Fault) -> str:

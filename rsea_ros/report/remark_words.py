@@ -105,8 +105,7 @@ def _also_in_model(remark: Remark) -> str:
 def _coherence_lost(remark: Remark) -> str:
     return (
         f"Above {remark.values[0]:.3g} Hz the coherence of the {words.channel(remark.names[0])} with the "
-        "command is lost: most of it is noise there, and what these data say of those frequencies is said "
-        "by chance."
+        "command is lost: most of it is noise there, and these data say little about those frequencies."
     )
 
 

@@ -14,7 +14,7 @@ from rsea_ros.signals import FloatArray
 Piece = Literal["level", "line"]
 """What a piece is: a level, or a level with a slope."""
 _MOST = 80
-"""Places that PELT looks at, in pure Python; the days between are looked at afterwards (refit.py)."""
+"""Places that PELT looks at, in pure Python; the days between are looked at afterwards (course.py)."""
 
 
 class WeightedPieces(BaseCost):  # type: ignore[misc]

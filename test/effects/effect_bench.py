@@ -15,7 +15,7 @@ from rsea_ros.signals import Channel, Record
 
 RIG = load_rig("paper_high_impedance")
 ON_THE_BENCH = [e for e in catalogue().values() if e.name != "gravity_error"]
-"""Every effect that a bench with both ends clamped can have; test_gravity_error.py tests the other."""
+"""Every effect that a bench with both ends clamped can have; test_variants.py has the other."""
 SIGNALS = ("ft", "position", "velocity")
 NOISE = {"ft": 0.03, "position": 6.2e-6, "velocity": 2.1e-4, "motor_torque": 0.06}
 """One sigma of each sensor of the rig, its quantum counted as quantum / sqrt(12)."""

@@ -15,7 +15,7 @@ NAN = Fault("nan", "ft", 0.01)
 
 def test_a_fault_of_a_topic_is_one_line_for_all_its_channels():
     assert fault_lines([*DISORDER, NAN]) == [
-        "out of order in position, velocity and motor torque, 84.0 samples, 5.0 % of the samples "
+        "out of order in position, velocity and motor torque, 84 samples, 5.0 % of the samples "
         "(first at 0.4 s, sorted)",
         "NaN in F/T torque, 1.0 % of the samples",
     ]

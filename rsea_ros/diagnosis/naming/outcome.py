@@ -71,7 +71,7 @@ def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Name
 
 
 def is_named(stage: Evaluated, naming: Mapping[str, Named]) -> bool:
-    """Tell whether the cause that a stage adds may be named."""
+    """Return whether the cause that a stage adds may be named."""
     return stage.added in naming and naming[stage.added].status is not None
 
 

@@ -43,7 +43,7 @@ def contests(
 ) -> list[Contest]:
     """Return the contest for the place of each accepted cause, in the order of the stages.
 
-    far: from how many times the noise on the data are tempered (tempering.py).
+    far: from how many times the noise on the data are tempered (score.py).
     """
     result = []
     for without, with_it in itertools.pairwise(stages):

@@ -73,7 +73,7 @@ def number(f: Finding) -> str:
     """Return the number of a finding with its interval and unit."""
     if f.value is None:
         return ""
-    shown = words.number(f.value, 3)
+    shown = f"{f.value:.0f}" if f.kind == "topics" else words.number(f.value, 3)
     if f.low is not None and f.high is not None:
         shown = "".join(words.with_doubt(f.value, f.low, f.high))
     return f"{shown} {words.unit(f.unit)}".rstrip()

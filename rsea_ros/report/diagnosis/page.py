@@ -52,7 +52,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     yield _final(d)
     yield tried_section(d)
     yield channel_section(d)
-    yield _untold(d)
+    yield _undetermined(d)
     if d.next_experiment is not None:
         yield experiment_section(d.next_experiment)
     yield _faults(d)
@@ -76,7 +76,7 @@ def _kicker(d: Diagnosis) -> str:
     return f"Diagnosis of {d.rig_name} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
 
 
-def _untold(d: Diagnosis) -> str:
+def _undetermined(d: Diagnosis) -> str:
     told = [*say.confusions(d), *remark_sentences(d.remarks)]
     body = bullets(told) if told else paragraph("The data determine every free value.")
     return section("What these data cannot determine", body)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rsea_ros.diagnosis.result import Alternative, Cause, Diagnosis
+from rsea_ros.diagnosis.result import Alternative, Cause
 from rsea_ros.report import words
 from rsea_ros.wording import listed
 
@@ -31,12 +31,6 @@ def standing(cause: Cause, alternatives: Sequence[Alternative] = (), at_floor: b
         return f"one of: {listed(said, 'or')}; {reason}"
     text = f"{STATUS[cause.status]}: {said[0]}; {reason}"
     return f"{text}; less likely instead: {listed(said[1:], 'or')}" if rivals else text
-
-
-def standings(diagnosis: Diagnosis) -> list[str]:
-    """Return the standing of every cause of a diagnosis."""
-    d = diagnosis
-    return [standing(c, d.alternatives, d.at_noise_floor) for c in d.causes]
 
 
 def against(cause: Cause, alternatives: Sequence[Alternative]) -> list[Alternative]:

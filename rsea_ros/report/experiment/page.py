@@ -33,7 +33,7 @@ def advice_page(advice: Advice, provenance: Provenance | None = None) -> str:
         blocks = [
             key_numbers(_keys(p)),
             *blocks,
-            _separations(p),
+            *([_separations(p)] if len(p.names) > 1 else []),
             command_figure(p),
             spectrum_figure([("run", p)]),
         ]
@@ -56,7 +56,7 @@ def _keys(p: Proposal) -> list[tuple[str, str]]:
         keys.append(
             (f"{worst[2]:.3g}", f"S of {plain_name(worst[0])} over {plain_name(worst[1])}, the worst pair")
         )
-    return [*keys, (f"{p.decided:.0%}", "expected to be decided")]
+    return keys if len(p.names) == 1 else [*keys, (f"{p.decided:.0%}", "expected to be decided")]
 
 
 def _causes(advice: Advice) -> str:

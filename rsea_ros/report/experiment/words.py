@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from rsea_ros.experiment.advice import Advice, Proof
-from rsea_ros.experiment.hypothesis import NOTHING
+from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.limits import UNITS
 from rsea_ros.experiment.margins import LEVEL
 from rsea_ros.experiment.proposal import Proposal
@@ -30,10 +32,20 @@ def verdict(advice: Advice) -> str:
     if p is None:
         return f"No run within the limits separates {listed(names)}"
     if len(names) == 1:
-        times = 2.718281828**p.sharpened
-        return f"The next run narrows the interval of {names[0]} {times:.3g} times: {shape_words(p)}"
+        return f"{_narrowed(advice.hypotheses[0], p)}: {shape_words(p)}"
     share = f"{100.0 * p.decided:.0f} %"
     return f"The next run is expected to decide between {listed(names)} in {share} of cases: {shape_words(p)}"
+
+
+def _narrowed(hypothesis: Hypothesis, p: Proposal) -> str:
+    """Return how much a run narrows each interval where one cause is left: the geometric mean over them."""
+    if hypothesis.name == NOTHING:
+        return "No cause is in doubt; a run can only narrow the intervals of the rig, and this one does most"
+    count = len(hypothesis.own) or len(hypothesis.theta)
+    times = f"{math.exp(p.sharpened / count):.3g} times"
+    if count == 1:
+        return f"The next run narrows the interval of {plain_name(hypothesis.name)} {times}"
+    return f"The next run narrows the intervals of {plain_name(hypothesis.name)} {times} on average"
 
 
 def proof_words(proof: Proof) -> str:

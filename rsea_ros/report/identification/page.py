@@ -36,7 +36,7 @@ def identification_report(identification: Identification, provenance: Provenance
     blocks += [bode_figure(r, m) for r, m in zip(responses, models, strict=True)]
     for overlay in _shown(identification):
         blocks += [_over_time(identification, overlay), _over_frequency(identification, overlay)]
-    blocks += [_untold(identification), _correlation(identification)]
+    blocks += [_undetermined(identification), _correlation(identification)]
     footer = [*_footer(identification), *(provenance.lines if provenance else ())]
     return page(verdict_sentence(identification), _kicker(identification), blocks, footer)
 
@@ -125,7 +125,7 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
     return residual_figure(title, n, frequency, curves, noise)
 
 
-def _untold(identification: Identification) -> str:
+def _undetermined(identification: Identification) -> str:
     title = "What these data cannot determine"
     said = (*doubt_sentences(identification), *remark_sentences(identification.remarks))
     body = bullets(said) if said else paragraph("The data determine every free value.")

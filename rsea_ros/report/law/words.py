@@ -22,13 +22,22 @@ def headline(result: LawResult) -> str:
     if result.at_floor:
         return "No law is needed: the model is at the noise floor"
     if not result.laws:
-        return "A residual remains, but no law of it holds on held-out blocks"
+        return f"{_remaining(result)} remains, but no law of it holds on held-out blocks"
     law = result.laws[0].law
     kind = "A learnt law, which names no cause: " if law.is_learnt else ""
     share = min(100.0 * result.share, 100.0)
     also = _also(result)
     sentence = f"{share:.0f} % of the remaining residual is a function of {depends_on(law, result)}{also}"
     return f"{kind}{sentence}"
+
+
+def _remaining(result: LawResult) -> str:
+    """Return the worst residual on the test blocks: `A residual of 1.19 times the noise (F/T torque)`."""
+    ratios = {n: before / result.noise[n] for n, before in result.before.items() if result.noise.get(n)}
+    if not ratios:
+        return "A residual"
+    worst = max(ratios, key=lambda n: ratios[n])
+    return f"A residual of {words.number(ratios[worst])} times the noise ({words.channel(worst)})"
 
 
 def depends_on(law: Law, result: LawResult) -> str:
