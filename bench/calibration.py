@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import copyreg
-import json
 import pickle
 import sys
 import time
@@ -22,10 +21,12 @@ from typing import Any
 
 from calibration_records import Plan, left_out, made, plans
 from calibration_score import JUDGES, diagram, fitted, reliability, rows, said, table
+from json_log import append_to_log, read_log
 
 from rsea_ros.checks.faults import check
 from rsea_ros.diagnosis.criteria import is_at_floor, takes_most
 from rsea_ros.diagnosis.diagnose import nominal_problem, search
+from rsea_ros.diagnosis.evaluation import held_out_of
 from rsea_ros.diagnosis.naming.weighing import Place, weigh
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.workers import worker_pools
@@ -70,13 +71,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def _make(args: argparse.Namespace) -> None:
     """Append the evidence of every record that the cache does not hold yet."""
-    args.cache.parent.mkdir(parents=True, exist_ok=True)
-    done = {entry["name"] for entry in read(args.cache)}
+    done = {entry["name"] for entry in read_log(args.cache)}
     for plan in plans(args.records):
         if plan.name not in done:
             entry = _entry(plan, args.searches, args.pool)
-            with args.cache.open("a") as file:
-                file.write(json.dumps(entry) + "\n")
+            append_to_log(args.cache, entry)
             print(_line(entry), flush=True)
 
 
@@ -107,12 +106,7 @@ def _score(args: argparse.Namespace) -> None:
 
 def usable(cache: Path) -> list[dict[str, Any]]:
     """Return the entries of a cache that ended without an error."""
-    return [e for e in read(cache) if "error" not in e]
-
-
-def read(cache: Path) -> list[dict[str, Any]]:
-    """Return the entries of a cache, none where it does not exist."""
-    return [json.loads(line) for line in cache.read_text().splitlines()] if cache.exists() else []
+    return [e for e in read_log(cache) if "error" not in e]
 
 
 def _entry(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
@@ -144,7 +138,8 @@ def _weighed(plan: Plan, searches: Path | None, pool: int) -> dict[str, Any]:
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps((selection, stages)))
-        accepted, weighing = len(stages), weigh(selection, stages, None, pools, settings)
+        accepted, held_out = len(stages), held_out_of(selection, None)
+        weighing = weigh(selection, stages, held_out, pools, settings)
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     return {
         "nothing_wrong": is_at_floor(first),

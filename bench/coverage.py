@@ -10,7 +10,6 @@ Found: the effect is named, alone or among the rivals of a cause.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 import traceback
@@ -21,6 +20,7 @@ from typing import Any
 
 from coverage_records import COMMANDS, made
 from independent.severities import SEVERITIES, SIZES
+from json_log import append_to_log, read_log
 
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.model.rig_file import load_rig
@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
 def _play(args: argparse.Namespace) -> None:
     import numpy as np
 
-    done = {entry["cell"] for entry in _read(args.log)}
+    done = {entry["cell"] for entry in read_log(args.log)}
     cells = list(product(args.effect or SIZES, args.work or COMMANDS, args.severity or SEVERITIES))
     order = np.random.default_rng(args.seed).permutation(len(cells))[: args.sample]
     for effect, work, severity in (cells[k] for k in order):
@@ -68,8 +68,7 @@ def _play(args: argparse.Namespace) -> None:
             continue
         entry = {"cell": cell, "effect": effect, "work": work, "severity": severity}
         entry |= _outcome(effect, work, severity, args)
-        with args.log.open("a") as file:
-            file.write(json.dumps(entry) + "\n")
+        append_to_log(args.log, entry)
         named = [f"{c['name']} {c['status']} {c['probability']:.2f}" for c in entry.get("causes", [])]
         print(f"{entry['outcome']:<7}{cell:<55}{', '.join(named)} {entry['seconds']:.0f} s", flush=True)
 
@@ -113,7 +112,7 @@ def _judged(effect: str, causes: Sequence[dict[str, Any]], left: float) -> str:
 
 
 def _table(args: argparse.Namespace) -> None:
-    entries = _read(args.log)
+    entries = read_log(args.log)
     by_cell: dict[tuple[str, str, str], list[str]] = {}
     for entry in entries:
         by_cell.setdefault((entry["effect"], entry["work"], entry["severity"]), []).append(entry["outcome"])
@@ -134,10 +133,6 @@ def _table(args: argparse.Namespace) -> None:
 
 def _is_surely_wrong(entry: dict[str, Any]) -> bool:
     return any(c["status"] == "confirmed" and c["name"] != entry["effect"] for c in entry.get("causes", []))
-
-
-def _read(log: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from independent.bench import drawn_bench, record_command  # noqa: E402
 from independent.hidden import hide  # noqa: E402
 from independent.severities import SEVERITIES, drawn_parameters  # noqa: E402
 
+from bench.json_log import append_to_log, read_log  # noqa: E402
 from bench.sections import parser_of  # noqa: E402
 from msg_adapters import write_record  # noqa: E402
 from rsea_ros.cli._processes import Processes  # noqa: E402
@@ -168,14 +169,13 @@ def said(outcome):
 
 def causes(log, first, count):
     """Play benches and append their lines."""
-    done = {json.loads(line)["bench"] for line in log.read_text().splitlines()} if log.exists() else set()
+    done = {entry["bench"] for entry in read_log(log)}
     with worker_pools() as pools:
         for k in range(first, first + count):
             if k in done:
                 continue
             line = one(k, pools)
-            with log.open("a") as file:
-                file.write(json.dumps(line) + "\n")
+            append_to_log(log, line)
             short = {
                 p: (line[p]["end"], line[p]["cause"], round(line[p]["seconds"], 2))
                 for p in ("designed", "chirp", "random")
@@ -186,7 +186,7 @@ def causes(log, first, count):
 
 def summary(log):
     """Print the figures of a log."""
-    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    lines = read_log(log)
     apart = [x for x in lines if x["shown"] and x["cause"] not in ALIKE]
     right = [x for x in apart if x["designed"]["end"] == "confirmed" and x["designed"]["cause"] == x["cause"]]
     alike = [x for x in lines if x["cause"] in ALIKE]

@@ -11,7 +11,6 @@ diagnosing 100 000 recordings would take a week. The log goes on where it stoppe
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -20,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from fleet_simulated import DAY, DAY_SD, START, Fleet, Wear, fleet
+from json_log import append_to_log, read_log
 
 from rsea_ros.trends import Alarm, TrendSettings, alarms
 from rsea_ros.trends.ranking import by_joint
@@ -211,13 +211,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
-    lines = args.log.read_text().splitlines() if args.log.exists() else []
-    done = {o["seed"]: o for o in map(json.loads, lines)}
+    done = {o["seed"]: o for o in read_log(args.log)}
     for seed in range(args.seeds):
         if seed not in done and time.perf_counter() < end:
             done[seed] = outcome(seed, args.values)
-            with args.log.open("a") as file:
-                file.write(json.dumps(done[seed]) + "\n")
+            append_to_log(args.log, done[seed])
     drawn = f"{args.values} and causes drawn from a played sample"
     print(f"simulated: {drawn}; {len(done)} of {args.seeds} fleets")
     print("\n".join(table([done[s] for s in sorted(done)])))

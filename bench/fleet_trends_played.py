@@ -24,6 +24,7 @@ import numpy as np
 from fleet_plants import COULOMB, RIG, WORK, joint, recording
 from independent.bench import Bench
 from independent.faults import FAULTS
+from json_log import append_to_log, read_log
 
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.settings import DiagnosisSettings
@@ -185,8 +186,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser.parse_args(argv)
     end = time.perf_counter() + args.seconds
     done: dict[str, dict[str, Any]] = {}
-    for line in args.log.read_text().splitlines() if args.log.exists() else []:
-        entry = json.loads(line)
+    for entry in read_log(args.log):
         done.setdefault(entry["name"], {}).update(entry)
     every = list(plans())
     for step, key in ((played, "outcome"), (identified, "identified")):
@@ -205,8 +205,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _kept(log: Path, done: dict[str, dict[str, Any]], entry: dict[str, Any]) -> None:
     """Write what came of a recording to the log and the screen."""
     done.setdefault(entry["name"], {}).update(entry)
-    with log.open("a") as file:
-        file.write(json.dumps(entry) + "\n")
+    append_to_log(log, entry)
     names = ", ".join(c["name"] for c in entry.get("causes", [])) or "identified"
     print(f"{entry['name']:<34}{entry['seconds']:5.1f} s  {names}", flush=True)
 

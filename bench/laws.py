@@ -13,7 +13,6 @@ channels in units of what the base leaves of them.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 import traceback
@@ -22,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from json_log import append_to_log, read_log
 from laws_cases import LawCase, cases
 
 from rsea_ros.checks.faults import check
@@ -43,20 +43,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the cases that the log lacks, or print its figures."""
     args = _parser().parse_args(argv)
     if args.table:
-        print(table([json.loads(line) for line in args.log.read_text(encoding="utf-8").splitlines()]))
+        print(table(read_log(args.log)))
         return 0
     if args.group == "time":
         return _timed(args.duration or 160.0)
-    done = set()
-    if args.log.exists():
-        done = {json.loads(line)["name"] for line in args.log.read_text(encoding="utf-8").splitlines()}
-    args.log.parent.mkdir(parents=True, exist_ok=True)
+    done = {entry["name"] for entry in read_log(args.log)}
     for case in cases(args.clean):
         if case.group != args.group or case.name in done or args.select not in case.name:
             continue
         row = _kept(case, args.duration or 30.0)
-        with args.log.open("a", encoding="utf-8") as log:
-            log.write(json.dumps(row) + "\n")
+        append_to_log(args.log, row)
         print(_line(row), flush=True)
     return 0
 

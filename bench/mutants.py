@@ -35,6 +35,7 @@ import pytest  # noqa: F401
 import scipy  # noqa: F401
 import xdist.scheduler  # noqa: F401
 import yaml
+from json_log import read_log
 from mutants_imports import ROOT
 from mutants_operators import Mutant, mutants_of
 from mutants_run import SURVIVED, BenchError, outcomes
@@ -148,10 +149,8 @@ def _reasons(places: Mapping[str, Mapping[str, str]]) -> Reasons:
 
 
 def _resumed(path: Path | None) -> dict[tuple[str, ...], str]:
-    if path is None or not path.exists():
-        return {}
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    return {tuple(each["key"]): each["outcome"] for each in lines}
+    entries = [] if path is None else read_log(path)
+    return {tuple(each["key"]): each["outcome"] for each in entries}
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:

@@ -10,7 +10,6 @@ look-alikes and five that any record has, on 12 s of a chirp with noise.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -21,6 +20,7 @@ from typing import Any
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "test" / "effects"))
 
+from json_log import append_to_log, read_log
 from similar_machine import factor, record_with, similar
 
 from rsea_ros.diagnosis.diagnose import diagnose
@@ -44,12 +44,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--log", type=Path, required=True, metavar="FILE", help="a line of JSON each")
     args = parser.parse_args(argv)
     effects = [e for e in catalogue().values() if e.name != "gravity_error" and args.select in e.name]
-    played = {(p["effect"], p["times"]): p for p in _read(args.log)}
+    played = {(p["effect"], p["times"]): p for p in read_log(args.log)}
     for effect in effects:
         for times in (1.0, *args.times):
             if (effect.name, times) not in played:
                 played[effect.name, times] = _played(effect, times)
-                _append(args.log, played[effect.name, times])
+                append_to_log(args.log, played[effect.name, times])
     rows = [row for e in effects for row in _rows(e.name, args.times, played)]
     print("| effect | times | on the machine | on the similar one | largest change of a size |")
     print("|---|---|---|---|---|")
@@ -85,16 +85,6 @@ def _change(a: float, b: float) -> float:
 
 def _said(played: dict[str, Any]) -> str:
     return f"{' + '.join(played['causes']) or 'no cause'}, {played['verdict'].replace('_', ' ')}"
-
-
-def _read(log: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
-
-
-def _append(log: Path, one: dict[str, Any]) -> None:
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with log.open("a") as lines:
-        lines.write(json.dumps(one) + "\n")
 
 
 if __name__ == "__main__":

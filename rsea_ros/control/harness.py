@@ -70,12 +70,12 @@ class Arrivals:
 
     taken: by how much each measurement is taken after its place; nan for one that is lost. acting: by how
     much the command that it leads to acts after the sample that it is meant for. ft_age: by how much its
-    torque is older than the rest of it; zeros by default. All of shape (n,).
+    torque is older than the rest of it. Each of shape (n,); ft_age may be one number.
     """
 
     taken: FloatArray
     acting: FloatArray
-    ft_age: FloatArray | None = None
+    ft_age: FloatArray | float = 0.0
 
 
 def irregular(
@@ -95,7 +95,7 @@ def irregular(
     plant, grid, lateness = Plant(rig, rate * PARTS, seed=seed), Grid(1e9 / rate), Lateness(rate)
     due = {round((k + off) * PARTS): k for k, off in enumerate(arrivals.taken) if np.isfinite(off)}
     acting: dict[int, float] = {}
-    ages = np.zeros(len(desired)) if arrivals.ft_age is None else arrivals.ft_age
+    ages = np.broadcast_to(arrivals.ft_age, len(desired))
     rows, torque, command, numbers = [], 0.0, 0.0, np.arange(len(desired))
     sample = plant.step(0.0)
     torques = [sample.ft]

@@ -156,9 +156,8 @@ def prior_cost(problem: Problem, theta: FloatArray) -> float:
 def is_at_bound(solution: Solution, name: str, near: float) -> bool:
     """Return whether an effect's main parameter lies at a bound, within a share `near` of its span."""
     main = f"{name}.{effect_named(name).main.name}"
-    unknown = next(u for u in solution.problem.unknowns if u.name == main)
-    span = unknown.high - unknown.low
-    return not unknown.low + near * span < solution.values[main] < unknown.high - near * span
+    unknowns = zip(solution.problem.unknowns, solution.theta, strict=True)
+    return next(u.is_near_bound(float(t), near) for u, t in unknowns if u.name == main)
 
 
 def _distance(weights: Score | None, farthest: float) -> float:

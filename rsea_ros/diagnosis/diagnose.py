@@ -13,7 +13,7 @@ from dataclasses import replace
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.diagnosis.backward_elimination import eliminate_backwards
-from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined, evaluate, held_out_of
 from rsea_ros.diagnosis.naming.conclusion import conclude
 from rsea_ros.diagnosis.result import Diagnosis
 from rsea_ros.diagnosis.selection import Selection
@@ -96,7 +96,8 @@ def search(
     tell("looking for a simpler model", 0.9)
     selection = eliminate_backwards(selection, effects, pools, settings)
     tell("evaluating on the test blocks", 0.95)
-    return selection, [evaluate(selection, m, holdout, pools, settings) for m in selection.models]
+    held_out = held_out_of(selection, holdout)
+    return selection, [evaluate(selection, m, held_out, pools, settings) for m in selection.models]
 
 
 def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:

@@ -92,6 +92,10 @@ class HeldOut:
         phased = in_phase(rig, self.record.record)
         return score(problem, (case,), simulated((case,), phased, offsets, ride=problem.ride), self.rule)
 
+    def score_of(self, model: Candidate) -> Score:
+        """Return the score of a model that is fitted and simulated on the cases."""
+        return self.score(model.problem, model.solution.theta, model.outputs)
+
 
 def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
     """Return what the models of a selection are tested on. record: takes the place of the test blocks."""
@@ -102,19 +106,16 @@ def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
 def evaluate(
     selection: Selection,
     chosen: Candidate,
-    holdout: Checked | None,
+    held_out: HeldOut,
     pools: Pools,
     settings: DiagnosisSettings,
 ) -> Evaluated:
-    """Re-fit a model to the training and validation blocks, and score it on the test blocks.
-
-    holdout: a record that takes the place of the test blocks.
-    """
+    """Re-fit a model to the training and validation blocks, and score it on what was held out."""
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
     setup = FitSetup(
         cases, settings, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain
     )
     model = fit_candidate(setup, chosen.problem, chosen.solution.theta)
     train = score_on(model.problem, cases, blocks, model.outputs, settings.blocks)
-    test = held_out_of(selection, holdout).score(model.problem, model.solution.theta, model.outputs)
+    test = held_out.score_of(model)
     return Evaluated(model.solution, model.outputs, train, test)

@@ -23,7 +23,7 @@ from rsea_ros.diagnosis.residual_peaks import (
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
 from rsea_ros.effects.signal_table import ROTOR_ANGLE
-from rsea_ros.identification.machine_scale import torque_size
+from rsea_ros.identification.machine_scale import LARGEST, torque_size
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
 from rsea_ros.model.drive import Drive
@@ -39,8 +39,6 @@ _SHARP_APART = 0.5
 """Hz between two lines that count as two: mains and its neighbours stay one."""
 _LOWEST, _HIGHEST = 1.0, 0.49
 """Hz and share of the rate between which peaks are looked for: below is drift, above only half the rate."""
-_OUTLIERS = 0.999
-"""Quantile that counts as the largest value: a few samples may be outliers."""
 _SHARES = (0.03, 0.1, 0.3)
 """Of a joint's largest torque: what friction, ripple and their like may have."""
 _LIMITS = (1.0, 0.9, 0.7)
@@ -122,7 +120,7 @@ class RecordView:
     def largest_motor_torque(self) -> float | None:
         """Return the largest measured motor torque but for outliers, N m; None without that channel."""
         torque = self.case.measured.get("motor_torque")
-        return None if torque is None else float(np.quantile(np.abs(torque), _OUTLIERS))
+        return None if torque is None else float(np.quantile(np.abs(torque), LARGEST))
 
     def largest_unanswered_command(self, share: float) -> float | None:
         """Return the largest command of which the measured motor torque shows less than a share, N m."""

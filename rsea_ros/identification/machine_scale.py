@@ -14,7 +14,7 @@ from rsea_ros.model.position_loop import loop_parameters
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
-_LARGEST = 0.999
+LARGEST = 0.999
 """Quantile that is taken for the largest value: a few samples may be outliers."""
 _LAG = 0.02
 """s over which the measured angle is differenced for a speed: over one sample it were the encoder's step."""
@@ -79,4 +79,4 @@ def _largest(case: Case, channel: str) -> float:
 
 
 def _quantile(values: FloatArray) -> float:
-    return float(np.quantile(np.abs(values), _LARGEST)) if len(values) else 0.0
+    return float(np.quantile(np.abs(values), LARGEST)) if len(values) else 0.0

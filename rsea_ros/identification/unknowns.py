@@ -108,6 +108,11 @@ class Unknown:
         ]
         return any(abs(coordinate - end) < 1e-6 * self.scale for end in ends if end != self.inner(self.start))
 
+    def is_near_bound(self, coordinate: float, near: float) -> bool:
+        """Return whether its value lies within a share `near` of its span of a bound."""
+        margin = near * (self.high - self.low)
+        return not self.low + margin < self.outer(coordinate) < self.high - margin
+
     def inner(self, value: float) -> float:
         """Return the coordinate that the fit works in."""
         return math.log(value) if self.logarithmic else value

@@ -16,6 +16,7 @@ from msg_adapters.ros import (
 )
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.stalls import every
 
 RATE, ERROR_LIMIT, ERROR_TIME, FT_LIMIT = 280.0, 15.0, 0.5, 110.0
 """Of config/nodes/controller.yaml: Hz, N m, s, N m."""
@@ -46,19 +47,20 @@ class Wire:
         self.listener.until(future.done)
         return future.result()
 
+    def clear_latched(self):
+        """Clear whichever node has a fault."""
+        for name in ("driver", "controller"):
+            status = self.status(name)
+            if status is not None and status.level == b"\x02":
+                self.clear(name)
+
     def hold(self, torque, condition):
         """Ask for a torque until a condition holds; clear what a machine that stands still has latched."""
-        looked = time.monotonic()
+        clear_now_and_then = every(2.0, self.clear_latched)
 
         def done():
-            nonlocal looked
             self.desired.publish(torque_command_message(time.time_ns(), torque))
-            if time.monotonic() - looked > 2.0:
-                looked = time.monotonic()
-                for name in ("driver", "controller"):
-                    status = self.status(name)
-                    if status is not None and status.level == b"\x02":
-                        self.clear(name)
+            clear_now_and_then()
             return condition()
 
         self.listener.until(done)

@@ -15,14 +15,13 @@ from msg_adapters.ros import DiagnosticArray, JointState, Trigger, WrenchStamped
 from rsea_ros.hardware.dynamixel.tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.stalls import every, is_stall
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENT = {"rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
 """A machine that is busy with other tests must not look like a fault."""
 WAIT = 55.0
 """s for what normally takes one: the driver starts and compiles beside other tests."""
-STALLS = ("no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power")
-"""What a machine that stands still for a while latches; no test here provokes one of them."""
 
 
 class Driven:
@@ -38,22 +37,20 @@ class Driven:
 
     def push(self, condition, torque=10.0):
         """Command a torque until the condition holds; clear what a busy machine has latched."""
-        looked = begun = time.monotonic()
+        begun, clear_now_and_then = time.monotonic(), every(1.5, self._clear_stall)
 
         def pushed():
-            nonlocal looked
             assert time.monotonic() < begun + WAIT, self.process.output[-5:]
             self._commands.publish(torque_command_message(0, torque))
-            if not (result := condition()) and time.monotonic() - looked > 1.5:
-                looked = time.monotonic()
-                self._clear_stall()
+            if not (result := condition()):
+                clear_now_and_then()
             return result
 
         self._listener.until(pushed)
 
     def _clear_stall(self):
-        fault = _value(self._health, self.name, "fault") or ""
-        if fault.startswith(STALLS):
+        fault = _value(self._health, self.name, "fault")
+        if is_stall(fault):
             self.cleared.append(fault)
             self._clear.call_async(Trigger.Request())
 

@@ -12,11 +12,10 @@ from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes import driver
 from rsea_ros.nodes._joints import joint_table
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
+from test.nodes.stalls import every, is_stall
 from test.nodes.test_driver import Spy
 
 JOINTS = ("hip", "knee", "ankle")
-STALLS = ("no_reply", "heldup", "ft", "effort", "velocity", "power")
-"""What a machine that stands still for a while latches; no test here provokes one of them."""
 X = {
     "torque_limit": 3.0, "current_limit": 3.2, "voltage_limit": 10.0, "effort_limit": 0.0, "ft_limit": 0.0,
     "power_limit": 20.0, "deflection_limit": 0.0, "ft_host": "", "rig": "bare_drive",
@@ -88,14 +87,11 @@ class Leg:
 
     def push(self, torques, condition):
         """Command torques until the condition holds; clear what a machine that stands still has latched."""
-        looked = time.monotonic()
+        clear_now_and_then = every(2.0, self.clear_stalls)
 
         def pushed():
-            nonlocal looked
             assert self.process.running(), self.process.output[-5:]
-            if time.monotonic() - looked > 2.0:
-                looked = time.monotonic()
-                self.clear_stalls()
+            clear_now_and_then()
             for joint, torque in torques.items():
                 self.commands[joint].publish(torque_command_message(time.time_ns(), torque, joint))
             return condition()
@@ -105,7 +101,7 @@ class Leg:
     def clear_stalls(self):
         """Clear the faults of joints that no test here provokes."""
         for joint, client in self.clearing.items():
-            if (self.value(joint, "fault") or "").startswith(STALLS):
+            if is_stall(self.value(joint, "fault")):
                 client.call_async(Trigger.Request())
 
     def together(self):

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rsea_ros.diagnosis.evaluation import Evaluated
-from rsea_ros.diagnosis.naming.rivals import beside_score, trial_score
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.status import Named
 from rsea_ros.diagnosis.naming.weighing import Weighed
 from rsea_ros.diagnosis.result import Alternative, Cause, Estimate, Reason, Rejected
@@ -17,7 +16,6 @@ from rsea_ros.diagnosis.settings import SizeSettings
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.identification.confidence import confidence_of
 from rsea_ros.identification.estimates import parameters_of
-from rsea_ros.identification.problem import Case
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
@@ -104,10 +102,9 @@ def latest(trials: Sequence[Trial]) -> list[Trial]:
     return list(best.values())
 
 
-def rejected_of(trial: Trial, cases: tuple[Case, ...], channel: str) -> Rejected:
-    """Return a trial with its gain, on the test blocks over the model that it was tried beside."""
-    with_it, without = trial_score(trial, cases), beside_score(trial, cases)
-    size = gain(with_it, without, channel)[0]
+def rejected_of(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
+    """Return a trial with its gain over the model that it was tried beside."""
+    size = gain(held_out.score(trial.problem, trial.theta), held_out.score_of(trial.beside), channel)[0]
     return Rejected(trial.name, size, trial.reason, trial.rival, trial.is_full)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from rsea_ros.diagnosis.coherence import lost_above
 from rsea_ros.diagnosis.criteria import is_at_floor
-from rsea_ros.diagnosis.evaluation import Evaluated, Examined
+from rsea_ros.diagnosis.evaluation import Evaluated, Examined, held_out_of
 from rsea_ros.diagnosis.naming.causes import alternative_of, latest, rejected_of, undetermined_play
 from rsea_ros.diagnosis.naming.outcome import Outcome, outcome_of
 from rsea_ros.diagnosis.naming.weighing import Weighed, weigh
@@ -36,7 +36,7 @@ def conclude(
     settings: DiagnosisSettings,
 ) -> Diagnosis:
     """Weigh and name the causes of a selection. stages: its models, evaluated."""
-    weighing = weigh(selection, stages, examined.holdout, pools, settings)
+    weighing = weigh(selection, stages, held_out_of(selection, examined.holdout), pools, settings)
     outcome = outcome_of(weighing, examined, settings)
     return _diagnosis(weighing.selection, outcome, examined, pools, settings)
 
@@ -95,7 +95,8 @@ def _rejected(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rej
     """Return what was accepted and may not be named, then all others that were tried."""
     decided = {c.name for c in outcome.causes} | {r.name for r in outcome.dropped}
     others = [t for t in latest(selection.trials) if t.name not in decided]
-    rejected = pools.fits.map(lambda t: rejected_of(t, selection.cases, outcome.channel), others)
+    test_blocks = held_out_of(selection, None)
+    rejected = pools.fits.map(lambda t: rejected_of(t, test_blocks, outcome.channel), others)
     return (*outcome.dropped, *rejected)
 
 

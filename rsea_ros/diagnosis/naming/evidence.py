@@ -92,9 +92,5 @@ def evidence_for(
 def is_at_edge(problem: Problem, theta: FloatArray, name: str, near: float) -> bool:
     """Return whether a parameter of an effect, optional ones apart, lies within a share `near` of a bound."""
     parameters = {f"{name}.{p.name}" for p in effect_named(name).parameters if not p.optional}
-    for unknown, t in zip(problem.unknowns, theta, strict=True):
-        margin = near * (unknown.high - unknown.low)
-        inside = unknown.low + margin < unknown.outer(float(t)) < unknown.high - margin
-        if unknown.name in parameters and not inside:
-            return True
-    return False
+    unknowns = zip(problem.unknowns, theta, strict=True)
+    return any(u.name in parameters and u.is_near_bound(float(t), near) for u, t in unknowns)

@@ -20,12 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.diagnosis.candidate import Candidate, effect_size, prior_cost
-from rsea_ros.diagnosis.data_split import TEST
 from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut
 from rsea_ros.diagnosis.naming.evidence import Claim
-from rsea_ros.diagnosis.score import RESAMPLES, Score, score_on, tempered_loss
+from rsea_ros.diagnosis.score import RESAMPLES, Score, tempered_loss
 from rsea_ros.diagnosis.selection import Selection, Trial
-from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 from rsea_ros.signals import FloatArray
 
@@ -76,13 +74,13 @@ def weighed(
     weights = _stacked(scores, priors, [effect_size(t.name) for t in tried], far)
     weight_of = {t.name: w for t, w in zip(tried, weights, strict=True)}
     rivals = [
-        Claim(t.name, t.problem, t.theta, s, _score_of(t.beside, held_out), weight_of[t.name])
+        Claim(t.name, t.problem, t.theta, s, held_out.score_of(t.beside), weight_of[t.name])
         for t, s in zip(tried, scores, strict=True)
         if t.name != claim.name
     ]
     swapped = [m for m in selection.rivals_of(claim.name) if len(m.causes) == len(accepted)]
     models = [selection.last, *swapped]
-    tested = [_score_of(m, held_out) for m in models]
+    tested = [held_out.score_of(m) for m in models]
     among_swapped = _stacked(tested, [m.prior_cost for m in models], [m.size for m in models], far)
     among_tried = weight_of.get(claim.name, 1.0)
     for model, with_it, weight in zip(swapped, tested[1:], among_swapped[1:], strict=True):
@@ -92,22 +90,6 @@ def weighed(
     once = {r.name: r for r in reversed(heavy)}
     kept = sorted(once.values(), key=lambda r: -r.weight)[: rule.most_rivals]
     return Contest(replace(claim, weight=min(among_tried, among_swapped[0])), tuple(kept))
-
-
-def trial_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
-    """Return how a trial does on the test blocks."""
-    problem = replace(trial.problem, cases=cases)
-    return score_on(problem, cases, TEST, problem.outputs(trial.theta), trial.beside.settings.blocks)
-
-
-def beside_score(trial: Trial, cases: tuple[Case, ...]) -> Score:
-    """Return how the model does on the test blocks that a trial was made beside."""
-    model = trial.beside
-    return score_on(trial.problem, cases, TEST, model.outputs, model.settings.blocks)
-
-
-def _score_of(model: Candidate, held_out: HeldOut) -> Score:
-    return held_out.score(model.problem, model.solution.theta, model.outputs)
 
 
 def _stacked(

@@ -11,16 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from rsea_ros.checks.faults import Checked
 from rsea_ros.diagnosis.candidate import FitSetup, fit_candidate
 from rsea_ros.diagnosis.criteria import is_at_floor, preference
-from rsea_ros.diagnosis.evaluation import Evaluated, evaluate, held_out_of
+from rsea_ros.diagnosis.evaluation import Evaluated, HeldOut, evaluate, held_out_of
 from rsea_ros.diagnosis.naming.evidence import Claim, Evidence, evidence_for
-from rsea_ros.diagnosis.naming.rivals import beside, beside_score, contests, trial_score
+from rsea_ros.diagnosis.naming.rivals import beside, contests
 from rsea_ros.diagnosis.score import Score
 from rsea_ros.diagnosis.selection import Selection, Trial
 from rsea_ros.diagnosis.settings import DiagnosisSettings
-from rsea_ros.identification.problem import Case
 from rsea_ros.identification.workers import Pools
 
 
@@ -53,20 +51,15 @@ class Weighing:
 def weigh(
     selection: Selection,
     stages: Sequence[Evaluated],
-    holdout: Checked | None,
+    held_out: HeldOut,
     pools: Pools,
     settings: DiagnosisSettings,
 ) -> Weighing:
-    """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far.
-
-    holdout: the record that takes the place of the test blocks, where one was given.
-    """
+    """Weigh every accepted cause and its rivals, and one more that surely helps where the floor is far."""
     accepted = len(stages)
     if not is_at_floor(stages[-1].test, settings.floor):
-        selection, stages = promoted(selection, stages, holdout, pools, settings)
-    contested = contests(
-        selection, stages, held_out_of(selection, holdout), pools, settings.floor.far
-    )
+        selection, stages = promoted(selection, stages, held_out, pools, settings)
+    contested = contests(selection, stages, held_out, pools, settings.floor.far)
     claims = [c for contest in contested for c in (contest.cause, *contest.rivals)]
     weigh_claim = partial(evidence_for, cases=selection.cases, settings=settings, run=pools.run)
     evidence_by_claim = {id(c): e for c, e in zip(claims, pools.fits.map(weigh_claim, claims), strict=True)}
@@ -85,29 +78,29 @@ def weigh(
 def promoted(
     selection: Selection,
     stages: Sequence[Evaluated],
-    holdout: Checked | None,
+    held_out: HeldOut,
     pools: Pools,
     settings: DiagnosisSettings,
 ) -> tuple[Selection, list[Evaluated]]:
     """Return the selection and its stages with the effect that helps most, if one surely does."""
-    cases, last = selection.cases, selection.last
+    test_blocks, last = held_out_of(selection, None), selection.last
     tried = [t for t in beside(selection, last) if t.name not in last.causes]
-    scores = list(pools.fits.map(lambda t: trial_score(t, cases), tried))
-    helpful = [(t, s) for t, s in zip(tried, scores, strict=True) if _helps(t, s, cases)]
+    scores = list(pools.fits.map(lambda t: test_blocks.score(t.problem, t.theta), tried))
+    helpful = [(t, s) for t, s in zip(tried, scores, strict=True) if _helps(t, s, test_blocks)]
     if not helpful:
         return selection, list(stages)
     against = min((s for _, s in helpful), key=lambda s: float(s.loss(s).sum()))
     trial, _ = min(helpful, key=lambda item: float(item[1].loss(against).sum()))
-    setup = FitSetup(cases, settings, pools.run, trial.beside.validation)
+    setup = FitSetup(selection.cases, settings, pools.run, trial.beside.validation)
     model = fit_candidate(setup, trial.problem, trial.theta)
     if model.is_at_bound:
         return selection, list(stages)
     marked = replace(trial, reason="replaced")
     larger = replace(selection, models=(*selection.models, model), trials=(*selection.trials, marked))
-    return larger, [*stages, evaluate(larger, model, holdout, pools, settings)]
+    return larger, [*stages, evaluate(larger, model, held_out, pools, settings)]
 
 
-def _helps(trial: Trial, score: Score, cases: tuple[Case, ...]) -> bool:
+def _helps(trial: Trial, score: Score, test_blocks: HeldOut) -> bool:
     """Return whether a trial surely does better than the model that it was tried beside."""
     extra, rule = len(trial.theta) - trial.beside.parameters, trial.beside.settings.acceptance
-    return preference(score, beside_score(trial, cases), extra, rule).better
+    return preference(score, test_blocks.score_of(trial.beside), extra, rule).better
