@@ -1,4 +1,4 @@
-"""What every test shares: its worker, a ROS domain of its own for each, and reproducible examples."""
+"""Shared by all tests: the worker, a ROS domain for each worker, and reproducible examples."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ nodes by turns, so that the cores are busy and the nodes are not late."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the dearest files first and leave the rest in its order."""
+    """Put the slowest files first and leave the others in their order."""
 
     def place(item: pytest.Item) -> int:
         found = (k for k, name in enumerate(DEAREST) if item.nodeid.startswith(f"test/{name}"))
@@ -65,7 +65,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class OneWorker(LoadFileScheduling):
-    """Give a worker whole files, and those that share a diagnosis together."""
+    """Give a worker whole files, and the files that share a diagnosis together."""
 
     def _split_scope(self, nodeid: str) -> str:
         return "test/report" if nodeid.startswith("test/report/") else super()._split_scope(nodeid)

@@ -1,4 +1,4 @@
-"""The order in which the files of tests are handed out (conftest.py) names files that exist."""
+"""The order in which conftest.py hands out the test files names files that exist."""
 
 from pathlib import Path
 
@@ -10,5 +10,5 @@ HERE = Path(__file__).parent
 
 
 @pytest.mark.parametrize("name", DEAREST)
-def test_what_takes_longest_is_there(name):
+def test_every_file_in_the_list_of_the_longest_exists(name):
     assert list(HERE.glob(f"{name}*"))

@@ -23,7 +23,7 @@ def test_paper_writes_page_json_and_bags(tmp_path, capsys):
     assert len(record["ft"]) == 20 * 280
 
 
-def test_a_test_too_short_is_refused(tmp_path, capsys):
+def test_a_duration_that_is_too_short_is_refused(tmp_path, capsys):
     assert main(["paper", "--duration", "2", "--out", str(tmp_path / "x")]) == 2
     assert capsys.readouterr().err == "rsea paper: --duration 2 s, expected at least 20 s\n"
     assert not (tmp_path / "x").exists()

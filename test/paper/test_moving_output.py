@@ -27,19 +27,19 @@ def test(request, tmp_path_factory):
     return moving_output(load_rig(request.param), bag, duration=24.0, channels=RIGS[request.param])
 
 
-def test_unlumped_explains_the_held_out_torque_at_every_sensor(test):
+def test_the_unlumped_model_explains_the_held_out_torque_at_every_sensor(test):
     unlumped = test.rivals[0]
     assert unlumped.name == "unlumped"
     assert all(j.explained > 0.95 for j in unlumped.judged)
 
 
-def test_lumped_fails_at_one_sensor_at_least(test):
+def test_the_lumped_model_fails_at_one_sensor_at_least(test):
     lumped = test.rivals[1]
     assert lumped.name == "lumped"
     assert min(j.explained for j in lumped.judged) < 0.5
 
 
-def test_bench_is_not_what_the_rig_states():
+def test_the_bench_differs_from_what_the_rig_states():
     rig = load_rig("paper_moving_output")
     bench = drawn(rig, 1)
     assert all(bench[n] != rig[n] for n in rig.free())
