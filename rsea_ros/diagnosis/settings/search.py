@@ -68,7 +68,7 @@ class ForwardSettings:
     paired_fits: int = number(2, "1", "pairs that are fitted to all training blocks")
     smaller_guess: float = number(
         0.1, "1", "share of a first guess that is tried where two linear steps from it led uphill",
-        "a tenth of a typical size is nearly linear; mild effects were lost without it (bench/coverage.py)",
+        "a tenth of a typical size is nearly linear; without it mild effects were lost (effect_coverage.py)",
     )  # fmt: skip
     screening_steps: int = number(2, "1", "Gauss-Newton steps of an effect's screening, with old derivatives")
     screening_part: float = number(
