@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import signal
+import sys
 import tempfile
 from pathlib import Path
 
@@ -13,6 +14,11 @@ import pytest
 from xdist.scheduler import LoadFileScheduling
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+from rsea_ros.compiler_cache import trusted_cache
+
+BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix
+if sys.dont_write_bytecode:  # then pytest would rewrite 3000 asserts anew in each worker, 10 s each
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(trusted_cache("bytecode"))
 
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")
@@ -77,3 +83,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> OneWorker
         return None
     config.option.loadscopereorder = False
     return OneWorker(config, log)
+
+
+def pytest_collection_finish() -> None:
+    """Leave the bytecode of what the tests themselves import to the environment again."""
+    sys.dont_write_bytecode, sys.pycache_prefix = BYTECODE

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_ros.cli.main import main, verbs
+from rsea_ros.cli.main import FAULT, main, verbs
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
@@ -208,7 +208,7 @@ def test_a_still_command_is_refused_without_a_warning():
         (2, "", "rsea identify: \n", "message"),
         (2, "", "", "message"),
         (2, "", "first\nrsea identify: second\n", "message"),
-        (2, "", "rsea identify: KeyError, this is a fault of rsea\n", "last net"),
+        (2, "", f"rsea identify: {FAULT}: KeyError in cdr.py:7: 'a'\n", "last net"),
         (0, "{}", "x.py:1: RuntimeWarning: invalid value\n", "warning"),
         (0, '{"a": NaN}', "", "json"),
         (1, "", "Traceback (most recent call last):\nKeyError: 1\n", "traceback"),

@@ -22,12 +22,14 @@ def start(*words):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def test_it_prints_its_addresses_and_removes_the_port_at_sigterm(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number):
+    """To be stopped is its regular end."""
     process = start("--port", tmp_path / "tty", "--model", 2020)
     place = json.loads(process.stdout.readline())
     assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
     assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
     assert not (tmp_path / "tty").is_symlink()
