@@ -1,4 +1,4 @@
-"""Possible changes of a joint: for each parameter another value in the model, and the least change that counts."""
+"""Possible changes of a joint: for each parameter another value in the model, and the least that counts."""
 
 from __future__ import annotations
 

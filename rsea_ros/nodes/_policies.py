@@ -1,6 +1,6 @@
 """SROS 2 policies of the nodes, read from the nodes themselves: python -m rsea_ros.nodes._policies > FILE.
 
-Each node is made in this process with its defaults and asked for its topics and services. `operator` stands
+Each node is made in this process with its defaults, and its topics and services are listed. `operator` stands
 for a person, who may listen to everything, call every service, and publish nothing.
 """
 
