@@ -1,4 +1,4 @@
-"""What a check says on a terminal: a line for each finding."""
+"""The findings of a check on a terminal, one line each."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SAID_ELSEWHERE = ("identifiability", "noise", "excitation", "rest")
 
 
 def check_table(findings: Findings) -> Table:
-    """Return all findings of a record: light, what, value, expected, what would help."""
+    """Return all findings of a record: light, kind, value, expected value, remedy."""
     table = Table(box=None, pad_edge=False, header_style="dim", title_justify="left")
     for name in ("", "what", "channel", "value", "expected", "where, and what would help"):
         table.add_column(name, no_wrap=name in ("", "what", "channel", "value"))
@@ -63,7 +63,7 @@ def sentence(f: Finding) -> str:
 
 
 def kind(f: Finding) -> str:
-    """Return the plain name of what was looked at."""
+    """Return the plain name of a kind of finding."""
     if f.light != "green" and f.kind in _DOUBTED:
         return _DOUBTED[f.kind]
     return _KINDS.get(f.kind, f.kind.replace("_", " "))
