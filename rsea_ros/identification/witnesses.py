@@ -44,7 +44,7 @@ def _sign(x: FloatArray) -> FloatArray:
 
 
 def _motion(case: Case, outputs: Mapping[str, FloatArray], t: FloatArray) -> tuple[FloatArray, ...]:
-    """Return command, position, velocity and load at instants; those without a sensor follow from the others."""
+    """Return command, position, velocity and load at instants; those without a sensor are derived."""
     drive = case.drive
     if not isinstance(drive, Drive):
         return tuple(np.interp(t, drive.t, y) for y in (drive.torque, drive.q, drive.v, drive.torque))
