@@ -14,6 +14,7 @@ import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -23,7 +24,10 @@ from std_srvs.srv import Trigger
 from msg_adapters.topics import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
-__all__ = ["Bool", "Clock", "DiagnosticArray", "JointState", "Time", "Trigger", "WrenchStamped"]
+__all__ = [
+    "Bool", "ChangeState", "Clock", "DiagnosticArray", "GetAvailableTransitions", "GetState", "JointState",
+    "Time", "Trigger", "WrenchStamped",
+]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
 SECOND = 1_000_000_000
