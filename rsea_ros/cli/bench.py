@@ -17,7 +17,7 @@ from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.bus import Bus
 from rsea_ros.hardware.peer.ft import ForceSensor
 from rsea_ros.hardware.peer.misbehaviour import Misbehaviour
-from rsea_ros.hardware.peer.motor import Motor
+from rsea_ros.hardware.peer.motor import KEPT, Motor
 from rsea_ros.hardware.peer.registers import MODELS
 from rsea_ros.hardware.peer.requests import LineRequests
 from rsea_ros.hardware.peer.station import Station
@@ -54,8 +54,9 @@ def run(args: argparse.Namespace) -> int:
     if not args.port.is_symlink():  # a killed bench leaves its link
         check_free([args.port])
     wrong = Misbehaviour(seed=args.seed)
-    plants, motors = _motors(args)
-    bus, sensor = Bus(args.port, motors, wrong), ForceSensor(plants[0], args.ft_rate, wrong)
+    kept = KEPT if args.requests else 0  # nobody else can ask for the logs
+    plants, motors = _motors(args, kept)
+    bus, sensor = Bus(args.port, motors, wrong, kept), ForceSensor(plants[0], args.ft_rate, wrong)
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
@@ -75,13 +76,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _motors(args: argparse.Namespace) -> tuple[list[SimulatedDevice], list[Motor]]:
+def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[Motor]]:
     """Return the running plant of each motor, and the motors, with the IDs 1, 2, …"""
     rig = load_rig(args.rig)
     plants, motors = [], []
     for place, model in enumerate(args.model):
         plant = SimulatedDevice(rig, PLANT_RATE, seed=args.seed + place, clock=time.monotonic_ns)
-        motor = Motor(model, plant, args.torque_constant)
+        motor = Motor(model, plant, args.torque_constant, kept=kept)
         motor.put("id", place + 1)
         motor.put("return_delay", args.return_delay)
         plant.open()
