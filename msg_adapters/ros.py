@@ -67,6 +67,12 @@ def joint_state_message(
     return message
 
 
+def joint_states_message(joints: Sequence[str]) -> JointState:
+    """Return a state of several joints, all at zero, without a stamp."""
+    zeros = [0.0] * len(joints)
+    return JointState(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
+
+
 def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
     """Return an angle of the spring, rad, as `deflection` carries it."""
     message = JointState(name=[joint], position=[float(angle)])
