@@ -112,7 +112,7 @@ def clock_message(stamp_ns: int) -> Clock:
 def diagnostics_message(
     stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object], hardware: str = ""
 ) -> DiagnosticArray:
-    """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: what it is about."""
+    """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: its subject."""
     return statuses_message(stamp_ns, [(name, level, summary, values)], hardware)
 
 
@@ -134,7 +134,7 @@ def statuses_message(
 def parameter_descriptor(
     description: str, constraints: str = "", bounds: tuple[float, float] | tuple[int, int] | None = None
 ) -> ParameterDescriptor:
-    """Return what a node says of a parameter that is fixed once it runs; bounds are inclusive."""
+    """Return the descriptor of a parameter that is fixed once the node runs; bounds are inclusive."""
     descriptor = ParameterDescriptor(
         description=description, additional_constraints=constraints, read_only=True
     )
@@ -196,7 +196,7 @@ def _plain(value: Any) -> Any:
 
 
 def _index(message: JointState, joint: str | None) -> int:
-    """Return where a joint stands. Raises ParameterError for one that is not there, or not the only one."""
+    """Return the index of a joint. Raises ParameterError for a missing one, or one among several."""
     names = list(message.name)
     if joint is not None and names:
         if joint not in names:

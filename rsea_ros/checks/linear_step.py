@@ -1,4 +1,4 @@
-"""The Gauss-Newton step on laid-out rows, its doubt, and what the rows bring of each value of the rig.
+"""The Gauss-Newton step on the rows, its doubt, and the information of the rows on each value of the rig.
 
 The covariance is the sandwich over blocks of one second (identification/confidence.py says why).
 """
@@ -19,7 +19,7 @@ _WIDER = 3.0
 
 
 class Brought(NamedTuple):
-    """What data bring of a value: the share of what is known of it then, and its one sigma over its size."""
+    """The information of data on a value: its share of all information, and one sigma over the value."""
 
     share: float
     relative_sd: float
@@ -52,9 +52,9 @@ def _scores(rows: Rows, left: FloatArray) -> FloatArray:
 
 
 def brought_by_value(setting: Setting, rows: Rows) -> dict[str, Brought]:
-    """Return by value of the rig what the data bring of it.
+    """Return the information of the data on each value of the rig.
 
-    Gains and drifts count as known: they are what a check looks for, not what a fit frees.
+    Gains and drifts count as known: a check looks for them, a fit does not free them.
     """
     values, n, m = setting.values, len(setting.values), len(setting.timed)
     if not n:

@@ -29,7 +29,7 @@ _FORCES = 5
 
 
 class Linear(NamedTuple):
-    """Propagators of one step and what is read from the state x (order n).
+    """Propagators of one step and the rows that read the state x (order n).
 
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
     velocity and deflection; outputs (4, n): position, velocity, the linear torque at the F/T sensor and
@@ -52,7 +52,7 @@ class Calls(NamedTuple):
     """The effects that are on, in the order of their ports.
 
     first[port] … first[port + 1] are those of a port; p_at and x_at say where their parameters and states
-    begin. nonlinear: whether anything adds torques at all.
+    begin. nonlinear: whether any effect adds torques.
     """
 
     first: IntArray
@@ -132,7 +132,7 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
-    """Put what the sensors of the nominal actuator see into the table."""
+    """Put the readings of the nominal actuator's sensors into the table."""
     s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs, 0, x)
     s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs, 1, x)
     s[st.FT] = _dot(linear.outputs, 2, x) + s[st.SENSED] * s[st.SPRING_TORQUE]

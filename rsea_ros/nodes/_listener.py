@@ -1,4 +1,4 @@
-"""A node that only listens: which topics there are, how fast they come, what they say."""
+"""A node that only listens: topics, their rates, their messages."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _OWN = ("/rosout", "/parameter_events")
 
 
 class Listener:
-    """Hears any topic; publishes nothing. node: the visitor by which it hears."""
+    """Subscribes to any topic; publishes nothing. node: the visitor through which it does."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
 
     def topics(self, seconds: float) -> list[tuple[str, str, str, str]]:
-        """Return name, type, number of publishers and of subscribers of what is found within some seconds."""
+        """Return name, type, numbers of publishers and subscribers of topics found within some seconds."""
         time.sleep(seconds)
         return [
             (name, ", ".join(types), *self._counts(name))
@@ -58,7 +58,7 @@ class Listener:
             yield message_text(waiting.pop(0))
 
     def _subscribe(self, topic: str, hear: Any, *, raw: bool) -> str:
-        """Hear a topic with the durability of its publisher; return its full name."""
+        """Subscribe to a topic with the durability of its publisher; return its full name."""
         name = absolute(topic)
         kind = self._type_of(name)
         publishers = self._node.get_publishers_info_by_topic(name)

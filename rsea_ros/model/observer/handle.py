@@ -1,7 +1,7 @@
 """Many arrays as one argument of a compiled function.
 
 Numba unpacks every array of its arguments at every call from Python, 0.2 us each: for all of the filter's
-it takes longer than the filter. So their addresses and shapes go into one; compiled code makes them again.
+it takes longer than the filter. So one array has their addresses and shapes, and compiled code rebuilds them.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def _log(h):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def receive(handle, rest, reads_load, hold, t, kind, a, b, estimate):  # type: ignore[no-untyped-def]
-    """Take in an event; put the estimate behind a measurement, shape (6,), and tell whether there is one."""
+    """Process an event; write the estimate of a measurement, shape (6,); return whether there is one."""
     model, state, log = _model(handle, rest, reads_load, hold), _state(handle), _log(handle)
     row = take_in(model, state, log, t, kind, a, b)
     if row == NONE:
