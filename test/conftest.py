@@ -1,4 +1,4 @@
-"""What every test shares: its worker, a ROS domain of its own for each, and reproducible examples."""
+"""Shared by all tests: the worker, a ROS domain for each worker, and reproducible examples."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _place(nodeid: str, names: tuple[str, ...]) -> int:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the dearest files first and leave the rest in its order."""
+    """Put the slowest files first and leave the others in their order."""
     places = {item.path: _place(item.nodeid, WAITING + COMPUTING) for item in items}
     items.sort(key=lambda item: places[item.path])
 

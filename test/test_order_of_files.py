@@ -1,4 +1,4 @@
-"""The order in which the files of tests are handed out (conftest.py) names files that exist."""
+"""The order in which conftest.py hands out the test files names files that exist."""
 
 from pathlib import Path
 

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the ports of the bench in one line of JSON, and run it until stdin ends, or SIGINT or SIGTERM."""
+    """Print the ports of the bench in one line of JSON, and run it until stdin ends or a signal stops it."""
     if not 1.0 <= args.ft_rate <= 7000.0:
         raise ParameterError(f"--ft-rate {args.ft_rate:g} Hz, expected 1 to 7000 Hz")
     if not 0 <= args.return_delay <= 254:

@@ -109,7 +109,7 @@ def _fault(error: Exception) -> str:
     """Return one line about an error that nobody expected."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     kind = type(error).__name__
-    return f"a fault of rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"
+    return f"a bug in rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"
 
 
 def _forget_peak() -> None:

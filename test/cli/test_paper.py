@@ -47,7 +47,7 @@ def test_lumped_fails_at_one_sensor_at_least(played, rig):
     assert min(j["explained"] for j in played[1]["moving_output"][rig]["lumped"]) < 0.5
 
 
-def test_a_test_too_short_is_refused(tmp_path, capsys):
+def test_a_duration_that_is_too_short_is_refused(tmp_path, capsys):
     assert main(["paper", "--duration", "2", "--out", str(tmp_path / "x")]) == 2
     assert capsys.readouterr().err == "rsea paper: --duration 2 s, expected at least 20 s\n"
     assert not (tmp_path / "x").exists()

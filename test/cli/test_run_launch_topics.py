@@ -22,12 +22,12 @@ from rsea_ros.errors import ParameterError
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_every_node_of_the_graph_is_one_that_there_is():
+def test_every_node_of_the_graph_exists():
     content = yaml.safe_load((ROOT / "launch" / "graph.yaml").read_text())
     assert {*content["first"], *content["others"]} <= set(node_names())
 
 
-def test_a_graph_starts_its_first_node_and_those_that_are_asked_for():
+def test_a_graph_starts_its_first_node_and_the_requested_ones():
     started = [call.name for call in node_calls("simulation", [])]
     assert started == ["plant", "model", "identify"]
     asked = node_calls(
@@ -44,7 +44,7 @@ def test_a_wrong_argument_is_refused_before_anything_starts(wrong):
         node_calls("simulation", [wrong])
 
 
-def test_parameters_are_handed_on_as_ros_reads_them():
+def test_parameters_are_passed_on_as_ros_reads_them():
     assert ros_arguments(["rig:=pendulum", "rate:=500.0"]) == [
         "--ros-args", "-p", "rig:=pendulum", "-p", "rate:=500.0", "--",
     ]  # fmt: skip
@@ -72,7 +72,7 @@ def rsea(*words: str) -> list[str]:
 
 
 def heard(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
-    """Return a message of a topic, once there is one, while some processes run."""
+    """Return the first message of a topic while some processes run."""
     while all(process.poll() is None for process in running):  # a plant compiles its simulation first
         echo = subprocess.run(
             rsea("topics", "echo", topic), cwd=ROOT, capture_output=True, text=True, timeout=60

@@ -6,7 +6,7 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.paper.moving_output import drawn
 
 
-def test_bench_is_not_what_the_rig_states():
+def test_the_bench_differs_from_what_the_rig_states():
     rig = load_rig("paper_moving_output")
     bench = drawn(rig, 1)
     assert all(bench[n] != rig[n] for n in rig.free())
