@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from bench.bare_loop import permitted
 from bench.bare_wire import outcome
 
