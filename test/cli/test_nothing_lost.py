@@ -6,7 +6,7 @@ import errno
 import os
 import signal
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from rsea_ros.diagnosis import diagnose
 from rsea_ros.errors import OutputError
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report import file_names
@@ -82,7 +83,8 @@ class Found:
     verdict: str = ""
     feasible: bool = True
     faults: tuple[()] = ()
-    rig_option: str = ""
+    remarks: tuple[()] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
 
 
 @pytest.fixture(scope="module")
