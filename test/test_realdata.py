@@ -83,7 +83,7 @@ def test_emps_predicts_the_run_with_pulses(tmp_path):
     assert force.rms_error / rms < 0.047
 
 
-def test_pendulum_gravity(tmp_path):
+def test_the_pendulum_has_its_published_gravity(tmp_path):
     file = "pendulum/gravity_compensation.measured.csv.gz"
     result = identified(file, "pendulum", "pendulum", tmp_path)
     gravity = result["parameters"]["spring_end.gravity"]
@@ -94,7 +94,7 @@ def test_pendulum_gravity(tmp_path):
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_cycloidal_statics_of_every_design(design):
+def test_the_statics_of_every_cycloidal_design_are_as_published(design):
     travel, saturates = DESIGNS[design]
     short, long = (ramps(design, which) for which in ("short", "long"))
     assert np.degrees(short.travel) == pytest.approx(travel, abs=0.005)
@@ -112,7 +112,7 @@ def ramps(design: str, which: str) -> Statics:
 
 
 @pytest.mark.parametrize("design", list(DESIGNS)[::5])
-def test_cycloidal_identified(design, tmp_path, capsys):
+def test_a_cycloidal_gear_is_identified(design, tmp_path, capsys):
     file = f"cycloidal/2024-{design}.csv.gz"
     short = identified(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
     stiffness = short["parameters"]["spring.stiffness"]
@@ -135,8 +135,8 @@ def test_cycloidal_saturation_is_seen_and_fitted():
     assert found["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
 
 
-def test_emps_diagnosed():
-    """Coulomb friction first, then its difference between directions; no Stribeck; judged by another run."""
+def test_emps_is_diagnosed_with_coulomb_friction_and_its_asymmetry():
+    """Coulomb friction first, then its difference between directions; no Stribeck; tested on another run."""
     run = imported("emps/DATA_EMPS.mat", "emps_identification")
     pulses = imported("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
     found = diagnose([run], load_rig("emps"), holdout=pulses)
@@ -163,7 +163,7 @@ MECHANICAL = {
 
 
 def test_cycloidal_backlash_is_named_in_run_in_gears():
-    """Its travel is twice that of any preloaded gear; friction and its asymmetry are there as well.
+    """Its travel is twice that of any preloaded gear; it also has friction and an asymmetry of it.
 
     Among the laws of friction, play and springs, in the first ramps: the whole catalogue and record name the
     same in four times the time.

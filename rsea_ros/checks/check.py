@@ -1,4 +1,4 @@
-"""Everything that can be said of a record before physics is fitted to it, in tenths of a second."""
+"""All checks of a record before physics is fitted to it, in tenths of a second."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_ri
 def check_record(
     record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrench | None = None, values: bool = False
 ) -> Findings:
-    """Return what a record is worth for a rig: a traffic light for each thing that was looked at.
+    """Return the findings of a record for a rig, each with a traffic light.
 
-    Nothing is changed or masked by it. axis: of the wrench that `ft` was read from. wrench: the other axes,
-    tried where `ft` has nothing to do with the command. values: fit the rig and tell which of its values
+    Nothing is changed or masked. axis: of the wrench that `ft` was read from. wrench: the other axes,
+    tried where `ft` has nothing to do with the command. values: fit the rig and add which of its values
     these data determine, and which are far off, as identify and diagnose do themselves.
     Raises nothing for data that are merely bad.
     """
@@ -103,7 +103,7 @@ def _topics(record: Record) -> list[Finding]:
 
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
-    """Return what holding the record against the rig's simulation shows."""
+    """Return the findings from comparing the record with the rig's simulation."""
     record = checked.record
     if is_full_of_gaps(record):
         return [
@@ -135,7 +135,7 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
 def _matched(
     record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
 ) -> tuple[Readings | None, list[Finding]]:
-    """Return the readings of the channels, and what they say of signs, scales and the rig."""
+    """Return the readings of the channels, and findings on signs, scales and the rig."""
     related = quotients(compared)
     readings = readings_of(related, rig)
     silent = set(related) - set(readings.channels if readings else ())
@@ -147,7 +147,7 @@ def _matched(
 
 
 def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
-    """Return what makes the machine of a record another one than a rig without a spring."""
+    """Return the findings by which the machine of a record differs from a rig without a spring."""
     if not is_inverse(rig):
         return []
     return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)

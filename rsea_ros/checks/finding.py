@@ -15,14 +15,14 @@ LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """The result of one check.
 
     kind: `topics`, `rate`, `gaps`, `order`, `clock_offset`, `clock_drift`, `noise`, `quantum`, `sign`,
     `scale`, `wrong_rig`, `rig_value`, `excitation`, `rest`, `identifiability`, or the kind of a fault of the
     data.
-    channel: the channel or rig value that it is about, empty for the whole record.
+    channel: the channel or rig value concerned, empty for the whole record.
     value, low, high: the number with its 95 % interval, in `unit`, where one belongs to it.
-    expected: what would be green. detail: what and where. remedy: what would help, or the option to give.
+    expected: the green range. detail: what and where. remedy: the advice, or the option to give.
     """
 
     light: Light
@@ -39,7 +39,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Findings:
-    """All findings of a record held against a rig, in the order in which they are worth reading.
+    """All findings of a record compared with a rig, the most important first.
 
     faults: those of the data, of which every result made from the record repeats the whole list.
     """

@@ -1,6 +1,6 @@
 """The rig linearised about its quick fit: clocks of the sensors.
 
-Gauss-Newton on output errors: linear_rows.py lays them out, linear_step.py solves.
+Gauss-Newton on output errors: linear_rows.py has the rows, linear_step.py the solution.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ class Number:
 
 @dataclass(frozen=True)
 class Linear:
-    """What the linearised fit says. offset: s at the start of the record, drift: s/s, by channel.
+    """The result of the linearised fit. offset: s at the start of the record, drift: s/s, by channel.
 
     misfit: RMS of the residual over the noise by channel.
-    settled: whether the clocks stood still at last; else their numbers mean nothing. problem, theta: the fit
+    settled: whether the clocks converged; otherwise their numbers are meaningless. problem, theta: the fit
     of the values with the clocks set right, and where the rounds ended.
     """
 
@@ -76,7 +76,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
 def _setting(
     record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape
 ) -> tuple[Setting, State]:
-    """Return what all rounds share, and the state where the quick fit ended."""
+    """Return the constants of all rounds, and the state where the quick fit ended."""
     start = float(record["command"].t[0])
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
@@ -110,7 +110,7 @@ def _descended(setting: Setting, state: State) -> tuple[State, Rows, FloatArray,
 
 
 def _clocks_stand(setting: Setting, step: FloatArray, sd: FloatArray) -> bool:
-    """Tell whether a step leaves every clock where it is, within its doubt."""
+    """Return whether a step leaves every clock unchanged within its doubt."""
     n, m = len(setting.values), len(setting.timed)
     finest = np.repeat([_RESOLUTION, _RESOLUTION / setting.case.duration], m)
     clocks = slice(n, n + 2 * m)

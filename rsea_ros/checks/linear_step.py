@@ -1,4 +1,4 @@
-"""The Gauss-Newton step on laid-out rows, and its doubt.
+"""The Gauss-Newton step on the rows, and its doubt.
 
 The covariance is the sandwich over blocks of one second (identification/confidence.py says why).
 """

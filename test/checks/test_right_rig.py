@@ -1,4 +1,4 @@
-"""A rig without a spring on a machine that has one, or another inertia, is asked about in red."""
+"""A rig without the machine's spring, or with another inertia, is questioned in red."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def asked(findings):
 
 
 @pytest.mark.parametrize("rig", ["bare_drive", "pendulum"])
-def test_a_spring_bench_is_no_machine_without_a_spring(rig):
-    """The check was green."""
+def test_a_rig_without_a_spring_is_questioned_on_a_bench_with_one(rig):
+    """This check was green."""
     record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
     findings = check_record(record, load_rig(rig))
     assert asked(findings) == {"spring_end.stiffness": "red"}
@@ -37,13 +37,13 @@ def test_a_spring_bench_is_no_machine_without_a_spring(rig):
     assert found.remedy == RIGHT_RIG
 
 
-def test_nor_is_a_light_pendulum_a_heavy_drive():
+def test_a_rig_of_a_heavy_drive_is_questioned_on_a_light_pendulum():
     findings = check_record(run_of("pendulum", 1.0), load_rig("bare_drive"))
     assert asked(findings)["spring_end.inertia"] == "red"
 
 
-def test_nor_a_pendulum_that_swings_far():
-    """Its torque follows sin(q), which no response shows; that of a real one was amber."""
+def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
+    """Its torque follows sin(q), which no frequency response shows; a real pendulum was rated amber."""
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     q = 2.0 * np.sin(1.7 * t) * np.sin(0.31 * t)
     v = np.gradient(q, t)
@@ -54,7 +54,7 @@ def test_nor_a_pendulum_that_swings_far():
 
 
 @pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
-def test_the_right_rig_is_not_asked_about(name, amplitude):
+def test_the_right_rig_is_not_questioned(name, amplitude):
     assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}
 
 

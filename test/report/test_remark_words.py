@@ -31,7 +31,7 @@ SAID = {
 
 
 @pytest.mark.parametrize(("remark", "text"), SAID.items(), ids=lambda item: getattr(item, "code", ""))
-def test_a_remark_is_said_with_its_names_and_numbers(remark, text):
+def test_a_remark_is_worded_with_its_names_and_numbers(remark, text):
     (sentence,) = remark_sentences([remark])
     assert text in sentence and sentence.endswith(".")
 
@@ -40,7 +40,7 @@ def test_every_code_has_its_words():
     assert {remark.code for remark in SAID} == set(get_args(Code))
 
 
-def test_a_loops_gains_are_fixed_by_other_measurements_than_a_spring():
+def test_the_suggested_measurements_differ_for_loop_gains_and_springs():
     spring, loop = remark_sentences([
         Remark("only_ratios", ("spring.stiffness", "rotor.reflected_inertia")),
         Remark("only_ratios", ("controller.k_p", "rotor.reflected_inertia")),

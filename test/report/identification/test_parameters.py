@@ -1,4 +1,4 @@
-"""The table of parameters: what counts as told, and how a lopsided interval is shown."""
+"""The table of parameters: which values count as determined, and how an asymmetric interval is shown."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def estimate(
      (estimate(3.0, -np.inf, np.inf), "no"), (estimate(0.01, -0.02, 0.04), "no"),
      (estimate(0.01, -0.02, 0.04, name="torque_ripple.phase"), "yes")],
 )  # fmt: skip
-def test_a_value_less_than_its_doubt_or_at_its_bound_is_not_told(p: ParameterEstimate, answer: str) -> None:
+def test_a_value_within_its_doubt_or_at_a_bound_is_not_determined(p: ParameterEstimate, answer: str) -> None:
     assert p.determined == answer
 
 

@@ -1,4 +1,4 @@
-"""Figures of the paper: what their values say, and drawings that are valid SVG."""
+"""Figures of the paper: their values, and drawings that are valid SVG."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def test_circuits_are_drawn_with_their_names(drawing, names):
     assert len(svg.findall(".//{http://www.w3.org/2000/svg}path")) > 8
 
 
-def test_surface_is_eq_7():
+def test_the_surface_is_eq_7():
     surface = figure_9()[0].data[0]
     k, j = np.array(surface["x"]), 1e-3 * np.array(surface["y"])
     expected = np.sqrt(0.292 * k[None, :] / j[:, None]) / (2 * np.pi)
     np.testing.assert_allclose(np.array(surface["z"]), expected, rtol=1e-4)
 
 
-def test_titles_carry_the_numbers():
+def test_titles_contain_the_numbers():
     assert "55.8 Hz by Eq. (7), 55.5 Hz printed (+0.6 %); 19.9 or 15.3 Hz" in figure_20().title
     assert "19.8 Hz unlumped, at 6.1 Hz lumped" in figure_18_as_printed().title
     assert "62.0 dB" in figure_18_as_printed().caption
@@ -49,7 +49,7 @@ def test_figures_are_json():
         json.dumps(asdict(figure), allow_nan=False)
 
 
-def test_table_escapes_and_aligns():
+def test_a_table_is_escaped_and_aligned():
     html = table(["a", "b"], [["<i>", "1"]], numbers=(1,))
     assert "&lt;i&gt;" in html
     assert "<td class='number'>1</td>" in html
