@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
@@ -195,3 +196,4 @@ class Diagnosis:
     remarks: tuple[Remark, ...] = ()
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT
+    rig_choice: RigChoice = field(default_factory=RigChoice)
