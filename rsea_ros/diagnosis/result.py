@@ -165,7 +165,8 @@ class Diagnosis:
     channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
     remarks: what the data cannot determine, and what a reader must know beside the numbers.
-    before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
+    before, after, masked: of the first record; masked: which samples of `before` do not count, by channel,
+    shape (n,): the faulty ones, and those before the bench has settled.
     """
 
     verdict: Verdict

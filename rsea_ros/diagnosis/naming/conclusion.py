@@ -73,7 +73,7 @@ def _diagnosis(
         rejected=rejected,
         next_experiment=_next_experiment(selection, outcome, records[0], settings),
         remaining=misfits(case, last.outputs[0], main, rig),
-        masked=examined.checked[0].masked,
+        masked={n: ~counted for n, counted in case.mask.items()},
         settings=settings,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
