@@ -14,6 +14,7 @@ import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -23,7 +24,10 @@ from std_srvs.srv import Trigger
 from msg_adapters.topics import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
-__all__ = ["Bool", "Clock", "DiagnosticArray", "JointState", "Time", "Trigger", "WrenchStamped"]
+__all__ = [
+    "Bool", "ChangeState", "Clock", "DiagnosticArray", "GetAvailableTransitions", "GetState", "JointState",
+    "Time", "Trigger", "WrenchStamped",
+]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
 SECOND = 1_000_000_000
@@ -61,6 +65,12 @@ def joint_state_message(
     message.header.stamp = time_of(stamp_ns)
     message.header.frame_id = frame
     return message
+
+
+def joint_states_message(joints: Sequence[str]) -> JointState:
+    """Return a state of several joints, all at zero, without a stamp."""
+    zeros = [0.0] * len(joints)
+    return JointState(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
 
 
 def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:

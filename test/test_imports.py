@@ -100,7 +100,10 @@ NAMING = (
 REPORT = {
     "figures": set(),
     "page": {"figures"},
-    "diagnosis": {"figures", "page", "identification"},
+    "diagnosis": {"figures", "page", "identification", "rig"},
+    "identification": {"figures", "page", "rig"},
+    "check": {"figures", "page", "rig"},
+    "rig": {"page"},
     "campaign": {"figures", "page", "experiment"},
     "fleet": {"figures", "page", "diagnosis"},
     "paper": {"figures", "page", "design"},

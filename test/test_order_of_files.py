@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from test.conftest import DEAREST
+from test.conftest import COMPUTING, WAITING
 
 HERE = Path(__file__).parent
 
 
-@pytest.mark.parametrize("name", DEAREST)
-def test_every_file_in_the_list_of_the_longest_exists(name):
+@pytest.mark.parametrize("name", WAITING + COMPUTING)
+def test_what_takes_longest_is_there(name):
     assert list(HERE.glob(f"{name}*"))

@@ -57,14 +57,17 @@ class Prediction:
         path: FloatArray = expected + (desired - expected[-1]) * (i / (missed + 1.0)) ** 3
         return path[:-1]
 
-    def ahead(self, desired: float, samples: int) -> FloatArray:
-        """Take the desired torque of this sample; return it from AHEAD samples on: shape (samples,)."""
+    def ahead(self, desired: float, samples: int, off: float = 0.0) -> FloatArray:
+        """Take the desired torque of this sample; return it from AHEAD samples on: shape (samples,).
+
+        off: samples by which the desired torque is for later than this sample, the same for all of them.
+        """
         expected = ALONG @ self._state
         surprise = desired - expected[0]
         self._state = expected + self._gains * surprise
         self._trust(surprise, desired)
         rate, second = self._state[1:]
-        j = AHEAD + np.arange(samples)
+        j = AHEAD - off + np.arange(samples)
         along: FloatArray = self._smoothed(desired, samples)
         along += self.trust * (desired + j * rate + 0.5 * j * j * second - along)
         return along

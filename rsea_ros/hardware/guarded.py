@@ -12,6 +12,7 @@ from dataclasses import replace
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
+from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.hardware.together import cycle
@@ -35,7 +36,7 @@ class Guarded:
         self.state: State | None = None
         self._taring = self.away = False
         self._turn = threading.Lock()
-        self._lost = {"read": 0, "write": 0}
+        self._losses = {what: Losses(limits.lost_cycles) for what in ("read", "write")}
 
     @property
     def fault(self) -> Fault | None:
@@ -84,7 +85,7 @@ class Guarded:
         except DeviceError as error:
             self._failed("read", error)
             return None
-        self._lost["read"] = 0
+        self._losses["read"].take(lost=False)
         self.guard.look(state)
         self.state = state
         return state
@@ -98,7 +99,7 @@ class Guarded:
         except DeviceError as error:
             self._failed("write", error)
         else:
-            self._lost["write"] = 0
+            self._losses["write"].take(lost=False)
         return torque
 
     def enable(self) -> None:
@@ -182,7 +183,8 @@ class Guarded:
             self.away = True
         try:
             work()
-            self._lost = dict.fromkeys(self._lost, 0)
+            for losses in self._losses.values():
+                losses.clear()
             if self.enabled:
                 self.device.enable()
             self.guard.clear()
@@ -195,11 +197,9 @@ class Guarded:
                         self.device.protection.beat(False)
 
     def _failed(self, what: str, error: DeviceError) -> None:
-        """Count a failure. One lost answer costs a cycle; several in a row, and any other failure, trip."""
-        self._lost[what] += 1
+        """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""
         self.cycles[f"failed_{what}s"] += 1
-        limit = self.guard.limits.lost_cycles
         if not isinstance(error, NoReply):
             self.guard.trip(Fault(type(error).__name__.lower(), detail=str(error)))
-        elif self._lost[what] >= limit:
-            self.guard.trip(Fault("no_reply", self._lost[what], limit, "cycles", str(error)))
+        elif fault := self._losses[what].take(lost=True):
+            self.guard.trip(replace(fault, detail=fault.detail + str(error)))

@@ -24,7 +24,7 @@ class Limits:
     soft_start: N m/s, by which the largest torque grows after an activation and a fault.
     effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
     command_timeout: s without a command while torque is commanded. ramp: s from then to zero torque.
-    lost_cycles: cycles in a row without an answer. ft_axis: place in the wrench.
+    lost_cycles: cycles in a row without an answer, see Losses. ft_axis: place in the wrench.
     """
 
     torque: float

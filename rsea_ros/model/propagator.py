@@ -97,6 +97,7 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
         outputs=_outputs(rig, system.mechanics),
         gravity=np.array([rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES]),
         reads_load=reads_load,
+        rest=(0.0,) * n,
     )
 
 

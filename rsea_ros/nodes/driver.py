@@ -22,6 +22,7 @@ from rsea_ros.nodes._alarm import Alarm
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
+from rsea_ros.nodes._combined import Combined
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import LIMITS, MOTOR, SAFETY, SENSOR
 from rsea_ros.nodes._devices import DEVICES
@@ -77,6 +78,7 @@ class Driver(ManagedEntity):
             for service, work in (("stop", self._stop), ("clear_fault", self._clear_faults)):
                 offer(node, self._jobs, service, work, lambda: None)
         self._cycle: Cycle | None = None
+        self._combined: Combined | None = None
         node.add_managed_entity(self)
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
@@ -92,6 +94,8 @@ class Driver(ManagedEntity):
                 self._close_devices()
                 self._take_topics_away()
                 return TransitionCallbackReturn.FAILURE
+        if self.joints[0].part:
+            self._combined = Combined(self._node, [joint.part for joint in self.joints])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False, anchor=anchor)
         for joint in self.joints:
             joint.runs_in(self._cycle)
@@ -161,7 +165,9 @@ class Driver(ManagedEntity):
     def _take_topics_away(self) -> None:
         for joint in self.joints:
             joint.close()
-        self._cycle = None
+        if self._combined is not None:
+            self._combined.close()
+        self._cycle = self._combined = None
 
     def _close_devices(self) -> None:
         """Close every device whatever one raises; all torques are zero before the first, slow, close."""
@@ -195,9 +201,12 @@ class Driver(ManagedEntity):
         """Run a cycle of the devices and publish the readings."""
         drives = [joint.drive for joint in self.joints if joint.drive is not None]
         try:
-            for joint, state in zip(self.joints, step(drives, stamp, self._buses), strict=True):
+            states = step(drives, stamp, self._buses)
+            for joint, state in zip(self.joints, states, strict=True):
                 if state is not None:
                     joint.publish(state)
+            if self._combined is not None:
+                self._combined.publish(states, drives[0].anchor.shift)
         except Exception:
             self._close_devices()
             raise

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer import motor
@@ -29,6 +30,9 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number)
     place = json.loads(process.stdout.readline())
     assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
     assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
+    words = place["launch"].split()
+    driver = node_calls(words[2], words[3:])[0]
+    assert words[:2] == ["rsea", "launch"] and driver.parameters["ft_page_port"] == str(place["page_port"])
     process.send_signal(number)
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")

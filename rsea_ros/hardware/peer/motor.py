@@ -32,14 +32,16 @@ class Plant(Protocol):
 class Motor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
-    history: every change of the torque that acts, as (clock in ns, goal in counts, whether torque is on).
+    history: every write to it, as (clock in ns, goal in counts, whether torque is on), the newest `kept`.
     """
 
-    def __init__(self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234) -> None:
+    def __init__(
+        self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234, kept: int = KEPT
+    ) -> None:
         self.model, self._plant = MODELS[number], plant
         self._constant, self._origin = torque_constant or self.model.constant, origin
         self.memory = bytearray(TABLE_SIZE)
-        self.history: deque[tuple[int, int, bool]] = deque(maxlen=KEPT)
+        self.history: deque[tuple[int, int, bool]] = deque(maxlen=kept)
         self._touched = 0
         for name, register in self.model.registers.items():
             self.put(name, register.start)

@@ -19,7 +19,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.observer.transition import exponential, transition
-from rsea_ros.model.step import Calls, Linear, advance
+from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.signals import FloatArray
 
 POSITION, WRENCH, TORQUE = range(3)
@@ -114,7 +114,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         transition(model.a, model.walk, model.scale, dt, model.f, model.q)
         model.held[1] = dt
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
-    command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, 4)), np.empty(0)
+    command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, len(OUTPUTS))), np.empty(0)
     advance(model.linear, model.calls, command, none, none, state.clock[NOW],
             state.x, state.table, state.own, out)  # fmt: skip
     n = len(state.x)
