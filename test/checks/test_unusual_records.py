@@ -65,7 +65,6 @@ def test_another_axis_is_tried_on_stamps_put_right():
     twice = np.repeat(T[::2], 2)
     dead, alive = Channel(twice, np.zeros(len(T))), Channel(twice, np.roll(command.y, 2))
     position = Channel(T, np.cumsum(command.y))
-    said = check_record(
-        Record({"command": command, "position": position, "ft": dead}), RIG, wrench=lambda: {"torque.x": alive}
-    )
+    record = Record({"command": command, "position": position, "ft": dead})
+    said = check_record(record, RIG, wrench=lambda: {"torque.x": alive})
     assert {f.kind for f in said.findings if f.channel == "ft"} >= {"dead_channel", "duplicate_stamps"}
