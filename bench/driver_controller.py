@@ -1,11 +1,13 @@
 """Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, and the largest |ft|, which a load may not
-raise. The bare loop of the same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO
-if that is permitted: motor and sensor have processors of their own; at 1 kHz a bench that waits for one is
-a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where permitted
-(--priority): the machine's other work is then out of their way, but for the kernel's worker that carries
-the bytes of a pseudo-terminal.
+raise. The bare loop of the same minute tells what the machine can, and so does a loop of nothing but the
+two requests to the motor, on the same terminal once the driver has left it: how long it waits for a reply,
+and how many faults the driver's rule would make of that. The bench on a wire runs at SCHED_FIFO if that is
+permitted, above both nodes: motor and sensor have processors of their own; at 1 kHz a bench that waits for
+one is a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where
+permitted (--priority): the machine's other work is then out of their way, but for the kernel's worker that
+carries the bytes of a pseudo-terminal.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from bench.bare_loop import permitted
+from bench.bare_wire import ALONE, wire_alone
 from bench.driver_lateness import Torques, noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
@@ -86,13 +89,13 @@ def _trial(
 ) -> list[tuple[str, str, str]]:
     """Run one trial; a fault ends the sine, which is part of what is asked."""
     outside = Outside()
-    with ExitStack() as kept:
+    with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
-        bench.hurry()
+        bench.hurry(priority + 1 if priority else 50)
         own = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
-        kept.enter_context(running("driver", 0, **own, **both, **patient))
-        kept.enter_context(running("controller", 0, rig=kind.rig, **both))
+        nodes.enter_context(running("driver", 0, **own, **both, **patient))
+        nodes.enter_context(running("controller", 0, rig=kind.rig, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         kept.enter_context(burning(load))
         late = _lateness(rate)
@@ -102,6 +105,8 @@ def _trial(
         largest = max(abs(torque) for _, torque, _ in outside.wrenches)
         faults = _faults(outside)
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
+        nodes.close()
+        alone = wire_alone(rate, priority, path.parent, bench)
     outside.node.destroy_node()
     beside = f"beside {load} that burn" if load else "quiet"
     name = f"{kind.name}, {rate:g} Hz, {beside}"
@@ -115,6 +120,7 @@ def _trial(
     return [
         (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", told),
         (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N m", f"{largest:.2f} N m"),
+        (f"{name}: the two requests alone, {ALONE:g} s", "", alone),
     ]
 
 

@@ -21,7 +21,7 @@ BESIDE = ("spring", "hard_stop", "hysteresis_")
 
 
 def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
-    """Return what the bench of an exported rig measures at the begin of each command's hold.
+    """Return the measurements of an exported rig's bench at the beginning of each command's hold.
 
     command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without MuJoCo,
     and for a model that MuJoCo refuses.
@@ -66,7 +66,7 @@ def _sensed(mujoco: Any, rollout: Any, model: Any, torque: FloatArray, piece: in
 
 
 def _channels(rig: Rig, model_text: str, read: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the rig's channels from what the model's sensors read at every step."""
+    """Return the rig's channels from the readings of the model's sensors at every step."""
     position, velocity = read["output"], read["output_rate"]
     if rig.encoder_end == "spring_end":
         for name in ("deflection", "play"):

@@ -1,4 +1,4 @@
-"""Records that are hardly ones: few samples, none, a command of next to nothing."""
+"""Unusual records: few samples, none, a tiny command."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_commands_of_next_to_nothing_and_of_too_much_have_a_light(name):
+def test_tiny_and_excessive_commands_are_rated(name):
     command, light = COMMANDS[name]
     assert [f.light for f in checked(command).findings if f.kind == "excitation"] == [light]
 

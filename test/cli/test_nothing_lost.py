@@ -1,4 +1,4 @@
-"""Whatever fails while results are written, at whatever step: old files stay, and nothing is half there."""
+"""Whatever fails while results are written, at whatever step: old files stay, and no file is partial."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from rsea_ros.fleet import columns
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.laws import learn
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report import file_names
@@ -52,7 +53,7 @@ OLD, JSON = b"old", {"all": 1}
 
 
 class Disk:
-    """The calls of the system with which files.py writes; the n-th of them misfires."""
+    """The system calls with which files.py writes; the n-th of them fails."""
 
     def __init__(self, n: int, misfire: Callable[[str], None]) -> None:
         self.left, self._misfire = n, misfire
@@ -81,7 +82,7 @@ def stop(name: str) -> None:
 
 @dataclass(frozen=True)
 class Found:
-    """What the verbs ask of any result."""
+    """The interface of a result that the verbs use."""
 
     rig: None = None
     extended_rig: None = None
@@ -89,7 +90,8 @@ class Found:
     verdict: str = ""
     feasible: bool = True
     faults: tuple[()] = ()
-    rig_option: str = ""
+    remarks: tuple[()] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
     base_rig: None = None
     laws: tuple[()] = ()
     at_floor: bool = False
@@ -112,7 +114,7 @@ def record() -> Record:
 
 @pytest.fixture
 def folder(record, tmp_path, monkeypatch) -> Path:
-    """Return a working directory with inputs, where what verbs compute is there at once."""
+    """Return a working directory with inputs, in which verbs have their results without computing."""
     write_record(record, tmp_path / "run.mcap")
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / "run.csv").write_text("t,u\n0,1\n1,2\n2,3\n")
@@ -167,7 +169,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> Iterator[int]:
-    """Run a verb again and again, each time with a later step that misfires, until none does."""
+    """Run a verb repeatedly, each time with a later step that fails, until none fails."""
     for n in range(1, 200):
         disk = Disk(n, misfire)
         with monkeypatch.context() as patch:
@@ -244,8 +246,8 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
 
 
 @pytest.mark.parametrize("verb", ["predict", "simulate", "export", "identify", "simulate to a directory"])
-def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
-    """A pipe stands for devices: to replace /dev/null takes a system down."""
+def test_only_regular_files_are_replaced(folder, capsys, verb):
+    """A pipe stands for devices: replacing /dev/null would take a system down."""
     words, names = WRITERS[verb]
     (folder / "out").mkdir()
     os.mkfifo(folder / "out" / names[0])
@@ -285,7 +287,7 @@ def test_an_input_is_never_replaced(folder, record, capsys, words):
 
 
 @pytest.mark.parametrize("verb", ["design", "identify", "diagnose", "control", "paper"])
-def test_a_second_call_without_out_goes_beside_the_first(folder, capsys, verb):
+def test_a_second_call_without_out_writes_beside_the_first(folder, capsys, verb):
     words = WRITERS[verb][0][:-2]
     assert [main(words) for _ in range(3)] == [0, 0, 0]
     name = f"{verb}-run" if verb in ("identify", "diagnose") else verb
@@ -293,7 +295,7 @@ def test_a_second_call_without_out_goes_beside_the_first(folder, capsys, verb):
 
 
 def test_two_runs_at_once_do_not_take_one_name(folder, monkeypatch, capsys):
-    """The other run ends first, between the check and the naming."""
+    """The other run ends first, between the check of the name and its use."""
 
     def other(name: str) -> None:
         if name == "link":

@@ -1,4 +1,4 @@
-"""What was damaged in a bag is told by every verb, and the result still comes."""
+"""Every verb reports the damage in a bag and still returns its result."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RIG = "paper_high_impedance"
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """Return a clean bag with a gap of 40 wrenches, and messages that its metadata count and it lacks."""
+    """Return a bag with a gap of 40 wrenches and with fewer messages than its metadata count."""
     folder = tmp_path_factory.mktemp("told")
     assert main(["simulate", RIG, "--out", str(folder / "clean"), "--duration", "8"]) == 0
     wrenches = 0
@@ -41,17 +41,17 @@ def _assert_told(faults):
     assert told["dropped_samples", "ft"]["size"] == 40
 
 
-def test_identify_tells(bag, tmp_path, capsys):
+def test_identify_reports_the_faults_of_a_bag(bag, tmp_path, capsys):
     assert main(["identify", str(bag), "--out", str(tmp_path / "out"), "--json"]) == 0
     _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
 
 
-def test_predict_tells(bag, capsys):
+def test_predict_reports_the_faults_of_a_bag(bag, capsys):
     assert main(["predict", RIG, str(bag)]) == 0
     _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
 
 
-def test_the_check_before_a_diagnosis_tells(bag):
+def test_the_check_before_a_diagnosis_reports_the_faults_of_a_bag(bag):
     checked = check(readable(str(bag), TopicMap()), load_rig(RIG))
     _assert_told([fault_json(fault) for fault in checked.faults])
 
@@ -79,7 +79,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", DAMAGE)
-def test_identify_predict_and_diagnose_tell_alike_and_the_intervals_hold(run, tmp_path, capsys, name):
+def test_identify_predict_and_diagnose_report_damage_alike_and_the_intervals_hold(run, tmp_path, capsys, name):
     """Seven such bags gave intervals that missed the truth without a word."""
     damage, kind = DAMAGE[name]
     bag, truth = str(write(tmp_path / "a.mcap", damage(run))), load_rig(RIG)
