@@ -1,7 +1,7 @@
 """Numbers out of and into one serialised message, without making the message.
 
 rclpy makes a Python object for every part of a message: 250 us for a wrench in a process that has slept for
-3 ms. The layout is walked once (cdr.py); while the bytes that make it stay, numbers are where they were.
+3 ms. The layout is determined once (cdr.py); while the bytes that define it stay, numbers keep their places.
 """
 
 from __future__ import annotations

@@ -35,11 +35,12 @@ def read_record(
 ) -> Record:
     """Read one bag, or several files of one run, as a record; other topics are ignored.
 
-    Stamps are those of the message headers; where one is zero, the log time stands in and a note says so.
-    Samples that lie out of order are sorted by their stamps. Damaged messages are left out. Whatever was
-    damaged stands in the record's faults, and what the bag's /diagnostics tell of the run.
-    strict: refuse what no model can be fitted to (missing command or measurement, NaN), and put the stamps
-    right (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN come as they are.
+    Stamps are those of the message headers; a zero one is replaced by the log time, with a note.
+    Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
+    all damage, and the faults in the bag's /diagnostics.
+    strict: refuse records to which no model can be fitted (missing command or measurement, NaN), and correct
+    the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN are returned
+    unchanged.
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
@@ -154,7 +155,7 @@ def _series(
 
 
 def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
-    """Refuse several joints where none is named, and a name that is not there."""
+    """Refuse several joints where none is named, and a missing name."""
     layouts = [block.layout for block in found if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])

@@ -1,7 +1,7 @@
-"""numba's compiler, keeping what it makes in this package's cache (compiler_cache.py).
+"""numba's compiler with this package's cache (compiler_cache.py).
 
 The folder is named only while a function of this package is decorated: neither the environment nor numba's
-settings for the functions of others change. Where nothing can be kept, every process compiles what it runs.
+settings for other packages change. Without a writable cache every process compiles its functions again.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _normalized: Any = sigutils.normalize_signature
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's decorator for a compiled function, with its options. cache: keep what is compiled."""
+    """Return numba's decorator for a compiled function, with its options. cache: store the compiled code."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         made = numba.njit(**options)(function)
@@ -51,7 +51,7 @@ def cfunc(signature: Any, *, cache: bool = False, **options: Any) -> Callable[[C
 
 
 class _Kept(_caching.FunctionCache):  # type: ignore[misc]
-    """The compiled code of one function on the disk; what cannot be read or written costs only time."""
+    """The compiled code of one function on the disk; an unreadable or unwritable file costs only time."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -80,7 +80,7 @@ def _cache_of(function: Callable[..., Any]) -> Any:
 
 @cache
 def warn_once(reason: str) -> None:
-    """Say that nothing is kept, once for each reason."""
+    """Warn that compiled code is not stored, once for each reason."""
     _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
 
 

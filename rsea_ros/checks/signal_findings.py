@@ -24,7 +24,7 @@ _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `ex
 
 
 def excitation(record: Record, rig: Rig) -> list[Finding]:
-    """Return what the command does: its band and size, and the share of the record at rest."""
+    """Return the findings on the command: its band and size, and the share of the record at rest."""
     command = record["command"]
     if float(np.ptp(command.y)) == 0.0:
         return [
@@ -112,7 +112,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
 
 
 def _rough(channel: Channel) -> float:
-    """Return the RMS of white noise that fourth differences show: what smooth motion has little of."""
+    """Return the RMS of white noise by fourth differences, in which smooth motion hardly appears."""
     return float(np.median(np.abs(np.diff(channel.y, 4)))) / 0.6745 / math.sqrt(70.0)
 
 

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the ports of the bench in one line of JSON, and run it until stdin ends, or SIGINT or SIGTERM."""
+    """Print the ports of the bench in one line of JSON, and run it until stdin ends or a signal stops it."""
     if not 1.0 <= args.ft_rate <= 7000.0:
         raise ParameterError(f"--ft-rate {args.ft_rate:g} Hz, expected 1 to 7000 Hz")
     if not 0 <= args.return_delay <= 254:
@@ -60,13 +60,13 @@ def run(args: argparse.Namespace) -> int:
     stop, stopping = os.pipe()
     inlet = sys.stdin.fileno() if args.requests else stop
     requests = LineRequests(motors, bus, sensor, wrong, inlet, sys.stdout.fileno())
-    ports = {"ft_port": sensor.port, "page_port": sensor.page}
+    place = _place(args, sensor)
     gc.freeze()
     gc.disable()  # a real motor does not stop for garbage collection
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.default_int_handler)
-        print(json.dumps({"port": str(args.port), "model": args.model[0], **ports}), flush=True)
+        print(json.dumps(place), flush=True)
         Station(plants, motors, bus, sensor, requests).run()
     except KeyboardInterrupt:
         pass
@@ -74,6 +74,18 @@ def run(args: argparse.Namespace) -> int:
         bus.vanish()
         os.close(stopping)
     return 0
+
+
+def _place(args: argparse.Namespace, sensor: ForceSensor) -> dict[str, object]:
+    """Return where the bench is, and the command that starts the driver on it."""
+    launch = (
+        f"rsea launch hardware rig:={args.rig} port:={args.port} ft_host:=127.0.0.1 "
+        f"ft_port:={sensor.port} ft_page_port:={sensor.page}"
+    )
+    return {
+        "port": str(args.port), "model": args.model[0], "ft_port": sensor.port, "page_port": sensor.page,
+        "launch": launch,
+    }  # fmt: skip
 
 
 def _motors(args: argparse.Namespace, kept: int) -> tuple[list[SimulatedDevice], list[Motor]]:

@@ -8,9 +8,9 @@
     u_c    = friction, ripple, backlash, from the model's own motion       compensation.py
     u      = u_ff + u_fb + u_c within the limits
 
-It needs no load: a rig's ends are not looked at. What the limits take away from the model's torque is taken
-from the model too, and integration stops at a limit. So nothing winds up, and the bench comes back to the
-desired torque as fast as the limits let it. A reading that is off its place in the grid of
+It needs no load: a rig's ends are not used. The torque that the limits remove is removed
+from the model too, and integration stops at a limit. So nothing winds up, and the bench returns to the
+desired torque as fast as the limits allow. A reading that is off its place in the grid of
 samples is compared with the model at its own instant.
 """
 
@@ -65,7 +65,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Share:
-    """What a command is made of, N m; reference: the torque that the model has at this sample."""
+    """The parts of a command, N m; reference: the torque of the model at this sample."""
 
     reference: float = 0.0
     feedforward: float = 0.0
@@ -163,7 +163,7 @@ class TorqueController:
         return self._prediction.ahead(desired, samples, off)
 
     def _coast(self, desired: float, off: float) -> None:
-        """Pass over a sample that did not come: the last torque goes on acting."""
+        """Bridge a missing sample: the last torque goes on acting."""
         ahead = self._ahead(desired, off)
         self._reference.advance(self._reference.torque(ahead), float(ahead[0]))
         self._remember(hold(self._state, self._state.newest), self._sent, self._known[1], self._learned[1])
@@ -177,7 +177,7 @@ class TorqueController:
     def _compare(self, reading: Reading, offset: float) -> tuple[float, float, Reading]:
         """Return how far the model is ahead in torque (N m) and speed (rad/s), and the reading at its place.
 
-        What is compared is of one instant: torque where ft was taken, speed where the rest was.
+        Both are compared at one instant: torque at that of ft, speed at that of the other measurements.
         """
         model = self._reference
         torque, speed = model.at(offset - reading.ft_age)[0], model.at(offset)[1]

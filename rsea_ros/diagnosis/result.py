@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
@@ -164,7 +165,8 @@ class Diagnosis:
     channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
     remarks: what the data cannot determine, and what a reader must know beside the numbers.
-    before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
+    before, after, masked: of the first record; masked: which samples of `before` do not count, by channel,
+    shape (n,): the faulty ones, and those before the bench has settled.
     """
 
     verdict: Verdict
@@ -195,3 +197,4 @@ class Diagnosis:
     remarks: tuple[Remark, ...] = ()
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT
+    rig_choice: RigChoice = field(default_factory=RigChoice)

@@ -1,4 +1,4 @@
-"""A device behind its limits: what a driver does in each cycle, without ROS."""
+"""A device behind its limits: the work of a driver in each cycle, without ROS."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ BUSY = "clear_fault or reboot is under way, expected it to be over"
 
 
 class Guarded:
-    """Reads and writes once a cycle; turns what goes wrong into latched faults, never into an exception.
+    """Reads and writes once a cycle; errors become latched faults, never exceptions.
 
-    enabled: whether commands get through. cycles: `failed_reads`, `failed_writes` of the cycles so far.
-    away: whether somebody else talks to the device, which takes longer than a cycle; cycles leave it alone.
-    spring: by which a measured deflection becomes a wrench where no sensor measures one; None: it does not.
+    enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
+    spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
     """
 
     def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
@@ -44,10 +44,10 @@ class Guarded:
         return self.guard.fault
 
     def open(self, *, unprotected: bool = False) -> None:
-        """Open the device and ask for its protection against a dead host.
+        """Open the device and check its protection against a dead host.
 
-        unprotected: whether there may be none. Raises ParameterError where there is none and may not be,
-        DeviceError; nothing stays open then.
+        unprotected: whether protection may be missing. Raises ParameterError for a device without it
+        otherwise, DeviceError; nothing stays open then.
         """
         self.device.open()
         if self.device.protection.kind == NONE and not unprotected:
@@ -78,7 +78,7 @@ class Guarded:
         return not self.away
 
     def read(self) -> State | None:
-        """Return the reading of this cycle; None when there was none."""
+        """Return the reading of this cycle; None without one."""
         try:
             self.device.protection.beat()  # to wait for a reply that is lost is not to hang
             state = self._read()
@@ -114,7 +114,7 @@ class Guarded:
             self.enabled = True
 
     def disable(self) -> None:
-        """Command zero torque and switch it off. Whoever has the device does it where that is away."""
+        """Command zero torque and switch it off. The thread that uses the device does it while it is away."""
         self.enabled = False
         with self._turn:
             self.guard.torque = 0.0
@@ -133,9 +133,9 @@ class Guarded:
             self._taring = False
 
     def clear(self) -> bool:
-        """Connect again if need be and forget the fault; return whether there was one.
+        """Reconnect if necessary and clear the fault; return whether there was one.
 
-        Raises DeviceError while its cause is there: a reading is asked.
+        Raises DeviceError while its cause is present, checked by a reading.
         """
         if self.guard.fault is None:
             return False
@@ -166,7 +166,7 @@ class Guarded:
         return f"{self._spring}" if self.state.inferred else "sensor"
 
     def _read(self) -> State:
-        """Return a reading, with the spring's torque where that is what is measured of it."""
+        """Return a reading, with the spring's torque where only the deflection is measured."""
         state = self.device.read()
         if self._spring is None:
             return state
@@ -176,7 +176,7 @@ class Guarded:
         return state
 
     def _alone(self, work: Callable[[], None]) -> None:
-        """Do something with the device while the cycles leave it alone, then begin anew, at zero torque."""
+        """Use the device while the cycles leave it alone, then restart at zero torque."""
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
@@ -191,7 +191,7 @@ class Guarded:
         finally:
             with self._turn:
                 self.away = False
-                if not self.enabled:  # also where it was asked for meanwhile
+                if not self.enabled:  # also where it was requested meanwhile
                     with suppress(DeviceError):
                         self.device.disable()
                         self.device.protection.beat(False)

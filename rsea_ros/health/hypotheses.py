@@ -1,4 +1,4 @@
-"""What may change in a joint: for each parameter the model with another value, and what counts as changed."""
+"""Possible changes of a joint: for each parameter another value in the model, and the least that counts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Hypothesis:
     value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
     alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
     below which the data cannot show it, as a delay within a sample. relative: `apply` takes the new value
-    over the old one. common: one sigma of the value that every look has in common, as that of a calibration.
+    over the old one. common: one sigma of the part that all looks share, as of a calibration.
     """
 
     code: str
@@ -61,7 +61,7 @@ class Hypothesis:
 
 
 def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
-    """Return what may change in a joint. period: s, between measurements."""
+    """Return the possible changes of a joint. period: s, between measurements."""
     found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
     found.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
     found.append(_friction(rig))
@@ -82,7 +82,7 @@ def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
 
 
 def nuisances_of(rig: Rig) -> tuple[Hypothesis, ...]:
-    """Return what no code stands for and the model may have a little wrong: inertia, the spring's damping."""
+    """Return parameters without a code that may be slightly wrong in the model: inertia, spring damping."""
     names = ["rotor.reflected_inertia", *([] if rig.rigid_spring else ["spring.damping"])]
     found = (_field(rig, name, "", 0.1) for name in names)
     return tuple(h for h in found if h is not None)

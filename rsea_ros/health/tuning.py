@@ -1,8 +1,8 @@
-"""The model as the first looks have it, within its doubts: an identification is right to its intervals only.
+"""The model tuned to the first looks within its doubts: an identification is right within its intervals only.
 
     d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= 1.96 doubt
 
-for all parameters together. What lies beyond the doubt stays a change, to be alarmed.
+for all parameters together. A deviation beyond the doubt stays a change and alarms.
 """
 
 from __future__ import annotations

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.identification.determined import shares_told
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution, central_jacobian
@@ -27,8 +28,6 @@ BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
 _MOST_CORRECTED = 4.0
 """Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
-_NULL = 1e-9
-"""Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""
 _INVOLVED = 0.2
@@ -41,9 +40,7 @@ _ALIKE = 0.8
 class Confidence:
     """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
-    told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
-    unknowns free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
-    theta: where the fit ended, shape (n,).
+    told: by determined.shares_told. information: J'J, shape (n, n). theta: where the fit ended, shape (n,).
     """
 
     theta: FloatArray
@@ -74,7 +71,7 @@ def confidence_of(solution: Solution) -> Confidence:
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    return Confidence(solution.theta, covariance, _told(information, doubt), information)
+    return Confidence(solution.theta, covariance, shares_told(information, doubt), information)
 
 
 def inverse_of(matrix: FloatArray) -> FloatArray:
@@ -95,13 +92,6 @@ def _alike(case: Case) -> float:
     """Return how many samples of a case are worth one independent sample: a filter makes them alike."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
-
-
-def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:
-    """Return by unknown the share of what is known of it that the data alone brought, 0 … 1."""
-    scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
-    told: FloatArray = 1.0 / (1.0 + np.diag(np.linalg.inv(scaled)))
-    return told
 
 
 def _block_scores(solution: Solution) -> FloatArray:

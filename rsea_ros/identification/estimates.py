@@ -41,8 +41,9 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
             unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
-            spread=u.doubt,
+            spread=u.spread,
             told_by_data=float(told),
+            spreads_off=u.sigmas(float(theta)),
         )
         for u, theta, s, told in zip(
             solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True

@@ -26,6 +26,7 @@ from rsea_ros.identification.even_stamps import Evened, evened
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of
+from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.record_checks import check_excited, check_usable
 from rsea_ros.identification.responses import model_response, responses_of
@@ -130,7 +131,11 @@ def _result(
         models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        remarks=(*torque_scale(problem), *undetermined(problem.unknowns, confidence)),
+        remarks=(
+            *off_rig(parameters),
+            *torque_scale(problem),
+            *undetermined(problem.unknowns, confidence),
+        ),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )

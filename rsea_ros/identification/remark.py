@@ -20,6 +20,7 @@ Code = Literal[
     "coherence_lost",
     "on_measured_angle",
     "coloured_noise",
+    "off_rig",
 ]
 """What a remark says.
 
@@ -35,6 +36,7 @@ also_in_model: effects that the extended model has and that are no causes.
 coherence_lost: of a channel with the command, above a frequency (Hz).
 on_measured_angle: an effect was simulated on the measured rotor angle.
 coloured_noise: of channels, taken from the residual.
+off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
 """
 
 

@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.identification.determined import TOLD, Determined, how_determined
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data determine any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_TOLD = 0.5
-"""Share of what is known of a value that the data must have brought for it to be identified."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,8 @@ class ParameterEstimate:
     """A parameter in SI with its 95 % interval.
 
     told_by_data: share of what is known of it that the data brought, 1 - var(posterior) / var(prior).
-    start: the value that the rig stated. spread: relative one-sigma prior spread around it.
+    start: the value that the rig stated. spread: relative one-sigma prior spread around it. spreads_off: how
+    many of them the value lies off it.
     """
 
     name: str
@@ -60,11 +61,17 @@ class ParameterEstimate:
     start: float
     spread: float
     told_by_data: float
+    spreads_off: float = 0.0
 
     @property
     def is_told(self) -> bool:
         """Return whether the data determine the value, rather than what the rig states."""
-        return self.told_by_data >= _TOLD
+        return self.told_by_data >= TOLD
+
+    @property
+    def determined(self) -> Determined:
+        """Return how well the data determine the value."""
+        return how_determined(self.name, self.value, self.ci95, self.told_by_data)
 
 
 @dataclass(frozen=True)
@@ -86,8 +93,7 @@ class Identification:
     frequencies of each of `responses`. remarks: what is not identifiable, and what was done to the stamps.
     statics: of slow ramps against a locked output. alternatives: laws that would explain a part of the
     misfit; the intervals span what each makes of the values. coloured: channels whose residual was taken for
-    coloured noise of the sensor. rig_option: the rig as the user named it. clocks: what unknown clocks of
-    the sensors would cost.
+    coloured noise of the sensor. clocks: what unknown clocks of the sensors would cost.
     """
 
     rig: Rig
@@ -109,7 +115,7 @@ class Identification:
     alternatives: tuple[str, ...] = ()
     coloured: tuple[str, ...] = ()
     clocks: tuple[Remark, ...] = ()
-    rig_option: str = ""
+    rig_choice: RigChoice = field(default_factory=RigChoice)
 
     @property
     def times_noise(self) -> dict[str, float]:

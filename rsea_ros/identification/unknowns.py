@@ -67,6 +67,11 @@ class Unknown:
     scale: float
 
     @property
+    def spread(self) -> float:
+        """Return the prior's one sigma over the value that it is around; absolute where that is 0."""
+        return self.doubt if self.logarithmic else self.doubt / (abs(self.start) or 1.0)
+
+    @property
     def is_clock(self) -> bool:
         """Whether it is the clock error of a sensor, or its rate."""
         return self.name.split(".")[0] in (CLOCK, CLOCK_RATE)

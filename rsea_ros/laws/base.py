@@ -59,7 +59,7 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
 
 
 def _finer(case: Case, known: Case) -> dict[str, float]:
-    """Return the noise of each channel: what a fit takes for noise may be a misfit."""
+    """Return the noise of each channel: the noise of a fit may contain a misfit."""
     return {n: min(v, known.noise[n]) for n, v in case.noise.items()}
 
 

@@ -1,4 +1,4 @@
-"""Laws fitted in the simulation: thinned to what the fit needs, and what they gain."""
+"""Laws fitted in the simulation, without needless terms, and their gain."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NEEDED = 0.03
 
 
 def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
-    """Fit the laws in the simulation, in units of what they leave, without terms that it does not need."""
+    """Fit the laws in the simulation, in units of their residual, and drop terms that it does not need."""
     refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
     weights = _score(base, refined, FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())
@@ -90,7 +90,7 @@ def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]
 
 
 def share_of(before: dict[str, float], after: dict[str, float], noise: dict[str, float]) -> float:
-    """Return which share of the power above the noise is explained, of the channels that had any."""
+    """Return the explained share of the power above the noise, over the channels that had any."""
     shares = [
         ((before[n] ** 2 - after[n] ** 2), before[n] ** 2 - noise[n] ** 2)
         for n in before

@@ -1,8 +1,8 @@
 """SROS 2 policies of the nodes, read from the nodes themselves: python -m rsea_ros.nodes._policies > FILE.
 
 With names of joints, `_policies hip knee`, they are those of one driver of these joints and of the other
-nodes in the namespace of each joint. Each node is made in this process with its defaults and asked for its
-topics and services. `operator` stands for a person, who may listen to everything, call every service, and
+nodes in the namespace of each joint. Each node is made in this process with its defaults, and its topics
+and services are listed. `operator` stands for a person, who may listen to everything, call every service, and
 publish nothing.
 """
 

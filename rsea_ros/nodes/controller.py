@@ -152,7 +152,7 @@ class Controller:
         self._commands.publish(self._writer.write(stamp, (self._torque,)))
 
     def _clear(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Begin anew, at zero torque, with the next measurement."""
+        """Restart at zero torque with the next measurement."""
         with self._lock:
             self._fault, self._last, self._torque = "", 0, 0.0
             self._grid.forget()

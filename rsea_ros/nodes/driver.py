@@ -84,7 +84,7 @@ class Driver(ManagedEntity):
             node.trigger_activate()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the devices and begin to publish what they measure."""
+        """Open the devices and begin to publish their measurements."""
         anchor = Anchor()
         for joint in self.joints:
             try:
@@ -126,9 +126,9 @@ class Driver(ManagedEntity):
     on_shutdown = on_error = on_cleanup
 
     def finished(self) -> bool:
-        """Tell of faults; go back to unconfigured when the cycle has ended with an exception.
+        """Report faults; return to unconfigured when the cycle has ended with an exception.
 
-        What the executor does next begins between two cycles.
+        The executor's next work begins between two cycles.
         """
         for joint in self.joints:
             joint.follow()
@@ -147,7 +147,7 @@ class Driver(ManagedEntity):
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Zero torque, devices closed, topics gone; also when there are none."""
+        """Zero torque, devices closed, topics removed; also without any."""
         for joint in self.joints:
             joint.guarded.enabled = False
         self._jobs.join(PATIENCE)
@@ -170,7 +170,7 @@ class Driver(ManagedEntity):
         self._cycle = self._combined = None
 
     def _close_devices(self) -> None:
-        """Close every device, whatever one raises; all are zero before one is closed, which takes long."""
+        """Close every device whatever one raises; all torques are zero before the first, slow, close."""
         with ExitStack() as kept:
             for joint in self.joints:
                 kept.callback(joint.guarded.device.close)
@@ -185,7 +185,7 @@ class Driver(ManagedEntity):
             bus.send()
 
     def _disable(self, joints: Sequence[Joint]) -> None:
-        """Zero torque, switched off, whatever one of them answers."""
+        """Zero torque and switch off, whatever one of them answers."""
         for joint in joints:
             try:
                 joint.guarded.disable()
@@ -193,12 +193,12 @@ class Driver(ManagedEntity):
                 self._node.get_logger().error(joint.named(f"while deactivating: {error}"))
 
     def _halt(self) -> None:
-        """End the torque with the next cycle: the process was asked to end."""
+        """End the torque with the next cycle, since the process is to end."""
         for joint in self.joints:
             joint.guarded.guard.halted = True
 
     def _step(self, stamp: int) -> None:
-        """Do a cycle of the devices and publish what was read."""
+        """Run a cycle of the devices and publish the readings."""
         drives = [joint.drive for joint in self.joints if joint.drive is not None]
         try:
             states = step(drives, stamp, self._buses)
@@ -218,7 +218,7 @@ class Driver(ManagedEntity):
         return "torque of all joints zero until clear_fault"
 
     def _clear_faults(self) -> str:
-        """Clear every joint's fault; one that cannot be cleared keeps no other from it."""
+        """Clear every joint's fault; one that cannot be cleared does not affect the others."""
         self._check_configured()
         done, failed = [], []
         for joint in self.joints:

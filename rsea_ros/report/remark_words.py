@@ -109,6 +109,16 @@ def _coherence_lost(remark: Remark) -> str:
     )
 
 
+def _off_rig(remark: Remark) -> str:
+    stated, value, low, high, spreads = remark.values
+    fitted, doubt = words.with_doubt(value, low, high)
+    unit = words.unit(remark.unit)
+    return (
+        f"{remark.names[0]} differs from the rig: the rig states {words.number(stated, 4)} {unit}, the fit "
+        f"gives {fitted}{doubt} {unit} (95 %), {words.number(spreads, 2)} of the stated spreads away."
+    )
+
+
 _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "even_clocks": _even_clocks,
     "clocks_taken_as_right": _clocks_taken_as_right,
@@ -124,4 +134,5 @@ _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "coherence_lost": _coherence_lost,
     "on_measured_angle": lambda remark: _ON_MEASURED_ANGLE,
     "coloured_noise": lambda remark: coloured_noise(remark.names),
+    "off_rig": _off_rig,
 }

@@ -109,6 +109,19 @@ def scaled(value: float, of: str) -> tuple[float, str]:
     return 1.0 / factor, f"{prefix}{unit(of)}"
 
 
+def span(low: float, high: float, of: str) -> str:
+    """Return a range with its unit, both ends to two digits of its width: `0 to 0.041 N·m`."""
+    factor, prefixed = scaled(max(abs(low), abs(high)), of)
+    low, high = low * factor, high * factor
+    width = high - low
+    if not (math.isfinite(width) and width > 0.0):
+        return f"{number(low)} to {number(high)} {prefixed}".rstrip()
+    decimals = 1 - math.floor(math.log10(width))
+    ends = (round(end, decimals) for end in (low, high))
+    low_text, high_text = (minus(f"{end:.{max(0, decimals)}f}") if end else "0" for end in ends)
+    return f"{low_text} to {high_text} {prefixed}".rstrip()
+
+
 LOPSIDED = 1.5
 """Ratio of the sides of an interval, from which each is shown instead of ± their mean."""
 

@@ -38,7 +38,7 @@ class Scan:
 
 
 def appearances(every: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
-    """Return what appeared, or was in one joint from the first and not in the fleet.
+    """Return causes and faults that appeared, or that one joint but not the fleet has from the first day.
 
     joints: how many the fleet has. p values are bounded by the number of days times exp(-ratio).
     """
@@ -79,7 +79,7 @@ def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
 
 
 def _always(named: FloatArray, usual: float) -> float:
-    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 if not clear."""
+    """Return the log likelihood ratio of a joint with a cause that its fleet lacks, 0 if not clear."""
     share = float(np.mean(named))
     if share < _MOSTLY or usual > _RARELY:
         return 0.0

@@ -56,7 +56,7 @@ def test_a_dead_sensor_is_named(name):
 @pytest.mark.parametrize(
     ("channel", "noise"), [("position", 1e-5), ("velocity", 2e-4), ("motor_torque", 0.05)]
 )
-def test_so_is_every_other_dead_channel(channel, noise):
+def test_every_other_dead_channel_is_named_too(channel, noise):
     assert ("dead_channel", channel) in kinds(having(channel, noise * RNG.normal(size=N)))
 
 

@@ -30,7 +30,7 @@ def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def verb(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
-    """Return a function that runs `rsea fake …`, where the verb does what it is given."""
+    """Return a function that runs `rsea fake …`, a verb that calls the given function."""
 
     def run(action: Callable[[argparse.Namespace], int], *arguments: str) -> int:
         module = types.ModuleType("rsea_ros.cli.fake")
@@ -165,7 +165,7 @@ def test_a_full_disk_under_stdout_is_one_line():
     assert (done.returncode, done.stderr) == (2, "rsea: No space left on device\n")
 
 
-def test_code_from_outside_is_announced(verb, capsys, monkeypatch):
+def test_code_from_outside_the_package_is_announced(verb, capsys, monkeypatch):
     monkeypatch.setenv("RSEA_EFFECTS", "/mine")
     assert verb(lambda args: 0) == 0
     line = "rsea fake: RSEA_EFFECTS=/mine: code from there runs as part of this program\n"
@@ -184,7 +184,7 @@ def test_wrong_arguments_exit_with_2(verb, capsys, arguments):
     assert arguments[-1] in capsys.readouterr().err
 
 
-def test_an_unknown_verb_is_named_beside_the_known(capsys):
+def test_an_unknown_verb_is_named_with_the_known_ones(capsys):
     assert cli.main(["dance"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("rsea: no verb 'dance', expected one of: ")

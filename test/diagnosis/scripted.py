@@ -1,6 +1,6 @@
-"""Fits by a script: what each set of causes leaves of the F/T torque, in place of a simulation.
+"""Scripted fits: the residual of the F/T torque that each set of causes leaves, in place of a simulation.
 
-The search and the elimination see candidates, problems and scores as of real fits; a table says their sizes.
+Search and elimination see candidates, problems and scores as from real fits; a table gives their sizes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def problem(*causes, stated=()):
 
 @dataclass
 class Script:
-    """What fits come to. ratio: by causes, in any order, of the residual over the noise; prior: its cost.
+    """Results of fits. ratio: residual over noise by causes, in any order; prior: its cost.
 
     log: each fit, as causes, and whether it was quick. cases: of every candidate.
     """

@@ -68,7 +68,7 @@ def test_the_seeds_hide_different_effects():
     assert len({conceal(seed).effect for seed in range(34, 40)}) == 6
 
 
-def test_what_the_catalogue_lacks_gets_no_name():
+def test_an_effect_outside_the_catalogue_gets_no_name():
     """The hidden effect and all that look like it are not tried: then nothing is named."""
     concealed = conceal(36)
     claims = effect_named(concealed.effect).claims

@@ -1,4 +1,4 @@
-"""Two effects at once: the second shows only beside the first, or changes what the first is called."""
+"""Two effects at once: the second shows only beside the first, or changes the name of the first."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ FINE = {"_lasting": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis"
 
 @pytest.fixture
 def measured(monkeypatch):
-    """Have every measure of a residual give a number."""
+    """Make every measure of a residual return a given number."""
 
     def set_to(**values):
         numbers = {**FINE, **values}
@@ -81,7 +81,7 @@ def test_a_residual_that_fails_in_one_point_is_a_misfit(measured, values, noise)
 
 
 @pytest.mark.parametrize(("size", "noise"), [(1499, False), (1500, True)])
-def test_short_records_do_not_say(measured, size, noise):
+def test_short_records_decide_nothing(measured, size, noise):
     measured()
     assert passes(white(size)) is noise
 
@@ -99,7 +99,7 @@ def test_measures_are_given_the_rate_of_the_channel_and_the_ratio_of_the_gear(
     assert seen == pytest.approx([100.0, ratio])
 
 
-def test_no_residual_is_no_noise(measured):
+def test_an_empty_residual_is_not_noise(measured):
     measured()
     assert passes(np.zeros(2000)) is False
     assert passes(np.where(np.arange(2000) % 2, 0.0, white(2000))) is True, "some zeros are"
@@ -151,7 +151,7 @@ ALTERNATING = np.resize([1.0, -1.0], 10_000)
         (np.linspace(-1.0, 1.0, 10_000) ** 2 - 1.0 / 3.0, 0.0),  # a curve is neither
     ],
 )
-def test_the_share_of_a_constant_and_a_trend(values, share):
+def test_the_share_of_a_constant_and_a_trend_is_measured(values, share):
     assert coloured._lasting(values) == pytest.approx(share, abs=2e-3)
 
 
@@ -197,7 +197,7 @@ def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
         (16, 1.0),  # 1 Hz
     ],
 )
-def test_which_lines_are_slow_and_which_they_are_compared_with(monkeypatch, line, ratio):
+def test_slow_lines_are_compared_with_those_up_to_a_hertz(monkeypatch, line, ratio):
     """Lines of a sixteenth of a hertz, one of which has a power of 100."""
     spectra = np.ones((2, 129), complex)
     spectra[:, line] = 10.0
@@ -206,7 +206,7 @@ def test_which_lines_are_slow_and_which_they_are_compared_with(monkeypatch, line
 
 
 @pytest.mark.parametrize(("lines", "ratio"), [(101, 1.0), (81, 0.0)])
-def test_two_slow_lines_are_the_fewest(monkeypatch, lines, ratio):
+def test_at_least_two_slow_lines_are_needed(monkeypatch, lines, ratio):
     """At 20 Hz: lines of 0.1 Hz, and of 0.125."""
     monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: np.ones((2, lines), complex))
     assert coloured._slow(np.zeros(9), 20.0) == ratio
@@ -218,7 +218,7 @@ def test_a_mean_is_not_slow():
 
 
 @pytest.mark.parametrize(("seconds", "known"), [(14, False), (33, True)])
-def test_a_record_without_two_slow_lines_does_not_say_whether_it_is_slow(seconds, known):
+def test_a_record_without_two_slow_lines_leaves_slowness_open(seconds, known):
     """Segments of half its length: of 8 s one line lies below 0.25 Hz, of 16 s three."""
     y = white(int(seconds * RATE)) + toned(int(seconds * RATE), (0.12, 9.0))
     assert (coloured._slow(y, RATE) > 0.0) is known
@@ -237,7 +237,7 @@ def test_values_too_rare_for_a_hertz_are_not_slow():
         (lambda rng: 5.0 + 2.0 * rng.uniform(-1.0, 1.0, 50_000), -1.2),  # whatever mean and size
     ],
 )
-def test_excess_kurtosis_of_known_distributions(values, excess):
+def test_the_excess_kurtosis_of_known_distributions_is_right(values, excess):
     flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.15)
 
@@ -273,7 +273,7 @@ def test_noise_that_comes_late_in_one_band_is_unsteady(band, least):
     assert value == pytest.approx(lines / 1.5, rel=0.35) and value > least
 
 
-def test_the_worst_band_says_whether_noise_is_steady():
+def test_the_worst_band_decides_whether_noise_is_steady():
     calm = np.ones((10, 513), complex)
     flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._unsteady(calm, flat, RATE) == 0.0
@@ -291,19 +291,19 @@ def share(a, b):
     ("gain", "expected"),
     [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (2.0, 0.8), (-1.0, 0.5), (1e6, 1.0)],
 )
-def test_the_share_of_the_power_that_is_coherent(gain, expected):
+def test_the_coherent_share_of_the_power_is_measured(gain, expected):
     witness = white(2**15, seed=1)
     assert share(white(2**15) + gain * witness, witness) == pytest.approx(expected, abs=0.04)
     assert share(white(2**15) + gain * witness, 1e3 * witness) == pytest.approx(expected, abs=0.04)
 
 
-def test_chance_is_taken_away_from_coherence():
+def test_coherence_is_corrected_for_chance():
     """Of 16 segments, 31 half overlapping, one in 29 of the power agrees by chance, in no band more."""
     one_band = [share(white(8192, seed=k), white(8192, seed=1000 + k)) for k in range(40)]
     assert -0.01 < np.mean(one_band) < 0.05  # the worst of four bands
 
 
-def test_the_worst_band_says_what_is_shared():
+def test_the_worst_band_decides_what_is_shared():
     witness = white(2**16, seed=1)
     low = shaped(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
     assert share(white(2**16) + 3.0 * low, witness) == pytest.approx(0.9, abs=0.03)
@@ -344,7 +344,7 @@ def test_lines_that_are_unsteady_count_in_their_band(first, last, lines):
     assert coloured._unsteady(spectra, flat, RATE) == pytest.approx(0.25 * lines / 1.5)
 
 
-def test_no_power_is_not_shared():
+def test_without_power_nothing_is_shared():
     assert share(np.zeros(8192), white(8192)) == pytest.approx(-1.056 / 31 / (1.0 - 1.056 / 31))
 
 
@@ -362,6 +362,6 @@ def test_lines_lie_between_zero_and_half_the_rate():
         (200, (188.5, 195.0), [[189, 190, 191]]),
     ],
 )
-def test_bands_and_their_lines(top, lows, inside):
+def test_every_band_has_its_lines(top, lows, inside):
     bands = coloured._bands(np.arange(top + 1.0), lows)
     assert [np.flatnonzero(b).tolist() for b in bands] == inside

@@ -1,4 +1,4 @@
-"""Rig files: what is written is read back; nonsense is one line with file, field, value and expectation."""
+"""Rig files survive a round trip; nonsense is one line with file, field, value and expectation."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ NONSENSE = [
 @pytest.mark.parametrize(
     ("path", "value", "message"), NONSENSE, ids=lambda item: "deleted" if item is DELETE else str(item)[:40]
 )
-def test_nonsense_is_one_line_that_names_it(path, value, message, tmp_path):
+def test_nonsense_is_refused_in_one_line_that_names_it(path, value, message, tmp_path):
     file = tmp_path / "bad.yaml"
     file.write_text(yaml.safe_dump(changed(path, value)))
     with pytest.raises(RigError) as error:
@@ -206,7 +206,7 @@ def test_a_known_field_must_be_stated(tmp_path):
     ],
     ids=["empty", "list", "broken", "binary", "object"],
 )
-def test_files_that_are_no_rig(content, message, tmp_path):
+def test_a_file_that_is_not_a_rig_is_refused(content, message, tmp_path):
     file = tmp_path / "bad.yaml"
     file.write_bytes(content)
     with pytest.raises(RigError) as error:
@@ -214,7 +214,7 @@ def test_files_that_are_no_rig(content, message, tmp_path):
     assert str(error.value).startswith(f"{file}: {message}") and "\n" not in str(error.value)
 
 
-def test_files_that_are_not_there(tmp_path):
+def test_a_file_that_does_not_exist_is_refused(tmp_path):
     with pytest.raises(RigError, match=r"none\.yaml: no such file, expected a rig in YAML"):
         load_rig(tmp_path / "none.yaml")
     with pytest.raises(RigError, match=r"rig 'none' not found, expected a YAML file or one of .*bare_drive"):
@@ -261,7 +261,7 @@ def test_a_mistake_is_named_with_its_line(old, tmp_path):
     assert str(caught.value).startswith(f"{tmp_path}/rig.yaml: line {line}: {message}")
 
 
-def test_units_as_people_write_them(tmp_path):
+def test_units_are_read_as_people_write_them(tmp_path):
     text = TEXT.replace("kg m^2", "kg*m²").replace("N m s/rad", "Nms/rad").replace('"1"', "1")
     (tmp_path / "rig.yaml").write_text(text.replace("N m/rad", "Nm/rad").replace("N m", "Nm"))
     assert load_rig(tmp_path / "rig.yaml") == load_rig("paper_high_impedance")

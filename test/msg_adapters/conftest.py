@@ -1,4 +1,4 @@
-"""What the tests of bags share."""
+"""Shared by the tests of bags."""
 
 from __future__ import annotations
 

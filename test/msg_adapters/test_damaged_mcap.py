@@ -1,4 +1,4 @@
-"""Damage of MCAP files: what is sound is used, what is not is left out, and both are told with counts."""
+"""Damaged MCAP files: sound parts are used, the others left out and reported with counts."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ CASES = {
 
 @pytest.mark.parametrize("strict", [True, False])
 @pytest.mark.parametrize("case", CASES)
-def test_damage_is_told_and_the_rest_is_used(tmp_path, case, strict):
+def test_damage_is_reported_and_the_rest_is_used(tmp_path, case, strict):
     make, expected, lost = CASES[case]
     got = read_record(write(tmp_path / "a.mcap", make()), strict=strict)
     told = {fault.kind: fault for fault in got.faults}
@@ -146,7 +146,7 @@ def test_a_sound_file_has_no_fault(tmp_path, file):
     assert np.array_equal(got["ft"].y, np.arange(60) * 0.7)
 
 
-def test_a_file_behind_the_end_of_another_is_read_and_told(tmp_path):
+def test_a_file_appended_to_another_is_read_and_reported(tmp_path):
     rows = run_rows(60)
     first, second = McapFile(rows[:90]), McapFile(rows[90:])
     got = read_record(write(tmp_path / "a.mcap", first.file() + second.file()))

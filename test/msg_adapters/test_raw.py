@@ -27,7 +27,7 @@ def test_a_state_is_read_whatever_its_joint_is_called(joint):
     assert STATE.read(raw) == (STAMP, [0.25, -7.5])
 
 
-def test_what_a_message_does_not_have_is_nan():
+def test_a_field_that_a_message_lacks_is_nan():
     stamp, (position, effort) = STATE.read(serialize_message(torque_command_message(STAMP, 4.0)))
     assert stamp == STAMP and math.isnan(position) and effort == 4.0
 
@@ -104,7 +104,7 @@ def test_a_frame_is_neither_read_nor_compared():
     assert Counted.cut < 9 * 20
 
 
-def test_what_is_written_is_read_by_rclpy():
+def test_messages_that_are_written_are_read_by_rclpy():
     template = efforts_message(0, {"distal": 0.0, "proximal": 0.0})
     writer = RawWriter(serialize_message(template), JOINT_STATE, "effort")
     written = deserialize_message(writer.write(STAMP, (1.5, -2.5, 9.0)), JointState)

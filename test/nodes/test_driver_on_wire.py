@@ -109,7 +109,7 @@ def wire(bench, start, listener):
     return Driven(bench(54024), listener, "main", start)
 
 
-def test_it_publishes_what_the_bench_has_sent_and_follows_commands(wire, listener):
+def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, listener):
     states = listener.hear(JointState, "/main/joint_states", MEASUREMENT)
     wrenches = listener.hear(WrenchStamped, "/main/ft", MEASUREMENT)
     wire.push(lambda: len(states) > 50 and len(wrenches) > 50 and states[-1].effort[0] > 9.0)
@@ -149,7 +149,7 @@ def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire,
     wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
 
 
-def test_a_fault_is_told_on_diagnostics_and_ends_by_service(wire, listener):
+def test_a_fault_is_published_on_diagnostics_and_ends_by_service(wire, listener):
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     wire.drive()
     wire.bench.ask("set", temperature=90)
@@ -202,8 +202,8 @@ def _undisturbed(wire):
     return len(wire.cleared) == cleared and answer == "clear_fault: there is no fault; nothing was done"
 
 
-def test_a_listener_that_is_stopped_holds_up_nobody(wire, listener):
-    """Fast DDS waited a second for one that was stopped while it took a message out of shared memory."""
+def test_a_stopped_listener_holds_up_nobody(wire, listener):
+    """Fast DDS waited a second for a listener that was stopped while it read shared memory."""
     program = Path(f"/proc/{wire.process.pid}/maps").read_text()
     assert "/dev/shm/fast" not in program, "a publisher waits for who has locked the shared memory"
     count = listener.node.count_subscribers("/main/joint_states")
@@ -212,21 +212,21 @@ def test_a_listener_that_is_stopped_holds_up_nobody(wire, listener):
         listener.until(lambda: listener.node.count_subscribers("/main/joint_states") > count)
         wire.drive()
         held.send_signal(signal.SIGSTOP)
-        # A busy machine latches a fault now and then; who waits for a stopped listener, each time.
+        # A busy machine latches a fault now and then; a driver that waits for its listener does each time.
         assert any(_undisturbed(wire) for _ in range(3)), wire.cleared
     finally:
         held.kill()
         held.wait()
 
 
-def test_deactivated_the_torque_is_zero_and_off(wire):
+def test_after_deactivation_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.change(Transition.TRANSITION_DEACTIVATE).success
     assert wire.goal() == (0, False)
     assert wire.change(Transition.TRANSITION_ACTIVATE).success
 
 
-def test_sigint_leaves_torque_zero_and_off(wire):
+def test_after_sigint_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.process.stop(signal.SIGINT) == 0
     assert wire.goal() == (0, False)
@@ -246,7 +246,7 @@ def script():
         process.kill()
 
 
-def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener, tmp_path, script):
+def test_after_an_exception_in_the_program_the_torque_is_zero_and_off(bench, listener, tmp_path, script):
     """The real driver, whose code for limits breaks after a while."""
     code = (
         "import sys\nfrom rsea_ros.hardware import limits\nfrom rsea_ros.nodes import driver\n"
@@ -262,7 +262,7 @@ def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener,
     wire.push(lambda: wire.goal() == (0, False))
 
 
-def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, listener):
+def test_after_a_lifecycle_shutdown_the_torque_is_zero_and_off(bench, start, listener):
     wire = Driven(bench(54025), listener, "shutdown", start)
     wire.drive()
     assert wire.change(Transition.TRANSITION_ACTIVE_SHUTDOWN).success
@@ -278,7 +278,7 @@ def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, lis
         (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
     ],
 )
-def test_killed_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
+def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
     """By the driver itself; by the supervisor; by the motor's own watchdog, which leaves it on at zero."""
     victim = Driven(bench(model), listener, f"{number.name}_{model}".lower(), start)
     victim.drive()

@@ -1,4 +1,4 @@
-"""Parameters: what does not fit is refused in one line with status 2."""
+"""Parameters: a wrong value is refused in one line with status 2."""
 
 import importlib
 import math

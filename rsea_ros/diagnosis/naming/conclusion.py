@@ -21,6 +21,7 @@ from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.confidence import undetermined
 from rsea_ros.identification.estimates import identified_rig, overlays_of, parameters_of
+from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.workers import Pools
@@ -48,7 +49,7 @@ def _diagnosis(
     first, last, main = outcome.stages[0], outcome.stages[-1], outcome.channel
     case, records, rig = selection.cases[0], examined.records, examined.rig
     rejected = _rejected(selection, outcome, pools)
-    baseline = parameters_of(first.solution, first.confidence)
+    baseline, final = (parameters_of(s.solution, s.confidence) for s in (first, last))
     return Diagnosis(
         verdict=outcome.verdict,
         channel=main,
@@ -59,7 +60,7 @@ def _diagnosis(
         faults=examined.faults,
         baseline_rig=identified_rig(first.solution, baseline),
         baseline=baseline,
-        extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
+        extended_rig=identified_rig(last.solution, final),
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.test, case),
         fit_percent=_fit(first, selection.cases),
@@ -72,12 +73,16 @@ def _diagnosis(
         rejected=rejected,
         next_experiment=_next_experiment(selection, outcome, records[0], settings),
         remaining=misfits(case, last.outputs[0], main, rig),
-        masked=examined.checked[0].masked,
+        masked={n: ~counted for n, counted in case.mask.items()},
         settings=settings,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),
-        remarks=(*undetermined_play(selection, outcome.causes, rejected), *_remarks(outcome, case)),
+        remarks=(
+            *off_rig(final),
+            *undetermined_play(selection, outcome.causes, rejected),
+            *_remarks(outcome, case),
+        ),
     )
 
 

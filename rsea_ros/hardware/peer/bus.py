@@ -27,7 +27,7 @@ BOOT_TIME = 300_000_000
 class Bus:
     """A line with motors on it, at `path` (a link to the terminal).
 
-    sent: data of every reply with measurements that went out whole, as (clock in ns, address, bytes), the
+    sent: data of every reply with measurements that was sent whole, as (clock in ns, address, bytes), the
     newest `kept`.
     """
 
@@ -64,7 +64,7 @@ class Bus:
             self._waiting.clear()
 
     def serve(self, now: int) -> None:
-        """Take what the host has sent and answer it."""
+        """Read the host's packets and answer them."""
         try:
             data = os.read(self.descriptor, 4096)
         except OSError:

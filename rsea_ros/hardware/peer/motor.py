@@ -55,7 +55,7 @@ class Motor:
         return int.from_bytes(raw, "little", signed=register.signed)
 
     def put(self, name: str, value: int) -> None:
-        """Set an item, whatever the rules for hosts say."""
+        """Set an item without the rules for hosts."""
         register = self.model.registers[name]
         modulus = 1 << 8 * register.size
         data = (int(value) % modulus).to_bytes(register.size, "little")
@@ -75,7 +75,7 @@ class Motor:
             self._act(now)
 
     def read(self, now: int, address: int, length: int) -> tuple[int, bytes]:
-        """Return error code and bytes, with what is measured brought up to date."""
+        """Return error code and bytes, with measurements updated."""
         self._touched = now
         if not 0 < length <= TABLE_SIZE - address:
             return LENGTH, b""
@@ -124,7 +124,7 @@ class Motor:
         self._act(now)
 
     def reboot(self, now: int) -> None:
-        """Begin anew: RAM as after power-on, EEPROM kept, torque off."""
+        """Restart: RAM as after power-on, EEPROM kept, torque off."""
         for name, register in self.model.registers.items():
             if register.access is not EEPROM:
                 self.put(name, register.start)

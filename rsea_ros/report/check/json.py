@@ -16,6 +16,8 @@ def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": checks[0].rig_name,
+        "rig_option": checks[0].rig_choice.option or None,
+        "rig_is_default": checks[0].rig_choice.is_default,
         "light": worst([c.light for c in checks]),
         "records": [_record(c) for c in checks],
     }

@@ -66,7 +66,7 @@ def _following(study: Study) -> Figure:
         for name, seen, width, dash in (
             ("locked", at.locked, 2.4, "solid"),
             ("free", at.free, 1.6, "dot"),
-            ("worst case of the set", at.hard, 1.0, "dash"),
+            ("worst case", at.hard, 1.0, "dash"),
         ):
             curves.append(Response(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
     hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)

@@ -13,6 +13,7 @@ from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, ne
 from rsea_ros.report.identification.json import parameter
 from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.json import rig_json
 
 SCHEMA = 1
 
@@ -23,6 +24,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": d.rig_name,
+        **rig_json(d.rig_choice, d.remarks),
         "verdict": d.verdict,
         "channel": d.channel,
         "sentence": diagnosis_sentence(d),

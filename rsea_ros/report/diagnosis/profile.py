@@ -55,8 +55,8 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
 
 def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
     """Return which samples count: neither those before the bench has settled nor faulty ones."""
-    faulty = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
-    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~faulty
+    out = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
+    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~out
     return good
 
 

@@ -57,11 +57,9 @@ def finding(profiles: Sequence[Profile]) -> str:
 
 def _extremes(profile: Profile) -> str:
     k = int(np.nanargmax(profile.before))
-    low, high = (words.number(side, 2) for side in profile.edges[k : k + 2])
+    low, high = profile.edges[k : k + 2]
     most, least = (words.number(v(profile.before), 2) for v in (np.nanmax, np.nanmin))
-    return (
-        f"{most} times the noise from {low} to {high} {words.unit(profile.unit)}, {least} where it is least"
-    )
+    return f"{most} times the noise from {words.span(low, high, profile.unit)}, {least} where it is least"
 
 
 def _traces(profile: Profile, x: str, changed: bool, colour: str) -> list[Json]:

@@ -9,6 +9,7 @@ from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.json import rig_json
 
 SCHEMA = 1
 
@@ -19,6 +20,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
+        **rig_json(i.rig_choice, i.remarks),
         "verdict": i.verdict,
         "sentence": verdict_sentence(i),
         "next": next_command(i) or None,

@@ -34,7 +34,7 @@ def files(tmp_path):
     return run
 
 
-def test_units_signs_scales_and_sums(files):
+def test_units_signs_scales_and_sums_are_applied(files):
     record = files()
     assert np.allclose(record["position"].y, [-math.pi / 2, math.pi / 4, 0.0])
     assert np.allclose(record["command"].y, [1.5 * 6.8 + 2.5, -0.5 * 6.8 + 4.5, 6.5])
@@ -52,7 +52,7 @@ def test_units_signs_scales_and_sums(files):
         ("mm", 1e-3),
     ],
 )
-def test_units_of_a_position(files, unit, value):
+def test_positions_are_converted_from_their_unit(files, unit, value):
     text = f"time: {{rate: 100}}\nchannels: {{position: {{column: phi, unit: {unit}}}}}"
     record = files(text)
     assert np.allclose(record["position"].y, np.array([90, -45, 0]) * value)
@@ -60,7 +60,7 @@ def test_units_of_a_position(files, unit, value):
 
 
 @pytest.mark.parametrize(("unit", "value"), [("rpm", math.pi / 30), ("deg/s", math.pi / 180), ("m/s", 1.0)])
-def test_units_of_a_velocity(files, unit, value):
+def test_velocities_are_converted_from_their_unit(files, unit, value):
     record = files(f"time: {{column: t, unit: min}}\nchannels: {{velocity: {{column: phi, unit: {unit}}}}}")
     assert np.allclose(record["velocity"].y, np.array([90, -45, 0]) * value)
     assert record["velocity"].t.tolist() == [0.0, 30.0, 60.0]
@@ -75,7 +75,7 @@ def test_units_of_a_velocity(files, unit, value):
         ("equals: 0", [4.0, 6.0]),
     ],
 )
-def test_rows_that_count(files, where, kept):
+def test_only_rows_that_match_are_read(files, where, kept):
     column = "load" if "equals" not in where else "flag"
     csv = (
         CSV.replace("load\n", "load,flag\n")
@@ -88,7 +88,7 @@ def test_rows_that_count(files, where, kept):
     assert record["command"].y.tolist() == kept
 
 
-def test_separators_comments_and_missing_names(files):
+def test_separators_comments_and_missing_names_are_read(files):
     assert np.allclose(files(MAP, CSV.replace(",", "\t"), "run.tsv")["position"].y[0], -math.pi / 2)
     assert np.allclose(files(f'delimiter: ";"\n{MAP}', CSV.replace(",", ";"))["position"].y[0], -math.pi / 2)
     assert np.allclose(files(MAP, f"# a comment\n{CSV}\n")["position"].y[0], -math.pi / 2)
@@ -132,7 +132,7 @@ BAD_MAPS = {
 
 
 @pytest.mark.parametrize("text", BAD_MAPS)
-def test_maps_that_make_no_sense(files, tmp_path, text):
+def test_senseless_maps_are_refused(files, tmp_path, text):
     with pytest.raises(ImportMapError, match=BAD_MAPS[text]) as caught:
         files(text)
     assert str(caught.value).startswith(str(tmp_path / "map.yaml"))
@@ -163,18 +163,18 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("text", BAD_FILES)
-def test_files_that_do_not_fit(files, tmp_path, text):
+def test_files_that_do_not_fit_the_map_are_refused(files, tmp_path, text):
     with pytest.raises(ImportMapError, match=BAD_FILES[text]) as caught:
         files(MAP, text)
     assert str(caught.value).startswith(str(tmp_path / "run.csv"))
 
 
-def test_no_row_left(files):
+def test_a_map_that_leaves_no_row_is_refused(files):
     with pytest.raises(ImportMapError, match=r"fewer than two rows left by where \(load goes from 2 to 6\)"):
         files(f"where: {{column: load, below: 1}}\n{MAP}")
 
 
-def test_a_value_that_no_unit_can_hold(files):
+def test_a_value_too_large_for_its_unit_is_refused(files):
     with pytest.raises(ImportMapError, match=r"command: i [+] load is too large for its unit"):
         files(MAP.replace("6.8", "1e250"), CSV.replace("1500", "1e200"))
 
@@ -200,7 +200,7 @@ def test_a_value_missing_in_a_sum_is_missing(files):
     assert [fault.channel for fault in record.faults] == ["command"]
 
 
-def test_a_channel_that_is_empty(files):
+def test_an_empty_channel_is_refused(files):
     with pytest.raises(ImportMapError, match="position: phi has 0 values"):
         files(MAP, CSV.replace("90", "").replace("-45", "").replace("0,0,6", ",0,6"))
 
@@ -245,20 +245,20 @@ SPACED = "".join(f"  {k * 0.01:10.4f}   {k:8.3f} {k:e}\t{k}  \n" for k in range(
         ("load,i,junk,phi,t\n" + "".join(f"{k},{k},text,{k},{k}\n" for k in range(5)), "run.csv"),
     ],
 )
-def test_what_parts_the_cells_is_seen(files, text, name):
+def test_the_separator_of_cells_is_recognised(files, text, name):
     record = files(MAP, text, name)
     assert np.allclose(record["position"].y, -np.arange(5) * DEGREE)
     assert not record.faults
 
 
-def test_what_fprintf_writes_without_names(files):
+def test_columns_without_names_are_read_by_number(files):
     text = MAP.replace("column: t", "column: 1").replace("phi", "2").replace("i,", "3,").replace("load", "4")
     for name in ("run.csv", "run.tsv", "run.txt"):
         assert np.allclose(files(text, SPACED, name)["position"].y, -np.arange(5) * DEGREE)
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "latin-1"])
-def test_encodings(files, tmp_path, encoding):
+def test_common_encodings_are_read(files, tmp_path, encoding):
     (tmp_path / "run.csv").write_bytes(CSV.replace("phi", "phi [°]").encode(encoding))
     (tmp_path / "map.yaml").write_text(MAP.replace("column: phi", 'column: "phi [°]"'))
     if encoding == "utf-16-le":  # without its mark
@@ -321,11 +321,11 @@ def test_terms_of_a_map_are_refused_with_their_line(files, old, new, message):
         files(MAP.replace(old, new))
 
 
-def test_no_delimiter_is_as_if_it_were_not_stated(files):
+def test_an_empty_delimiter_counts_as_not_stated(files):
     assert len(files(f"delimiter: null\n{MAP}")["position"]) == 3
 
 
-def test_units_as_people_write_them(files):
+def test_units_are_read_as_people_write_them(files):
     for text in ("Nm", "N*m", "N·m", "N.m"):
         assert files(MAP.replace("N m", text))["command"].y[0] == pytest.approx(1.5 * 6.8 + 2.5)
 
@@ -339,7 +339,7 @@ def test_blocks_make_no_difference(files, monkeypatch):
     assert all(np.array_equal(parts[name].y, whole[name].y) for name in whole.channels)
 
 
-def test_a_folder_or_a_pipe_for_a_file(files, tmp_path):
+def test_a_folder_and_a_pipe_are_refused(files, tmp_path):
     files()
     mapping = load_map(tmp_path / "map.yaml")
     (tmp_path / "folder.csv").mkdir()
@@ -349,7 +349,7 @@ def test_a_folder_or_a_pipe_for_a_file(files, tmp_path):
             import_record(tmp_path / name, mapping)
 
 
-def test_no_more_numbers_than_are_read(files, monkeypatch):
+def test_a_table_with_too_many_numbers_is_refused(files, monkeypatch):
     monkeypatch.setattr("msg_adapters.tables.table.LARGEST", 300)
     with pytest.raises(ImportMapError, match=r"more than 75 rows of 4 columns, expected a shorter record"):
         files(MAP, LONG)

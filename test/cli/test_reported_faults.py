@@ -1,4 +1,4 @@
-"""What was damaged in a bag is told by every verb, and the result still comes."""
+"""Every verb reports the damage in a bag and still returns its result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rsea_ros.cli.main import main
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
-    """Return a clean bag with a gap of 40 wrenches, and messages that its metadata count and it lacks."""
+    """Return a bag with a gap of 40 wrenches and with fewer messages than its metadata count."""
     folder = tmp_path_factory.mktemp("told")
     assert main(["simulate", "paper_high_impedance", "--out", str(folder / "clean"), "--duration", "8"]) == 0
     wrenches = 0
@@ -32,17 +32,17 @@ def _assert_told(faults):
     assert told["dropped_samples", "ft"]["size"] == 40
 
 
-def test_identify_tells(bag, tmp_path, capsys):
+def test_identify_reports_the_faults_of_a_bag(bag, tmp_path, capsys):
     assert main(["identify", str(bag), "--out", str(tmp_path / "out"), "--json"]) == 0
     _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
 
 
-def test_predict_tells(bag, capsys):
+def test_predict_reports_the_faults_of_a_bag(bag, capsys):
     assert main(["predict", "paper_high_impedance", str(bag)]) == 0
     _assert_told(json.loads(capsys.readouterr().out)["data"]["faults"])
 
 
-def test_the_check_before_a_diagnosis_tells(bag):
+def test_the_check_before_a_diagnosis_reports_the_faults_of_a_bag(bag):
     from msg_adapters import TopicMap
     from rsea_ros.checks.faults import check
     from rsea_ros.cli.diagnose import readable
