@@ -30,6 +30,7 @@ from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.stamps import repair_stamps
 
 Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
@@ -203,7 +204,7 @@ def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) ->
 
 def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
     """Return the quotient of another channel taken for the F/T torque."""
-    record = checked.record.with_channels(ft=channel)
+    record, _ = repair_stamps(checked.record.with_channels(ft=channel))
     side: Side | None = sides(replace(record, faults=()), rig).get("ft")
     return None if side is None else quotient("ft", side.t, side.y, side.p)
 

@@ -68,7 +68,7 @@ class ReducedModels:
         ]
 
     def is_needed(self, model: Candidate, without: Candidate) -> bool:
-        """Return whether a model is better than one without a cause of it, or with another in its place."""
+        """Return whether a model is better than without one of its causes, or with another in its place."""
         extra, rule = model.parameters - without.parameters, self.settings.acceptance
         return preference(model.validation, without.validation, extra, rule).better
 
@@ -96,7 +96,7 @@ class ReducedModels:
 
 
 def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
-    """Take out every accepted cause without which the others do as well."""
+    """Remove every accepted cause without which the others do as well."""
     last = selection.last
     for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
         if not models.is_needed(last, rest):

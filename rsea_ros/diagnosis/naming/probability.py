@@ -1,9 +1,9 @@
-"""The probability that a cause is what it is called: a logistic model of the evidence for it.
+"""The probability that the name of a cause is right: a logistic model of its evidence.
 
     p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
 
-The features f say how far the law's shape fits (signature.py), what a flexible law still gains (flexible.py),
-how it stands among its rivals (rivals.py), and how much it helps. The coefficients are those of
+The features f are the fit of the law's shape (signature.py), the further gain of a flexible law
+(flexible.py), its odds among its rivals (rivals.py), and its gain. The coefficients are those of
 `bench/calibration.py fit`; "none of these" is the mass that a cause and its rivals leave.
 """
 
@@ -24,9 +24,9 @@ _CERTAIN = 30.0
 def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT) -> dict[str, float]:
     """Return the numbers that the logistic model weighs, by name. preferred: the search chose it.
 
-    shape: how far lambda spreads. rivals: log odds among them, less the farther the noise is, for what is
-    left there is no noise, and more parameters always bend a law a little nearer to it. noise: its model
-    leaves only that. flexible: what a spline surely gains beside it. edge: a parameter ran to a bound.
+    shape: spread of lambda. rivals: log odds among them, reduced with the distance from the noise floor,
+    because the residual there is not noise, and more parameters always fit a little of it. noise: its model
+    leaves only noise. flexible: sure gain of a spline beside it. edge: a parameter is at a bound.
     """
     s, flexible, rule = e.signature, e.flexible, settings.evidence
     bent = max(s.amplitude, s.time, s.frequency)

@@ -1,4 +1,4 @@
-"""What a diagnosis says, in words and numbers for people; page and terminal say the same."""
+"""Words and numbers of a diagnosis, the same for page and terminal."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def _ratio(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
 
 
 def _ratio_range(shown: FrequencyResponse, model: ComplexArray | None) -> list[float]:
-    """Return a range in dB that shows the departures of trusted lines and what the band allows."""
+    """Return a range in dB that shows the deviations of trusted lines and the tolerance."""
     if model is None:
         return [-1.0, 1.0]
     trusted = shown.coherence > 0.5
@@ -126,7 +126,7 @@ def _layout(shown: FrequencyResponse, model: ComplexArray | None) -> Json:
 
 
 def _reference(response: FrequencyResponse) -> str:
-    """Return what 0 dB is, where the response has a unit."""
+    """Return the value of 0 dB, for a response with a unit."""
     over = _unit(response)
     return f" re 1 {over}" if over else ""
 

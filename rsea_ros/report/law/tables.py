@@ -1,4 +1,4 @@
-"""Tables of a law: on what the missing torque depends, what is gained, what else was tried."""
+"""Tables of a law: dependences of the missing torque, gains, other models."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of the rest"
 
 
 def dependence_section(result: LawResult) -> str:
-    """Return on what the missing torque depends, with the share that each explains."""
+    """Return the dependences of the missing torque, with their explained shares."""
     if not result.dependences:
         return ""
     top = [d for d in result.dependences if d.share > 0.005][:10]
