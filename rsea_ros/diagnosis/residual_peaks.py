@@ -87,15 +87,30 @@ def missing_torque(
     ):
         return None
     t, q = case.t["position"], residual_of(case, outputs, "position")
-    v, load = (
-        np.interp(t, case.t[n], residual_of(case, outputs, n)) if n in case.measured else otherwise
-        for n, otherwise in (("velocity", np.gradient(q, t)), ("ft", rig["spring.stiffness"] * q))
-    )
-    acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
+    v = _residual_at(t, case, outputs, "velocity", np.gradient(q, t))
+    a = np.pad((v[2:] - v[:-2]) / (t[2:] - t[:-2]), 1)
+    load = _residual_at(t, case, outputs, "ft", _load(rig, q, v, a))
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
-    torque = inertia * acceleration + rig["rotor.reflected_damping"] * v[1:-1] + load[1:-1]
+    torque = (inertia * a + rig["rotor.reflected_damping"] * v + load)[1:-1]
     keep = case.mask["position"][1:-1]
     return case.measured["position"][1:-1][keep], torque[keep]
+
+
+def _residual_at(
+    t: FloatArray, case: Case, outputs: Mapping[str, FloatArray], channel: str, otherwise: FloatArray
+) -> FloatArray:
+    """Return the residual of a channel at stamps t, s; otherwise, shape of t, where it was not measured."""
+    if channel not in case.measured:
+        return otherwise
+    return np.interp(t, case.t[channel], residual_of(case, outputs, channel))
+
+
+def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+    """Return the torque, N m, that carries a motion beyond the gear: of the spring, or of the load itself."""
+    if not rig.rigid_spring:
+        return rig["spring.stiffness"] * q
+    inertia, damping, stiffness = (rig[f"spring_end.{n}"] for n in ("inertia", "damping", "stiffness"))
+    return inertia * a + damping * v + stiffness * q
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
