@@ -106,7 +106,7 @@ def _along(
 def _residual_at(
     t: FloatArray, case: Case, outputs: Mapping[str, FloatArray], channel: str, otherwise: FloatArray
 ) -> FloatArray:
-    """Return the residual of a channel at the stamps t, s; otherwise, shape of t, where it was not measured."""
+    """Return the residual of a channel at the stamps t, s; `otherwise`, shape of t, without that channel."""
     if channel not in case.measured:
         return otherwise
     return np.interp(t, case.t[channel], residual_of(case, outputs, channel))

@@ -10,6 +10,8 @@ import pytest
 from rsea_ros import simulate
 from rsea_ros.diagnosis.diagnose import diagnose
 from rsea_ros.diagnosis.residual_peaks import missing_torque
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.signal_table import Port
 from rsea_ros.identification.problem import case_from
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -37,7 +39,10 @@ def test_cogging_of_a_bare_drive_is_named():
     ripple = {"amplitude": 3.0, "cycles_per_revolution": 7.0, "phase": 0.4}
     command = np.convolve(60.0 * np.random.default_rng(3).standard_normal(3000), np.ones(40) / 40.0, "same")
     record = simulate(rig.with_effect("torque_ripple", **ripple), command, rate=200.0)
-    (cause,) = diagnose([record], rig).causes
+    diagnosis = diagnose([record], rig)
+    (cause,) = diagnosis.causes
     assert cause.name == "torque_ripple"
     assert cause.parameters["amplitude"].value == pytest.approx(3.0, abs=0.3)
     assert cause.parameters["cycles_per_revolution"].value == pytest.approx(7.0, rel=1e-3)
+    of_a_spring = {e.name for e in catalogue().values() if e.port is Port.SPRING}
+    assert not of_a_spring & {r.name for r in diagnosis.rejected}, "an effect without a place was tried"
