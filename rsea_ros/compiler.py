@@ -55,11 +55,14 @@ class _Kept(_caching.FunctionCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            code = super().load_overload(sig, target_context)
         except Exception:  # a file that broke off may raise anything
             with suppress(OSError):
                 self.flush()
-            return None
+            code = None
+        if code is None:
+            tell_once()
+        return code
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -82,6 +85,12 @@ def _cache_of(function: Callable[..., Any]) -> Any:
 def warn_once(reason: str) -> None:
     """Warn that compiled code is not stored, once for each reason."""
     _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
+
+
+@cache
+def tell_once() -> None:
+    """Log, once in a process, that code is compiled and stored, which takes time."""
+    _log.info("compiling the simulation for this machine: up to a minute, once")
 
 
 @contextmanager
