@@ -20,6 +20,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.normal import Z95
 
 
 def cause_of(
@@ -89,7 +90,7 @@ def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> E
     value, sd = estimate.value, rule.model_error * abs(estimate.value)
     if estimate.unit == "s":
         sd = float(np.hypot(sd, CLOCK_DOUBT))
-    low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
+    low, high = (float(np.hypot(end - value, Z95 * sd)) for end in estimate.ci95)
     return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
 
 

@@ -61,7 +61,7 @@ def probabilities_and_status(
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
     """
-    likely = [probability(e, k == 0, coefficients, settings.evidence) for k, e in enumerate(evidence)]
+    likely = [probability(e, k == 0, coefficients, settings) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
     is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode_words import caption, finding
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
@@ -12,7 +13,7 @@ from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 from rsea_ros.report.figures.thinned import thinned
 from rsea_ros.signals import UNITS, ComplexArray, FloatArray
 
-_SIDE = 1.96 / np.sqrt(2.0)
+_SIDE = Z95 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""
 _ROWS = {"gain": [0.64, 1.0], "phase": [0.39, 0.6], "ratio": [0.165, 0.35], "coherence": [0.0, 0.125]}
 _MOST_DECIBEL = 12.0

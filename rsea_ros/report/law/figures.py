@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.laws.result import WrittenLaw
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
@@ -112,7 +113,7 @@ def _binned(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArra
     count = np.bincount(which, minlength=len(centre))[: len(centre)]
     mean = np.bincount(which, y, len(centre))[: len(centre)] / np.maximum(count, 1)
     square = np.bincount(which, y * y, len(centre))[: len(centre)] / np.maximum(count, 1)
-    error = 1.96 * np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count, 1))
+    error = Z95 * np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count, 1))
     return np.where(count > 4, mean, np.nan), error
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from rsea_ros.laws.result import LawResult
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence
@@ -24,7 +25,7 @@ def dependence_section(result: LawResult) -> str:
     rows = [
         f"<tr><td>{escape(d.regressor)}<small>{escape(d.place)}</small></td>"
         f"<td data-label='alone'>{_share_bar(d.share)}</td>"
-        f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {196 * d.se:.0f} %</td>"
+        f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {100 * Z95 * d.se:.0f} %</td>"
         f"<td class='number' data-label='of what the law leaves'>{100 * max(d.beside, 0.0):.1f} %</td></tr>"
         for d in top
     ]
