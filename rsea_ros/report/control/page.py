@@ -12,7 +12,7 @@ from rsea_ros.model.response import frequency_response
 from rsea_ros.report.control.tables import control_tables, gains_words
 from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH
-from rsea_ros.report.figures.response import Mark, Response, response_figure
+from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 
@@ -68,12 +68,12 @@ def _following(study: Study) -> Figure:
             ("free", at.free, 1.6, "dot"),
             ("worst case", at.hard, 1.0, "dash"),
         ):
-            curves.append(Response(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
+            curves.append(ResponseCurve(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
     hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)
     for rig, dash in ((study.rig, "solid"), (study.free, "dot")):
         opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
         name = "open loop, locked" if rig is study.rig else "open loop, free"
-        curves.append(Response(name, MEASURED, hz, opened, 1.2, dash))
+        curves.append(ResponseCurve(name, MEASURED, hz, opened, 1.2, dash))
     caption = (
         "Distal over desired torque, sine by sine, in simulation; the controller does not know the load. "
         "Slow torques are predicted along a parabola; fast ones go through a low pass and come two "

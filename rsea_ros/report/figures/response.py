@@ -13,7 +13,7 @@ from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)
-class Response:
+class ResponseCurve:
     """A curve: name in the legend at its end, hz and values of shape (n,)."""
 
     name: str
@@ -35,7 +35,7 @@ class Mark:
 
 def response_figure(
     title: str,
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark] = (),
     caption: str = "",
     decibel: tuple[float, float] | None = None,
@@ -55,7 +55,7 @@ def response_figure(
 
 
 def _layout(
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark],
     decibel: tuple[float, float] | None,
     phase: bool,
@@ -76,7 +76,7 @@ def _layout(
     )
 
 
-def _names(responses: Sequence[Response]) -> list[Json]:
+def _names(responses: Sequence[ResponseCurve]) -> list[Json]:
     return [
         label(r.name, 1.015, 1.0 - 0.075 * i, r.colour, xref="paper", yref="paper", yanchor="top")
         for i, r in enumerate(responses)
