@@ -16,6 +16,7 @@ from rsea_ros.control.controller import Limits, TorqueController
 from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
+from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, locked
 from rsea_ros.control.robustness import Robustness
 from rsea_ros.control.spread import Spread
@@ -203,11 +204,12 @@ def sine(
     seconds: float = SECONDS,
     settle: float = SETTLE,
     late: int = 0,
+    link: LinkShare | None = None,
 ) -> float:
     """Return the RMS error of a sine (N m, Hz), over its own RMS, from `settle` s on."""
     t = np.arange(round(seconds * design.rate)) / design.rate
     rise = np.minimum(1.0, 4.0 * t) ** 2
-    controller = TorqueController(model, design.rate, design.gains, limits=limits)
+    controller = TorqueController(model, design.rate, design.gains, limits=limits, link=link)
     wanted = amplitude * rise * np.sin(2.0 * np.pi * hz * t)
     return closed_loop(true, design.rate, controller, wanted, late=late).error(settle)
 

@@ -64,10 +64,10 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     value = {trial.what: trial for trial in at.trials}
     errors = [(f"{t.value:.1f} %", what) for what, t in value.items() if t.unit == "%"][:1]
     return [
-        (f"{study.resonance:.1f} Hz", "resonance of the open loop"),
-        (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz, one sample of delay"),
+        (f"{study.resonance:.1f} Hz", "open-loop resonance"),
+        (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
         (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "smallest of the whole set"),
+        (f"{at.swept.margins.phase:.0f}°", "least of the whole set"),
         *errors,
     ]
 
