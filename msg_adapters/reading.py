@@ -35,17 +35,23 @@ def read_record(
 ) -> Record:
     """Read one bag, or several files of one run, as a record; other topics are ignored.
 
-    Stamps are those of the message headers; where one is zero, the log time stands in and a note says so.
-    Samples that lie out of order are sorted by their stamps. Damaged messages are left out. Whatever was
-    damaged stands in the record's faults, and what the bag's /diagnostics tell of the run.
-    strict: refuse what no model can be fitted to (missing command or measurement, NaN), and put the stamps
-    right (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN come as they are.
+    Stamps are those of the message headers; a zero one is replaced by the log time, with a note.
+    Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
+    all damage, and the faults in the bag's /diagnostics.
+    strict: refuse records to which no model can be fitted (missing command or measurement, NaN), and correct
+    the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN are returned
+    unchanged.
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
-    contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
-    return record_from(contents, source, topics, strict=strict)
+    try:
+        contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
+        return record_from(contents, source, topics, strict=strict)
+    except MemoryError:
+        raise BagError(
+            f"{source}: needs more memory than this process may have: split it, or record fewer topics"
+        ) from None
 
 
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
@@ -154,7 +160,7 @@ def _series(
 
 
 def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
-    """Refuse several joints where none is named, and a name that is not there."""
+    """Refuse several joints where none is named, and a missing name."""
     layouts = [block.layout for block in found if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])

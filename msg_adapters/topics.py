@@ -48,10 +48,10 @@ def check_topic(topic: str) -> None:
 class TopicMap:
     """Names of the topics of one bench; the defaults are the contract's.
 
-    A name that starts with a slash stands as it is, any other lies in the namespace.
+    A name that starts with a slash is absolute, any other lies in the namespace.
     desired_position is a JointState whose position is the reference of the controller that ran during
-    the record. It is named like its sibling `desired_torque`, after what it asks for: `reference` says
-    neither of what nor in which unit, and in ROS names a reference frame as often as a set point.
+    the record. It is named like its sibling `desired_torque`, after the requested quantity: `reference` names
+    neither quantity nor unit, and in ROS often means a reference frame.
 
     deflection is a JointState whose position is the angle of the spring by its own encoder.
 

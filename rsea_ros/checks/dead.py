@@ -26,7 +26,7 @@ def dead_channels(
 
     compared: the record beside the rig's simulation.
     frozen: channels of which a part is held, which says why they have little to do with the command.
-    The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
+    Where the signal that the rig's simulation predicts is below the noise, no sensor is
     called dead.
     """
     if not is_commanded(record):
@@ -42,7 +42,7 @@ def dead_channels(
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
-    """Return what is wrong with a channel that holds one value although there was something to measure."""
+    """Return the fault of a channel that holds one value although its signal must have changed."""
     if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
         return ""
     if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):

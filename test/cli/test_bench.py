@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer import motor
@@ -29,6 +30,9 @@ def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number)
     place = json.loads(process.stdout.readline())
     assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
     assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
+    words = place["launch"].split()
+    driver = node_calls(words[2], words[3:])[0]
+    assert words[:2] == ["rsea", "launch"] and driver.parameters["ft_page_port"] == str(place["page_port"])
     process.send_signal(number)
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
@@ -64,10 +68,9 @@ def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 
 
-def test_the_memory_for_requests_is_bounded(monkeypatch):
+def test_the_memory_for_requests_is_bounded():
     """The memory grew by 3.7 MB a minute."""
-    monkeypatch.setattr(motor, "KEPT", 50)
-    made = motor.Motor(54024, SimpleNamespace(write=lambda torque: None))
+    made = motor.Motor(54024, SimpleNamespace(write=lambda torque: None), kept=50)
     goal = made.model.registers["goal"]
     for k in range(200):
         made.write(k, goal.address, (k % 100).to_bytes(goal.size, "little"))

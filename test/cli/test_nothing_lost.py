@@ -5,8 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import signal
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,18 @@ import rsea_ros.replaced as replaced
 from msg_adapters import read_record, write_record
 from rsea_ros.checks import usable
 from rsea_ros.checks.finding import Findings
-from rsea_ros.cli import _checks, paper
+from rsea_ros.cli import _checks, experiment, paper
 from rsea_ros.cli.main import main
 from rsea_ros.control import study
 from rsea_ros.design import judge, margins
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.errors import OutputError
+from rsea_ros.experiment import advice, run_file
+from rsea_ros.fleet import columns
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.laws import learn
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report import file_names
@@ -33,7 +37,11 @@ from rsea_ros.report.control import page as control_page
 from rsea_ros.report.design import json as design_json
 from rsea_ros.report.design import page as design_page
 from rsea_ros.report.diagnosis import files as diagnosis_files
+from rsea_ros.report.experiment import json as experiment_json
+from rsea_ros.report.experiment import page as experiment_page
+from rsea_ros.report.fleet import files as fleet_files
 from rsea_ros.report.identification import files as results
+from rsea_ros.report.law import files as law_files
 from rsea_ros.report.paper import json as paper_json
 from rsea_ros.report.paper import page as paper_page
 from rsea_ros.signals import Channel, Record
@@ -82,7 +90,20 @@ class Found:
     verdict: str = ""
     feasible: bool = True
     faults: tuple[()] = ()
-    rig_option: str = ""
+    remarks: tuple[()] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
+    base_rig: None = None
+    laws: tuple[()] = ()
+    at_floor: bool = False
+    joints: tuple[str, ...] = ("knee",)
+    command: tuple[()] = ()
+    rate: float = 280.0
+    excluded: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def proposal(self) -> Found:
+        """The run of an experiment."""
+        return self
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +131,12 @@ def folder(record, tmp_path, monkeypatch) -> Path:
         (control_json, "control_json", JSON), (control_page, "control_report", "page"),
         (design_json, "design_json", JSON), (design_page, "design_report", "page"),
         (paper_json, "paper_json", JSON), (paper_page, "paper_report", "page"),
+        (learn, "learn", found), (law_files, "law_json", JSON), (law_files, "law_report", "page"),
+        (law_files, "rig_text", "rig"), (experiment, "_possible", ((), {}, {})), (advice, "advise", found),
+        (run_file, "run_text", "t,u"), (experiment_json, "advice_json", JSON),
+        (experiment_page, "advice_page", "page"), (columns, "history", {}), (columns, "recordings", {}),
+        (fleet_files, "fleet_trends", found), (fleet_files, "alarms_of", []), (fleet_files, "_steps", None),
+        (fleet_files, "joint_page", "page"), (fleet_files, "fleet_page", "page"),
     ):  # fmt: skip
         monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
     monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.staged("one.mcap")))
@@ -122,6 +149,13 @@ WRITERS = {
     "import": (["import", "run.csv", "--map", "map.yaml", "--out", "out/new.mcap"], ["new.mcap"]),
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
     "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
+    "export of another kind": (["export", "--urdf", RIG, "--out", "out/new.urdf"], ["new.urdf"]),
+    "rig": (["rig", "new", "arm", "--out", "out/new.yaml"], ["new.yaml"]),
+    "fleet": (["fleet", "report", "store", "--out", "out"], ["index.html", "joint-knee.html"]),
+    "law": (["law", "run.mcap", "--json", "--out", "out"], list(file_names.LAW)),
+    "experiment": (
+        ["experiment", RIG, "--limits", "torque=1", "--json", "--out", "out"], list(file_names.EXPERIMENT)
+    ),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
     "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(file_names.IDENTIFICATION)),
     "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(file_names.DIAGNOSIS)),

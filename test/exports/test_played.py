@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
+from rsea_ros.design.mjcf import STEP
+from rsea_ros.exports import mujoco_play
 from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.fmu_play import play_fmu
@@ -88,6 +90,26 @@ def test_an_effect_that_conflicts_with_another_is_left_out_entirely(other):
     given = command(0.25)
     theirs = play_mujoco(made.content, both, given)
     assert max(one.times_noise for one in differences(said, ours(said, given, RATE), theirs)) < 1.0
+
+
+@MUJOCO
+def test_a_long_excitation_is_played_in_pieces(monkeypatch):
+    """One call took minutes, in which no signal was served; the pieces are one motion."""
+    from mujoco import rollout
+
+    rig, given, played, sizes = load_rig("paper_moving_output"), command(0.25), rollout.rollout, []
+
+    def counted(model, data, state, control, **more):
+        sizes.append(control.shape[1])
+        return played(model, data, state, control, **more)
+
+    whole = play_mujoco(export_mjcf(rig).content, rig, given)
+    monkeypatch.setattr(rollout, "rollout", counted)
+    monkeypatch.setattr(mujoco_play, "PIECE", 20)
+    pieces = play_mujoco(export_mjcf(rig).content, rig, given)
+    hold = round(1.0 / RATE / STEP)
+    assert sizes == [20 * hold] * 3 + [(len(given) - 60) * hold]
+    assert all(np.array_equal(pieces[name], y) for name, y in whole.items())
 
 
 @MUJOCO

@@ -163,6 +163,30 @@ def test_lost_answers_in_a_row_are_a_fault_and_other_errors_at_once(
         assert [s is None for s in states] == [a is not None for a in answers]
 
 
+@pytest.mark.parametrize(("method", "what"), [("read", "failed_reads"), ("write", "failed_writes")])
+def test_every_second_answer_lost_is_a_fault_though_never_two_in_a_row(joint, device, method, what):
+    """Torque went on for ever on a line that lost every second reply."""
+    device.broken = {method: [LOST, None] * 14}
+    for _ in range(28):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault is None
+    device.broken = {method: [LOST]}
+    joint.cycle(1.0, 0.0)
+    assert joint.fault == Fault("no_reply", 15, 15, "cycles", "of the last 29: no reply")
+    joint.clear()
+    device.broken = {method: [LOST] * 2}
+    joint.cycle(1.0, 0.0)
+    joint.cycle(1.0, 0.0)
+    assert joint.fault is None and joint.cycles == {what: 17}
+
+
+def test_a_third_of_the_answers_lost_is_none(joint, device):
+    device.broken = {"read": [LOST, None, None] * 40}
+    for _ in range(120):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault is None
+
+
 def test_an_answer_that_is_late_while_another_is_lost_makes_no_fault_of_both(joint, device):
     device.broken = {"read": [LOST, LOST], "write": [LOST, LOST]}
     joint.cycle(1.0, 0.0)

@@ -48,6 +48,23 @@ def test_several_joints_and_damaged_messages_are_refused():
     assert STATE.read(raw) == (STAMP, [0.0, 0.0])
 
 
+def test_of_several_joints_the_numbers_of_the_named_one_are_read():
+    raw = serialize_message(efforts_message(STAMP, {"hip": 1.0, "knee": 2.0}))
+    for joint, torque in (("hip", 1.0), ("knee", 2.0)):
+        assert RawReader(JOINT_STATE, [("effort", 0)], joint).read(raw) == (STAMP, [torque])
+    position = RawReader(JOINT_STATE, [("position", 0)], "knee")
+    assert math.isnan(position.read(raw)[1][0])
+    with pytest.raises(ParameterError, match=r"2 joints \(hip, knee\), expected 'ankle' once"):
+        RawReader(JOINT_STATE, [("effort", 0)], "ankle").read(raw)
+
+
+def test_a_joint_that_a_message_names_twice_is_refused():
+    raw = bytearray(serialize_message(efforts_message(STAMP, {"hip": 1.0, "hop": 2.0})))
+    raw[raw.index(b"hop") + 1] = ord("i")
+    with pytest.raises(ParameterError, match="expected 'hip' once"):
+        RawReader(JOINT_STATE, [("effort", 0)], "hip").read(bytes(raw))
+
+
 class Counted(bytes):
     """Bytes that count those cut out of them."""
 

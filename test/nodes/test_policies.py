@@ -39,6 +39,24 @@ def test_only_listed_nodes_may_move_the_machine(plural, verb, name, allowed):
     assert {node for node, profile in profiles.items() if name in named(profile)} == allowed
 
 
+def test_joints_have_nodes_in_namespaces_that_command_their_own_joint_alone(monkeypatch):
+    """A controller of one joint could be allowed the other's commands only by hand."""
+    both = {"/diagnostics", "/rsea/torque_command"}
+    kinds = {("topics", "publish"): both, ("services", "reply"): set()}
+    driver = {("topics", "subscribe"): {"/rsea/hip/torque_command", "/rsea/knee/torque_command"}}
+    monkeypatch.setattr(
+        _policies, "interfaces", lambda name, **given: driver if name == "driver" else dict(kinds)
+    )
+    profiles = _policies._joints(("hip", "knee"))
+    assert set(profiles) == {("rsea", "driver")} | {
+        (f"rsea/{joint}", name) for joint in ("hip", "knee") for name in _policies.OF_A_JOINT
+    }
+    knee = profiles["rsea/knee", "controller"]
+    assert knee["topics", "publish"] == {"/diagnostics", "/rsea/knee/torque_command"}
+    paths = [e.get("path") for e in XML.fromstring(_policies.document(profiles)).iter("enclave")]
+    assert "/rsea/driver" in paths and "/rsea/hip/controller" in paths
+
+
 @pytest.mark.parametrize(("given", "range_"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
 def test_nodes_are_found_from_this_machine_unless_the_user_opens_it(monkeypatch, given, range_):
     variable = "ROS_AUTOMATIC_DISCOVERY_RANGE"

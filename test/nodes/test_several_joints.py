@@ -78,6 +78,7 @@ class Leg:
         self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
+        self.combined = listener.hear(JointState, "/leg/joint_states", MEASUREMENT)
         self.clearing = {
             j: listener.node.create_client(Trigger, f"/leg/driver/{j}/clear_fault") for j in JOINTS
         }
@@ -144,6 +145,9 @@ def test_each_joint_follows_its_commands_in_one_exchange_a_cycle(leg):
     ))  # fmt: skip
     assert [list(leg.states[j][-1].name) for j in JOINTS] == [[j] for j in JOINTS]
     leg.push(TORQUES, lambda: len(leg.together()) > 20)  # never, where each had a transaction of its own
+    wanted = [TORQUES[joint] for joint in JOINTS]
+    leg.push(TORQUES, lambda: leg.combined and np.allclose(leg.combined[-1].effort, wanted, atol=0.3))
+    assert [*leg.combined[-1].name] == [*JOINTS] and len(leg.combined[-1].position) == len(JOINTS)
     leg.push(TORQUES, lambda: leg.value("knee", "active") == "True")
     leg.push(TORQUES, lambda: leg.value("ankle", "motor") == "XW540-T260")
 

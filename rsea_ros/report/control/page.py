@@ -32,7 +32,7 @@ def control_report(study: Study) -> str:
 
 
 def verdict(study: Study) -> str:
-    """Return in a sentence what is reached."""
+    """Return the verdict in a sentence."""
     missed = [f"{t.what} at {at.design.rate:g} Hz" for at in study.rates for t in at.trials if t.met is False]
     slowest = study.rates[0]
     reached = f"Stable on all {slowest.swept.cases} benches of the set, from locked to free"
@@ -66,7 +66,7 @@ def _following(study: Study) -> Figure:
         for name, seen, width, dash in (
             ("locked", at.locked, 2.4, "solid"),
             ("free", at.free, 1.6, "dot"),
-            ("worst case of the set", at.hard, 1.0, "dash"),
+            ("worst case", at.hard, 1.0, "dash"),
         ):
             curves.append(Response(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
     hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)

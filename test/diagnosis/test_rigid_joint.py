@@ -1,0 +1,29 @@
+"""The torque that a joint without a spring lacks, from its encoder alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros.diagnosis.residual_peaks import missing_torque
+from rsea_ros.identification.problem import case_from
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_and_link():
+    """A diagnosis from targets and encoder ended in a traceback: zero motion times an infinite stiffness."""
+    rig = load_rig("pd_joint")
+    kept = {n: q for n, q in rig.quantities.items() if not n.startswith(("spring.", "chassis."))}
+    rigid = replace(rig, quantities=kept, rigid_spring=True)
+    t = np.arange(800) / 100.0
+    record = synthesize(rigid, Channel(t, 0.5 * np.sin(2.0 * t)), seed=1)
+    case = case_from(replace(record, channels={n: record[n] for n in ("reference", "position")}), rigid)
+    error = 1e-3 * np.sin(5.0 * case.t["position"])
+    _, torque = missing_torque(case, rigid, {"position": case.measured["position"] - error})
+    inertia = rigid["rotor.reflected_inertia"] + rigid["spring_end.inertia"]
+    reaction = 1e-3 * np.hypot(inertia * 5.0**2, rigid["rotor.reflected_damping"] * 5.0)
+    assert np.max(np.abs(torque[200:])) == pytest.approx(reaction, rel=0.01)
