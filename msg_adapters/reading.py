@@ -45,8 +45,13 @@ def read_record(
     """
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
-    contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
-    return record_from(contents, source, topics, strict=strict)
+    try:
+        contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
+        return record_from(contents, source, topics, strict=strict)
+    except MemoryError:
+        raise BagError(
+            f"{source}: needs more memory than this process may have: split it, or record fewer topics"
+        ) from None
 
 
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 
@@ -42,6 +43,7 @@ DESIGNS = {
 """Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
 
 
+@functools.cache
 def imported(file: str, mapping: str) -> Record:
     """Return a file of measurements as a record."""
     return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
@@ -55,9 +57,16 @@ def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
     return json.loads((out / "identification.json").read_text(encoding="utf-8"))
 
 
-def test_emps_has_the_published_values(tmp_path):
+@pytest.fixture(scope="module")
+def emps(tmp_path_factory):
+    """Identify the drive once; return the folder of its bag and results, and what was identified."""
+    folder = tmp_path_factory.mktemp("emps")
+    return folder, identified("emps/DATA_EMPS.mat", "emps_identification", "emps", folder)
+
+
+def test_emps_has_the_published_values(emps):
     """Janot, Gautier, Brunot 2019: M 95.109 kg, 203.503 N s/m, 20.394 N, offset -3.165 N."""
-    found = identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)["parameters"]
+    found = emps[1]["parameters"]
     published = {
         "rotor.reflected_inertia": (95.109, 0.02),
         "rotor.reflected_damping": (203.503, 0.02),
@@ -72,12 +81,11 @@ def test_emps_has_the_published_values(tmp_path):
         assert high - low < 0.3 * abs(value), name
 
 
-def test_emps_predicts_the_run_with_pulses(tmp_path):
+def test_emps_predicts_the_run_with_pulses(emps, tmp_path):
     """Held out: the force residual is at most 4.7 % of the force."""
-    identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)
     pulses = ["import", str(REAL / "emps/DATA_EMPS_PULSES.mat"), "--map", "emps_pulses"]
     assert main([*pulses, "--out", str(tmp_path / "pulses")]) == 0
-    model = load_rig(tmp_path / "emps_identification_results" / "model.yaml")
+    model = load_rig(emps[0] / "emps_identification_results" / "model.yaml")
     force = predict(model, read_record(tmp_path / "pulses"))["motor_torque"]
     rms = float(np.sqrt(np.mean(force.measured[force.counts] ** 2)))
     assert force.rms_error / rms < 0.047

@@ -1,4 +1,4 @@
-"""The rig linearised about its quick fit: clocks of the sensors, and what these data can determine.
+"""The rig linearised about its quick fit: clocks of the sensors.
 
 Gauss-Newton on output errors: linear_rows.py has the rows, linear_step.py the solution.
 """
@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.linear_rows import Rows, Setting, State, left_of, on_time, rows_of
-from rsea_ros.checks.linear_step import Brought, brought_by_value, gauss_newton_step
+from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.shape import Shape
-from rsea_ros.identification.problem import case_from, channels_that_tell
+from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.normal import Z95
@@ -49,15 +49,17 @@ class Number:
 class Linear:
     """The result of the linearised fit. offset: s at the start of the record, drift: s/s, by channel.
 
-    misfit: RMS of the residual over the noise by channel. values: the information on the rig's values.
-    settled: whether the clocks converged; otherwise their numbers are meaningless.
+    misfit: RMS of the residual over the noise by channel.
+    settled: whether the clocks converged; otherwise their numbers are meaningless. problem, theta: the fit
+    of the values with the clocks set right, and where the rounds ended.
     """
 
     offset: Mapping[str, Number]
     drift: Mapping[str, Number]
     misfit: Mapping[str, float]
-    values: Mapping[str, Brought]
     settled: bool
+    problem: Problem
+    theta: FloatArray
 
 
 def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape) -> Linear:
@@ -139,6 +141,7 @@ def _linear(setting: Setting, state: State, rows: Rows, sd: FloatArray, settled:
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
         misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
-        values=brought_by_value(setting, rows),
         settled=settled,
+        problem=rows.left.problem,
+        theta=state.theta,
     )

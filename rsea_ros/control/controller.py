@@ -133,7 +133,7 @@ class TorqueController:
         late: the torque will act later than the margins allow; then it is feed-forward alone.
         trust: part of the feedback that counts, as lateness.py has it.
         """
-        for wanted in self._prediction.between(desired, missed):
+        for wanted in self._prediction.between(desired, missed) if missed else ():
             self._coast(wanted, desired_offset)
         ahead, model = self._ahead(desired, desired_offset), self._reference
         largest, most = self._largest(), self._limits.slew * self._law.period
@@ -193,7 +193,7 @@ class TorqueController:
         After lost samples, those between are read on a straight line.
         """
         s, turned = self._state, reading.velocity - self._state.velocity
-        for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist():
+        for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
             torque = s.applied + self._learned[0]
             self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)

@@ -4,8 +4,8 @@ The missing torque is the torque that a model lacks for the measured motion:
 
     J_m a + b_m v + T,   of the residuals: measured less simulated motion and load
 
-What the model has right, the command with its lags included, is in both. A simulated rotor angle of a 502:1
-gear loses its phase; the measured one does not.
+The parts that the model has right, the command with its lags included, cancel. A simulated rotor angle of a
+502:1 gear loses its phase; the measured one does not.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _MOST_PEAKS = 2
 
 
 def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
-    """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats most."""
+    """Return cycles per revolution, amplitude (N m) and phase (rad) of the strongest repetitions."""
     missing = missing_torque(case, rig, outputs)
     if missing is None:
         return []
@@ -46,7 +46,7 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
-    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of what repeats most.
+    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of the strongest ones.
 
     Of the measured angle less the simulated one.
     """
@@ -58,7 +58,7 @@ def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> lis
 
 
 def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
-    """Return cycles per revolution, amplitude and phase of what repeats most with an angle (rad)."""
+    """Return cycles per revolution, amplitude and phase of the strongest repetitions over an angle (rad)."""
     values = values - np.mean(values)
     cycles, power = _periodogram(angle, values)
     seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
@@ -121,12 +121,12 @@ def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
 
 
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
-    """Return what is measured less what is simulated, zero where that is masked."""
+    """Return measured less simulated, zero where masked."""
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:
-    """Return the places of the largest values that are more than so many bins apart."""
+    """Return the places of the largest values that are more than a number of bins apart."""
     level, largest = level.copy(), []
     for _ in range(_MOST_PEAKS):
         k = int(np.argmax(level))

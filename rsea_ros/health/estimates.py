@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 MEMORY = 60.0
@@ -62,7 +63,7 @@ class Estimates:
         """Return value and interval of each parameter."""
         variance = 1.0 / (self._information + self._prior)
         common = np.array([h.common for h in self._hypotheses])
-        change, half = variance * self._score, SURE * np.sqrt(variance + common**2)
+        change, half = variance * self._score, Z95 * np.sqrt(variance + common**2)
         return [
             Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
             for h, c, d, held in zip(

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.normal import Z95
 
-SURE = 1.96
-"""Standard deviations on either side of a 95 % interval."""
 FACTOR = "friction.factor"
 GAINS = ("torque_constant_error.gain", "ft_gain_error.gain")
 """Calibrations, which no record of the joint alone can separate from its stiffness and inertia."""
@@ -47,7 +46,7 @@ class Hypothesis:
     @property
     def inner(self) -> float:
         """Largest change that the doubt in the model allows."""
-        return SURE * self.doubt
+        return Z95 * self.doubt
 
     @property
     def outer(self) -> float:
@@ -117,7 +116,7 @@ def _field(rig: Rig, name: str, code: str, part: float) -> Hypothesis | None:
 def _doubt(rig: Rig, name: str) -> float:
     quantity = rig.quantities[name]
     if quantity.ci95 is not None:
-        return (quantity.ci95[1] - quantity.ci95[0]) / (2.0 * SURE)
+        return (quantity.ci95[1] - quantity.ci95[0]) / (2.0 * Z95)
     return 0.0 if name in rig.known else 0.5 * quantity.spread * quantity.value
 
 

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.bank import whitened
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.hypotheses import Hypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 FREEDOM = 4.0
@@ -123,7 +124,7 @@ class Fitter:
                     break
             if abs(change - last) < SHORTEST * max(sigma, SHORTEST * hypothesis.least):
                 break
-        return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / SURE))
+        return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / Z95))
 
     def _at(self, hypothesis: Hypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
@@ -142,5 +143,5 @@ def cost(w: FloatArray) -> float:
 
 
 def _interval(fit: _Fit, phi: float) -> tuple[float, float]:
-    half = SURE * fit.sigma * math.sqrt(phi)
+    half = Z95 * fit.sigma * math.sqrt(phi)
     return fit.change - half, fit.change + half

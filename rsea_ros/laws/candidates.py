@@ -30,8 +30,6 @@ from rsea_ros.laws.variables import Variables
 from rsea_ros.signals import FloatArray
 
 _DEGREE = 2
-_WAVES = (1, 2, 3)
-"""Harmonics of a periodic law that knows no form."""
 
 
 @dataclass(frozen=True)

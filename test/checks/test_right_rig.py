@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from independent.bench import drawn_bench, record_run
@@ -54,3 +56,24 @@ def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
 @pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
 def test_the_right_rig_is_not_questioned(name, amplitude):
     assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}
+
+
+def test_a_value_that_identify_leaves_to_the_prior_is_undetermined():
+    """Without encoder three values have no unique size: the check called them determined."""
+    run = run_of("paper_high_impedance", 15.0)
+    run = replace(run, channels={n: run[n] for n in ("command", "ft")})
+    fit = rsea.identify(run, "paper_high_impedance")
+    left = {p.name for p in fit.result.parameters if p.determined == "no" and not p.name.startswith("clock")}
+    found = rsea.check(run, "paper_high_impedance").result.of("identifiability")
+    assert {f.channel for f in found if f.light == "amber"} == left
+    assert {"rotor.reflected_inertia", "rotor.reflected_damping", "spring.damping"} <= left
+
+
+def test_a_value_far_from_the_rigs_is_amber_with_both_numbers():
+    """A spring 30 % off was green."""
+    bench = load_rig("paper_high_impedance").with_values({"spring.stiffness": 1.3 * 1530.456})
+    run = rsea.simulate(bench, 15.0 * np.random.default_rng(4).standard_normal(2800), RATE, seed=4)
+    (found,) = rsea.check(run, "paper_high_impedance").result.of("rig_value")
+    assert (found.light, found.channel, found.expected) == ("amber", "spring.stiffness", "1530, to 15 %")
+    assert found.low < 1.3 * 1530.456 < found.high
+    assert rsea.check(run, bench).result.of("rig_value") == ()

@@ -41,7 +41,7 @@ def test_a_good_bag_is_green_and_says_its_rig(bag, capsys):
     printed, errors = capsys.readouterr()
     assert errors == ""
     assert "red" not in printed.split("checked against")[0]
-    assert "checked against rig paper_high_impedance: 0 red, 0 amber" in printed
+    assert "checked against default rig paper_high_impedance: 0 red, 0 amber" in printed
 
 
 def test_several_bags_as_json_and_a_status(bag, good, capsys):

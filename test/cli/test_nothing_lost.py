@@ -28,6 +28,7 @@ from rsea_ros.fleet import columns
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
 from rsea_ros.laws import learn
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report import file_names
@@ -89,7 +90,8 @@ class Found:
     verdict: str = ""
     feasible: bool = True
     faults: tuple[()] = ()
-    rig_option: str = ""
+    remarks: tuple[()] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
     base_rig: None = None
     laws: tuple[()] = ()
     at_floor: bool = False

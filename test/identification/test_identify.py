@@ -29,11 +29,11 @@ def standard_errors(result: Identification, true: dict[str, float]) -> dict[str,
 @pytest.mark.parametrize(
     ("name", "kind", "duration"),
     [
-        ("paper_high_impedance", "white_noise", 10.0),
-        ("paper_high_impedance", "chirp", 10.0),
-        ("paper_moving_output", "white_noise", 10.0),
-        ("prototype_knee", "white_noise", 10.0),
-        ("bare_drive", "chirp", 20.0),
+        ("paper_high_impedance", "white_noise", 6.0),
+        ("paper_high_impedance", "chirp", 6.0),
+        ("paper_moving_output", "white_noise", 6.0),
+        ("prototype_knee", "white_noise", 6.0),
+        ("bare_drive", "chirp", 12.0),
     ],
 )
 def test_intervals_contain_the_truth_as_often_as_they_say(name, kind, duration):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.report.identification.parameters import how_determined, parameter_table, value_text
+from rsea_ros.report.identification.parameters import parameter_table, value_text
 
 
 def estimate(
@@ -24,7 +24,7 @@ def estimate(
      (estimate(0.01, -0.02, 0.04, name="torque_ripple.phase"), "yes")],
 )  # fmt: skip
 def test_a_value_within_its_doubt_or_at_a_bound_is_not_determined(p: ParameterEstimate, answer: str) -> None:
-    assert how_determined(p) == answer
+    assert p.determined == answer
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -14,6 +15,9 @@ from rsea_ros.report.page.table import table
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit, lumped_circuit
 from rsea_ros.report.paper.docs import documentation_figures
 from rsea_ros.report.paper.figures import figure_9, figure_18_as_printed, figure_20
+
+FIGURES = Path(__file__).parents[3] / "docs" / "figures"
+drawn = functools.cache(documentation_figures)
 
 
 @pytest.mark.parametrize(
@@ -55,9 +59,12 @@ def test_a_table_is_escaped_and_aligned():
     assert "<td class='number'>1</td>" in html
 
 
-@pytest.mark.parametrize("name", documentation_figures())
+def test_every_figure_of_the_derivation_is_one_that_the_program_draws():
+    assert {path.name for path in FIGURES.iterdir()} == set(drawn())
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in FIGURES.iterdir()))
 def test_figures_of_the_derivation_are_what_the_program_draws(name):
-    path = Path(__file__).parents[3] / "docs" / "figures" / name
-    made = documentation_figures()[name]
+    path, made = FIGURES / name, drawn()[name]
     assert path.read_text(encoding="utf-8") == made, f"rsea paper --figures docs/figures --force makes {name}"
     assert f"figures/{name}" in (path.parents[1] / "derivation.md").read_text(encoding="utf-8")
