@@ -13,13 +13,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
 from independent.bench import Bench, record_command
 
-from rsea_ros.health.finding import Finding
+from rsea_ros.health.finding import HealthFinding
 from rsea_ros.health.look import events_of
 from rsea_ros.health.monitor import Monitor
-from rsea_ros.health.settings import Settings
+from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import Channel, FloatArray, Record
 
 RATE, PIECE = 280.0, 60.0
@@ -64,7 +65,7 @@ def drawn(rng: np.random.Generator) -> tuple[Bench, Rig]:
     for name, key in names.items():
         sigma = DOUBT[name] * values[key]
         value = values[key] + sigma * rng.standard_normal()
-        quantities[name] = Quantity(value, 0.05, "drawn", (value - 1.96 * sigma, value + 1.96 * sigma))
+        quantities[name] = Quantity(value, 0.05, "drawn", (value - Z95 * sigma, value + Z95 * sigma))
     torque = values["coulomb"] * (1.0 + FRICTION_DOUBT * rng.standard_normal())
     known = replace(rig, quantities=quantities)
     return Bench().having(**values), known.with_effects(EffectSetting("coulomb_friction", {"torque": torque}))
@@ -120,7 +121,7 @@ def pieces(bench: Bench, seconds: float, rng: np.random.Generator, start: float 
         done += length
 
 
-def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, Finding]]:
+def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, HealthFinding]]:
     """Give a monitor what comes, as a node does; yield the time of each finding that is new, s."""
     for record in records:
         t, kind, values = events_of(record)
@@ -133,4 +134,4 @@ def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, 
 
 def monitor_of(rig: Rig, **settings: float) -> Monitor:
     """Return a monitor of a rig."""
-    return Monitor(rig, noise_of(rig), Settings(**settings))  # type: ignore[arg-type]
+    return Monitor(rig, noise_of(rig), WatchSettings(**settings))  # type: ignore[arg-type]

@@ -1,6 +1,6 @@
 """The model tuned to the first looks within its doubts: an identification is right within its intervals only.
 
-    d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= 1.96 doubt
+    d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= Z95 doubt
 
 for all parameters together. A deviation beyond the doubt stays a change and alarms.
 """
@@ -12,12 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.health.bank import Bank, Evidence
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.bank import Bank, LookEvidence
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 _CERTAIN = 1e-6
@@ -29,8 +30,8 @@ ROUNDS = 2
 
 
 def tuned(
-    rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], looks: Sequence[Look], hold: float
-) -> tuple[Rig, tuple[Hypothesis, ...]]:
+    rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], looks: Sequence[Look], hold: float
+) -> tuple[Rig, tuple[ChangeHypothesis, ...]]:
     """Return rig and hypotheses with the values that the looks have, within the doubts."""
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
@@ -48,7 +49,7 @@ def tuned(
 
 
 def _change(
-    found: Sequence[Evidence], hypotheses: Sequence[Hypothesis], before: FloatArray
+    found: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
     from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs
@@ -61,4 +62,4 @@ def _change(
     root = np.linalg.cholesky(information + np.eye(len(doubt)))
     wanted = np.linalg.solve(root, score + information @ (before / doubt))
     sigma = doubt * np.sqrt(np.diag(np.linalg.inv(root @ root.T)))
-    return doubt * lsq_linear(root.T, wanted, bounds=(-SURE, SURE)).x, sigma
+    return doubt * lsq_linear(root.T, wanted, bounds=(-Z95, Z95)).x, sigma

@@ -1,4 +1,4 @@
-"""What a fit says: its errors by channel, its estimates with their intervals, the rig with them."""
+"""The results of a fit: errors by channel, estimates with intervals, the rig with them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
 
 
 def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
-    """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
+    """Return the rig with the fitted values, their intervals, and their doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
     sensors = {
         n: replace(

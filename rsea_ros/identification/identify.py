@@ -1,4 +1,4 @@
-"""Identification: the parameters of a rig from records, by output error on all channels that are there."""
+"""Identification: the parameters of a rig from records, by output error on all present channels."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ from rsea_ros.signals import FloatArray, Record
 def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:
     """Return the parameters of the rig, effects that it lists included, with their confidence.
 
-    Raises IdentificationError when the records do not hold what the rig needs.
+    Raises IdentificationError when the records lack a channel that the rig needs.
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
@@ -87,7 +87,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
 
 
 def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
-    """Return where a fit may begin beside the rig's own values."""
+    """Return a start of the fit other than the rig's own values."""
     if is_inverse(rig):
         return None
     return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)

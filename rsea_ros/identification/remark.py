@@ -1,4 +1,4 @@
-"""Remarks: what a fit or a diagnosis has to say beside its numbers, as facts (report/remark_words.py)."""
+"""Remarks of a fit or a diagnosis beside its numbers, as facts (worded by report/remark_words.py)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ off_rig: the rig states a value, the data another (that, 95 % interval), so many
 
 @dataclass(frozen=True)
 class Remark:
-    """A fact: what it says, the parameters, channels or effects that it is about, and its numbers."""
+    """A fact: its code, the parameters, channels or effects concerned, and its numbers."""
 
     code: Code
     names: tuple[str, ...] = ()

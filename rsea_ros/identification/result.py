@@ -1,4 +1,4 @@
-"""What an identification says, as values. Reports and files are made from these."""
+"""The result of an identification as values, for reports and files."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ CLOCKS = ("clock.", "clock_rate.")
 class ParameterEstimate:
     """A parameter in SI with its 95 % interval.
 
-    told_by_data: share of what is known of it that the data brought, 1 - var(posterior) / var(prior).
-    start: the value that the rig stated. spread: relative one-sigma prior spread around it. spreads_off: how
-    many of them the value lies off it.
+    told_by_data: share of its information that comes from the data, 1 - var(posterior) / var(prior).
+    start: the value that the rig stated. spread: relative one-sigma prior spread around it. spreads_off:
+    distance of the value from it in spreads.
     """
 
     name: str
@@ -65,7 +65,7 @@ class ParameterEstimate:
 
     @property
     def is_told(self) -> bool:
-        """Return whether the data determine the value, rather than what the rig states."""
+        """Return whether the data determine the value, rather than the rig's prior."""
         return self.told_by_data >= TOLD
 
     @property
@@ -86,14 +86,14 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters with confidence, how well they explain the record, and what the data cannot determine.
+    """Parameters with confidence, their fit to the record, and values that the data cannot determine.
 
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
-    frequencies of each of `responses`. remarks: what is not identifiable, and what was done to the stamps.
+    frequencies of each of `responses`. remarks: on values that are not identifiable, and on corrected stamps.
     statics: of slow ramps against a locked output. alternatives: laws that would explain a part of the
-    misfit; the intervals span what each makes of the values. coloured: channels whose residual was taken for
-    coloured noise of the sensor. clocks: what unknown clocks of the sensors would cost.
+    misfit; the intervals span their estimates. coloured: channels whose residual was taken for
+    coloured noise of the sensor. clocks: cost of unknown clocks of the sensors.
     """
 
     rig: Rig
@@ -126,7 +126,7 @@ class Identification:
 
     @property
     def at_noise(self) -> bool:
-        """Return whether every channel that judges is down to its noise."""
+        """Return whether every channel that counts is at its noise."""
         return all(ratio <= AT_NOISE for ratio in self.times_noise.values())
 
     @property
@@ -136,9 +136,9 @@ class Identification:
 
     @property
     def verdict(self) -> Verdict:
-        """Return whether the model fits what the sensors measured, and whether that determines any value.
+        """Return whether the model fits the measurements, and whether they determine any value.
 
-        A sensor that measures nothing is a misfit: the model says what it should have measured.
+        A sensor that measures nothing is a misfit: the model predicts its measurement.
         """
         if not self.at_noise or self.silent:
             return "misfit"

@@ -10,7 +10,6 @@ from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.laws.base import FITTED, Base
 from rsea_ros.laws.file import Draft
 from rsea_ros.laws.refinement import Refined, refine
@@ -94,6 +93,6 @@ def share_of(before: dict[str, float], after: dict[str, float], noise: dict[str,
     shares = [
         ((before[n] ** 2 - after[n] ** 2), before[n] ** 2 - noise[n] ** 2)
         for n in before
-        if before[n] > AT_NOISE * noise[n]
+        if before[n] > DEFAULT.floor.reached * noise[n]
     ]
     return sum(a / b for a, b in shares) / len(shares) if shares else 0.0

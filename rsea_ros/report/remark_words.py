@@ -1,4 +1,4 @@
-"""The remarks of a fit or a diagnosis in words: what data cannot determine, what a reader must know."""
+"""The remarks of a fit or a diagnosis in words."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def remark_sentences(remarks: Iterable[Remark]) -> tuple[str, ...]:
 
 
 def coloured_noise(channels: Iterable[str]) -> str:
-    """Return what was taken for coloured noise of sensors, and why."""
+    """Return the residuals that were taken for coloured noise of sensors, and why."""
     return (
         f"The noise of the {listed([words.channel(n) for n in channels])} is coloured: its level was taken "
         "from the residual, which is steady, falls with frequency, and agrees with neither command nor "

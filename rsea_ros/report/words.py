@@ -72,7 +72,7 @@ def minus(text: str) -> str:
 
 
 def signed(value: float, digits: int) -> str:
-    """Return a value with its sign and so many decimal places."""
+    """Return a value with its sign and a number of decimal places."""
     return minus(f"{value:+.{digits}f}")
 
 
@@ -82,7 +82,7 @@ def hertz(value: float) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a value with so many significant digits, without an exponent where it can be helped."""
+    """Return a value with a number of significant digits, without an exponent if possible."""
     if not math.isfinite(value):
         return "∞" if value > 0.0 else "−∞" if value < 0.0 else "–"
     if value == 0.0:
@@ -101,7 +101,7 @@ def quantity(value: float, of: str, digits: int = 3) -> str:
 
 
 def scaled(value: float, of: str) -> tuple[float, str]:
-    """Return by what a value is to be multiplied to be read, and its unit then: 6.1e-6 rad is 1e6, `µrad`."""
+    """Return the factor that makes a value readable, and its unit then: 6.1e-6 rad gives 1e6, `µrad`."""
     simple = of and " " not in of.split("/")[0] and of != "1"
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
         return 1.0, unit(of)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import Appearance, Interval
@@ -142,5 +143,5 @@ def _size_now(n: Naming, last: int = 9) -> Interval | None:
     size, sd = n.size[usable], n.sd[usable]
     middle = float(np.median(size))
     spread = 1.4826 * float(np.median(np.abs(size - middle)))
-    half = 1.96 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
+    half = Z95 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
     return Interval(middle, middle - half, middle + half)

@@ -1,4 +1,4 @@
-"""Settings of what the accepted causes are called, and of the intervals of their sizes."""
+"""Settings of the names of accepted causes, and of the intervals of their sizes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rsea_ros.diagnosis.settings.number import CALIBRATED, flat, number
 
 @dataclass(frozen=True)
 class EvidenceSettings:
-    """What the probability of a cause is computed from (naming/), and which rivals it has."""
+    """The features of a cause's probability (naming/), and the choice of its rivals."""
 
     parts: int = number(4, "1", "parts of amplitude and of time, for the shape of a law", CALIBRATED)
     bands: int = number(6, "1", "frequency bands, for the shape of a law", CALIBRATED)
@@ -29,7 +29,7 @@ class EvidenceSettings:
 
 @dataclass(frozen=True)
 class NamingSettings:
-    """From which probability a cause is named, and as what (naming/status.py)."""
+    """The probabilities from which a cause is named, by status (naming/status.py)."""
 
     confirmed_at_floor: float = number(
         0.8, "1", "probability from which a cause is confirmed where all causes together leave only noise",
@@ -57,7 +57,7 @@ class NamingSettings:
 
 @dataclass(frozen=True)
 class SizeSettings:
-    """The interval of a cause's size, and the channel of which its gain speaks."""
+    """The interval of a cause's size, and the channel of its gain."""
 
     model_error: float = number(
         0.0025, "1", "relative error of the simulation itself in every size, one sigma",

@@ -52,7 +52,7 @@ class PieceSettings:
 
 @dataclass(frozen=True)
 class FloorSettings:
-    """RMS of a residual over the noise of its channel, and what each level means."""
+    """Levels of a residual: RMS over the noise of its channel."""
 
     only_noise: float = number(
         1.04,

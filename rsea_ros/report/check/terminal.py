@@ -1,4 +1,4 @@
-"""What a check says on a terminal: a line for each finding."""
+"""The findings of a check on a terminal, one line each."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
 
 
 def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
-    """Return the findings of a record, each in lines of at most `width` columns: light, what, channel, value.
+    """Return the findings of a record, each in lines of at most `width` columns: light, kind, channel, value.
 
-    What would be green and what would help follow where a light is not green.
+    The expected value and the remedy follow where a light is not green.
     """
     lines = []
     for f in _each_remedy_once(findings.findings):
@@ -76,7 +76,7 @@ def sentence(f: Finding) -> str:
 
 
 def kind(f: Finding) -> str:
-    """Return the plain name of what was looked at."""
+    """Return the plain name of a kind of finding."""
     if f.light != "green" and f.kind in _DOUBTED:
         return _DOUBTED[f.kind]
     return _KINDS.get(f.kind, f.kind.replace("_", " "))

@@ -1,4 +1,4 @@
-"""diagnosis.json: what a diagnosis says, for programs."""
+"""diagnosis.json: a diagnosis for programs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SCHEMA = 1
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the contents of diagnosis.json. No number in it is infinite or NaN: such are null."""
+    """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
     d = diagnosis
     return {
         "schema": SCHEMA,

@@ -37,7 +37,7 @@ class Profile:
 
 
 def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
-    """Return a profile for every respect that the record has the signals for."""
+    """Return a profile over every signal that the record has."""
     before, after = ({o.channel: o for o in overlays} for overlays in (diagnosis.before, diagnosis.after))
     if channel not in before:
         return ()

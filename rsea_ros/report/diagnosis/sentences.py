@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.fault_kinds import MASKED
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
@@ -39,7 +38,7 @@ def verdict_sentence(
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
-    if verdict == "unexplained" and silent and before <= AT_NOISE:
+    if verdict == "unexplained" and silent and at_floor:
         return (
             f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
@@ -79,7 +78,7 @@ def evidence(cause: Cause) -> str:
 
 
 def next_run(experiment: Experiment) -> str:
-    """Return what a run would decide, or why none is recommended, as one sentence without its stop."""
+    """Return what a run would decide, or why none is recommended, as one sentence without its full stop."""
     rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
     alike = f"{rivals} do as well on these data"
     if experiment.reason == "other_amplitude":

@@ -41,7 +41,7 @@ def where_figure(profiles: Sequence[Profile], changed: bool, colour: str = BEFOR
 
 
 def finding(profiles: Sequence[Profile]) -> str:
-    """Return the sentence: on what the residual depends most, and where it is largest.
+    """Return a sentence on the signal that the residual depends on most, and where it is largest.
 
     Time comes last: in a sweep it stands for the frequency.
     """

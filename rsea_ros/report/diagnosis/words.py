@@ -1,4 +1,4 @@
-"""What a diagnosis says, in words and numbers for people; page and terminal say the same."""
+"""Words and numbers of a diagnosis, the same for page and terminal."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
@@ -80,7 +79,7 @@ def _verdict(diagnosis: Diagnosis) -> str:
     d, n = diagnosis, diagnosis.channel
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
     silent = [words.channel(name) for name in silent_channels(d.faults)]
-    if d.verdict == "unexplained" and silent and before <= AT_NOISE:
+    if d.verdict == "unexplained" and silent and d.at_noise_floor:
         return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
     if d.verdict == "nothing_wrong" and values_off(d.remarks):
         return "The structure of the simulation fits: with fitted values, only sensor noise is left"

@@ -1,4 +1,4 @@
-"""identification.json: what an identification says, for programs."""
+"""identification.json: an identification for programs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SCHEMA = 1
 
 
 def identification_json(identification: Identification) -> dict[str, Any]:
-    """Return the contents of identification.json. No number in it is infinite or NaN: such are null."""
+    """Return the contents of identification.json; infinite numbers and NaN are null."""
     i = identification
     return {
         "schema": SCHEMA,
@@ -48,7 +48,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
 
 
 def parameter(p: ParameterEstimate) -> dict[str, Any]:
-    """Return a parameter as it stands in the result files."""
+    """Return a parameter for the result files."""
     return {
         "value": finite(p.value),
         "unit": p.unit,

@@ -7,8 +7,8 @@ from html import escape
 
 from rsea_ros.paper.arrangements import Arrangement, Limit
 from rsea_ros.paper.bands import TOLERANCES, Bands
-from rsea_ros.paper.claims import TABLE_2, Claim
-from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.claims import TABLE_2, PaperClaim
+from rsea_ros.paper.finding import PaperFinding
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.paper.rivals import Judged
 from rsea_ros.report import words
@@ -36,8 +36,8 @@ TABLE_1 = (
 )
 
 
-def claims_table(claims: Sequence[Claim]) -> str:
-    """Return printed beside ours with the difference; only what the paper's numbers alone make is counted."""
+def claims_table(claims: Sequence[PaperClaim]) -> str:
+    """Return printed beside our numbers; only results of the paper's own numbers are counted."""
     recomputed = [c for c in claims if c.status == "found"]
     agree = sum(c.agrees for c in recomputed)
     rows = []
@@ -57,7 +57,7 @@ def claims_table(claims: Sequence[Claim]) -> str:
     return section(title, table(head, rows, numbers=(2, 3, 5)), caption=caption)
 
 
-def findings_list(findings: Sequence[Finding]) -> str:
+def findings_list(findings: Sequence[PaperFinding]) -> str:
     """Return where the paper contradicts itself or is silent."""
     counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
     rows = "".join(
@@ -73,7 +73,7 @@ def findings_list(findings: Sequence[Finding]) -> str:
 
 
 def equations_section() -> str:
-    """Return the equations as printed, with what is ours."""
+    """Return the equations as printed, with ours."""
     return section("The equations as printed, and where the equations of motion differ", equation(EQUATIONS))
 
 
@@ -91,7 +91,7 @@ def table_1(drawings: Sequence[tuple[str, str]]) -> str:
 
 
 def table_2(rig_values: Mapping[str, float]) -> str:
-    """Return Table 2 beside what the rigs use."""
+    """Return Table 2 beside the rigs' values."""
     rows = []
     for name, (printed, unit) in TABLE_2.items():
         used = (

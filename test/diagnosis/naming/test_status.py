@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -74,6 +76,14 @@ def test_evidence_against_a_law_lowers_its_probability():
     for name, value in worse.items():
         assert probability(Evidence(**{**vars(RIGHT), name: value}), True) < probability(RIGHT, True), name
     assert set(features(RIGHT, True)) == set(COEFFICIENTS)
+
+
+def test_the_floor_of_the_settings_is_the_floor_of_a_cause():
+    """It was 1.1 times the noise, whatever `floor.reached` said."""
+    near = replace(RIGHT, left=1.2)
+    wider = replace(DEFAULT, floor=replace(DEFAULT.floor, reached=1.3))
+    assert features(near, True)["noise"] == 0.0
+    assert features(near, True, wider)["noise"] == 1.0
 
 
 def score(**ratios):
