@@ -136,11 +136,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     for name, t, y in held:
         channels[name], lost = _channel(name, t, y, mapping.channels[name])
         faults += lost
-    told = [f"{fault.channel}: {fault.detail}" for fault in faults]
+    lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
         *(part.note for part in parts),
-        *told,
+        *lines,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))
 
