@@ -16,7 +16,9 @@ import numpy as np
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
 from rsea_ros.cli._columns import columns
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._output import path
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._ros import need_ros
@@ -57,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wire", action="store_true", help="put the plant behind real wires and use the driver"
     )
-    parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
+    parser.add_argument("--out", type=path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
         "--seed", type=seed, default=1, help="seed of true values, excitation and noise (default 1)"
     )
@@ -108,7 +110,7 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
         disturbances = [f for f in read_record(bag, strict=False).faults if f.kind in DISTURBANCES]
         if not disturbances:
             break
-        print(f"this machine was too busy ({'; '.join(fault_lines(disturbances))}): {consequence}")
+        say(f"this machine was too busy ({'; '.join(fault_lines(disturbances))}): {consequence}", indent=2)
     return bag
 
 

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import positive
-from rsea_ros.cli._output import FOUND, add_force
+from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.new_files import check_free, write_file
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         about = f"rig, model.yaml or name of a rig: {about}"
         targets.add_argument(f"--{name}", *aliases, dest=name, metavar="RIG", help=about)
     add = parser.add_argument
-    add("--out", type=Path, help="file to be written (default the rig's name)")
+    add("--out", type=path, help="file to be written (default the rig's name)")
     add_force(parser)
     effect = "switch an effect on, SI units"
     add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)
@@ -72,7 +73,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(_document(made, rig, out, difference, not_played), indent=2))
     else:
-        print("\n".join(_lines(made, rig, out, difference, not_played)))
+        for line in _lines(made, rig, out, difference, not_played):
+            say(line, indent=4)
     too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in difference)
     return FOUND if too_far else 0
 
