@@ -75,17 +75,17 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
         raise BagError(f"{path}: no such bag")
     if not path.is_dir():
         return [_scan(path, contents)]
-    told = metadata.known(path, contents)
-    files = told.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
+    known = metadata.known(path, contents)
+    files = known.files or sorted(file for file in path.iterdir() if _suffix(file) in SCANNERS)
     if not files:
         raise BagError(f"{path}: no bag, expected a directory with .mcap or .db3 files")
     parts = _scan_all(files, contents)
-    contents.notes.extend(told.remarks.notes)
-    contents.faults.extend(told.remarks.faults)
+    contents.notes.extend(known.remarks.notes)
+    contents.faults.extend(known.remarks.faults)
     read: Counter[str] = Counter()
     for part in parts:
         read.update({topic: len(messages.raw) for topic, messages in part.topics.items()})
-    for topic, expected in told.counts.items():
+    for topic, expected in known.counts.items():
         contents.compare(topic, expected, read[topic], metadata.NAME)
     return parts
 

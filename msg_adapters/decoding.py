@@ -35,9 +35,9 @@ class Decoded:
         Raises BagError where all are damaged.
         """
         damaged: dict[int, str] = {}
-        found = list(blocks(self._messages.raw, self._msgtype, where, damaged))
-        _mark_overlong(found, damaged)
-        for block in found:
+        sorted_blocks = list(blocks(self._messages.raw, self._msgtype, where, damaged))
+        _mark_overlong(sorted_blocks, damaged)
+        for block in sorted_blocks:
             self.stamps[block.rows] = block.stamps()
             for row in block.rows[block.nanoseconds() >= _SECOND].tolist():
                 damaged.setdefault(row, "its stamp has more than a second of nanoseconds")
@@ -47,7 +47,7 @@ class Decoded:
             told.tell("damaged_messages", topic, detail, len(damaged), "messages", share)
         self.sound[:] = True
         self.sound[list(damaged)] = False
-        return found
+        return sorted_blocks
 
     def take(self, block: Block, columns: Mapping[str, FloatArray | None]) -> None:
         """Take the columns that a block of messages has."""

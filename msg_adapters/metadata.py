@@ -50,7 +50,7 @@ def known(bag: Path, contents: Contents) -> Known:
     """
     path = bag / NAME
     try:
-        found = _known(bag, yaml_text.load(path))
+        known_content = _known(bag, yaml_text.load(path))
     except FileNotFoundError:
         contents.notes.append(f"{bag}: without {NAME} (recorder killed?), read from its files")
         return Known()
@@ -60,10 +60,10 @@ def known(bag: Path, contents: Contents) -> Known:
         contents.notes.append(f"{path}: not understood, read from the files beside it")
         contents.tell("damaged_metadata", NAME, f"not understood ({_why(error)}), read without it")
         return Known()
-    for file in found.files:
+    for file in known_content.files:
         if not file.exists():
             raise BagError(f"{path}: names {brief(file.name)}, which is not there")
-    return found
+    return known_content
 
 
 def remarks_in(path: Path, data: bytes) -> Remarks:

@@ -57,24 +57,24 @@ def read_record(
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
     """Make a record of serialised messages, wherever they came from; see read_record."""
     _require(source, contents, topics, strict)
-    told = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
+    report = replace(contents, notes=list(contents.notes), faults=list(contents.faults))
     series: dict[str, Series] = {}
     roles = [role for role in ROLES if role != "ft" or not is_inferred(contents, topics)]
     if len(roles) < len(ROLES):
         made = f"{topics.topic('ft')}: no sensor's, the stiffness of a rig times {topics.topic('deflection')}"
-        told.notes.append(f"{made}; left out")
+        report.notes.append(f"{made}; left out")
     for role in roles:
         messages = contents.topics.get(topics.topic(role))
         if messages is not None and messages.raw:
-            series.update(_series(source, role, messages, topics, told))
+            series.update(_series(source, role, messages, topics, report))
     if strict:
         for one in series.values():
             check_finite(one)
-            note_repeats(one, told.notes)
-    series = on_the_clock_of_the_command(series, told)
-    _require_values(source, series, strict, told)
-    tell_health(contents, told)
-    return _record(series, source, told, strict)
+            note_repeats(one, report.notes)
+    series = on_the_clock_of_the_command(series, report)
+    _require_values(source, series, strict, report)
+    tell_health(contents, report)
+    return _record(series, source, report, strict)
 
 
 def _record(series: Mapping[str, Series], source: str, told: Contents, strict: bool) -> Record:
@@ -88,8 +88,8 @@ def _record(series: Mapping[str, Series], source: str, told: Contents, strict: b
     record = Record(channels, source, epoch, tuple(dict.fromkeys(told.notes)), tuple(told.faults))
     if not strict:
         return record
-    repaired, found = repair_stamps(record)
-    return replace(repaired, faults=(*record.faults, *found))
+    repaired, faults = repair_stamps(record)
+    return replace(repaired, faults=(*record.faults, *faults))
 
 
 def _seconds(nanoseconds: IntArray) -> FloatArray:
@@ -100,10 +100,10 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
     """Refuse a bag without the topics that a record needs, or with others' types under their names."""
     filled = set()
     for role in ROLES:
-        found = contents.topics.get(topics.topic(role), Messages(TYPES[role]))
-        if found.msgtype != TYPES[role]:
+        messages = contents.topics.get(topics.topic(role), Messages(TYPES[role]))
+        if messages.msgtype != TYPES[role]:
             raise BagError(
-                f"{source}: {topics.topic(role)} is {brief(found.msgtype)}, expected {TYPES[role]}"
+                f"{source}: {topics.topic(role)} is {brief(messages.msgtype)}, expected {TYPES[role]}"
             )
         if role in topics.required and topics.topic(role) not in contents.topics:
             near = did_you_mean(topics.topic(role), contents.topics)
@@ -111,7 +111,7 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
                 f"{source}: no topic {brief(topics.topic(role))} for {role}{near}; the bag holds "
                 f"{_held(contents)}"
             )
-        if found.raw:
+        if messages.raw:
             filled.add(role)
     for roles, others in _NEEDED if strict else [(ROLES, ())]:
         if not filled.intersection((*roles, *others)):

@@ -97,12 +97,12 @@ def _in_order(series: Sequence[_Series]) -> Iterator[tuple[int, str, str, bytes]
 def _series(record: Record, topics: TopicMap) -> Iterator[_Series]:
     """Yield the messages of a record; channels of a role that share their stamps share messages."""
     for role, fields in FIELDS.items():
-        there = [channel for channel in fields if channel in record and len(record[channel])]
-        while there:
-            first = there[0]
+        present = [channel for channel in fields if channel in record and len(record[channel])]
+        while present:
+            first = present[0]
             t = record[first].t
-            together = [channel for channel in there if np.array_equal(record[channel].t, t)]
-            there = [channel for channel in there if channel not in together]
+            together = [channel for channel in present if np.array_equal(record[channel].t, t)]
+            present = [channel for channel in present if channel not in together]
             stamps = _stamps(record, first, t)
             values = {fields[channel]: record[channel].y for channel in together}
             yield _Series(topics, role, stamps, np.maximum.accumulate(stamps), values)

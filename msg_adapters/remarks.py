@@ -47,8 +47,8 @@ def _faults(text: str) -> list[Fault]:
         rows = json.loads(text) if text else []
     except (ValueError, RecursionError):
         return []
-    found = [_fault(row) for row in rows[:_MOST]] if isinstance(rows, list) else []
-    return [fault for fault in found if fault is not None]
+    faults = [_fault(row) for row in rows[:_MOST]] if isinstance(rows, list) else []
+    return [fault for fault in faults if fault is not None]
 
 
 def _fault(row: object) -> Fault | None:

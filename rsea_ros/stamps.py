@@ -69,8 +69,8 @@ def repair_stamps(record: Record) -> tuple[Record, list[Fault]]:
         _check_even(channel, f"{record.source}: {name}")
         faults += _dropped(channel, name, int(repeated.sum()))
         channels[name] = channel
-    told = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
-    new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in told]
+    explained = {fault.channel for fault in record.faults if fault.kind in _EXPLAIN_GAPS}
+    new = [fault for fault in faults if fault.kind != "dropped_samples" or fault.channel not in explained]
     return record.with_channels(**channels), new
 
 

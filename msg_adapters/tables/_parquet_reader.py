@@ -31,8 +31,8 @@ def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int]
         raise Refused(f"{rows} rows of {len(places)} columns, expected fewer than {limit} numbers")
     if rows < 2:
         raise Refused(f"{rows} rows, expected a record")
-    found = [_field(place, file.schema_arrow) for place in places]
-    ways = zip(places, found, strict=True)
+    fields = [_field(place, file.schema_arrow) for place in places]
+    ways = zip(places, fields, strict=True)
     parts = (part for place, (name, way) in ways for part in _vectors(file, name, way, place))
     return [rows] * len(places), parts
 

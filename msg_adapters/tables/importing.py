@@ -138,11 +138,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
         if any(term.held for term in mapping.channels[name]):
             channels[name] = _arrivals(name, channels[name])
         faults += lost
-    told = [f"{fault.channel}: {fault.detail}" for fault in faults]
+    lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
         *(part.note for part in parts),
-        *told,
+        *lines,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))
 

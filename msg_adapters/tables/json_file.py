@@ -94,10 +94,10 @@ def _cells(value: Any, way: str) -> Any:
                 return _cells(value[way[:at]], way[at + 1 :])
         raise KeyError(way)
     if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
-        found = [_cell(item, way) for item in value]
-        if all(cell is None for cell in found):
+        cells = [_cell(item, way) for item in value]
+        if all(cell is None for cell in cells):
             raise KeyError(way)
-        return found
+        return cells
     raise KeyError(way)
 
 

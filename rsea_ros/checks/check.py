@@ -57,14 +57,14 @@ def check_record(
             return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
         record = bounded(record if rig.loop is None else commanded(record, rig))
         checked = check(record, rig)
-        found = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
-        found += [*order(record), *rates(record, rig)]
+        every = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
+        every += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
-            found += excitation(checked.record, rig)
-            found += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
-        found += _other_axes(checked, rig, axis, wrench)
-    faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
-    findings = tuple(_of_targets(f) for f in found) if rig.loop is not None else tuple(found)
+            every += excitation(checked.record, rig)
+            every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
+        every += _other_axes(checked, rig, axis, wrench)
+    faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
+    findings = tuple(_of_targets(f) for f in every) if rig.loop is not None else tuple(every)
     return Findings(record.source, rig.name, tuple(dict.fromkeys(findings)), faults)
 
 
@@ -124,20 +124,20 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
                 remedy="cut it with --from and --to",
             )
         ]
-    found = []
+    findings = []
     whole = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) < _WHOLE * len(bad)}
     both = checked.compared if checked.compared is not None else sides(record, rig)
     compared = {n: s for n, s in both.items() if n in whole}
     late = lags(compared)
     if late:
         record = in_step(record, late)
-        found = lag_findings(late, len(compared))
+        findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     readings, matched = _matched(record, compared, rig, axis)
-    found += [*noises(record, rig), *matched]
-    if readings is None or late or _is_elsewhere(found):
-        return found
-    return [*found, *_linearised(checked, rig, readings, values)]
+    findings += [*noises(record, rig), *matched]
+    if readings is None or late or _is_elsewhere(findings):
+        return findings
+    return [*findings, *_linearised(checked, rig, readings, values)]
 
 
 def _matched(
@@ -147,11 +147,11 @@ def _matched(
     related = quotients(compared)
     readings = readings_of(related, rig)
     silent = set(related) - set(readings.channels if readings else ())
-    found = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
-    found += gain_findings(readings, rig, axis) if readings else []
-    found += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
+    findings = strangers([q for n, q in related.items() if n in silent or q.related < _IN_COMMON])
+    findings += gain_findings(readings, rig, axis) if readings else []
+    findings += smoothing_findings(related, 1.0 / record["ft"].rate) if "ft" in record else []
     another = _another(record, compared, rig)
-    return readings, [*another, *(f for f in found if not (another and f.kind == "wrong_rig"))]
+    return readings, [*another, *(f for f in findings if not (another and f.kind == "wrong_rig"))]
 
 
 def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:

@@ -33,14 +33,14 @@ def dead_channels(
     """
     if not is_commanded(record):
         return []
-    found = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
+    constant = {n: _constant(record[n], n, compared.get(n), rig) for n in record.channels if n in MEASURED}
     judged = {} if is_inverse(rig) else quotients(compared)  # a torque also has friction that no motion shows
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
         alone = shows and q.is_unrelated and lag_of(compared[n]) == 0.0
-        if n in found and not found[n] and n not in frozen and alone and not _is_confirmed(record, n):
-            found[n] = "noise that has nothing to do with the command"
-    return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
+        if n in constant and not constant[n] and n not in frozen and alone and not _is_confirmed(record, n):
+            constant[n] = "noise that has nothing to do with the command"
+    return [Fault("dead_channel", n, 1.0, detail) for n, detail in constant.items() if detail]
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:

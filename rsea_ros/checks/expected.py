@@ -63,5 +63,5 @@ def is_full_of_gaps(record: Record) -> bool:
 
 def quotients(compared: Mapping[str, Side]) -> dict[str, Quotient]:
     """Return the quotient of every channel that has one."""
-    found = {n: quotient(n, s.t, s.y, s.p) for n, s in compared.items()}
-    return {n: q for n, q in found.items() if q is not None}
+    by_channel = {n: quotient(n, s.t, s.y, s.p) for n, s in compared.items()}
+    return {n: q for n, q in by_channel.items() if q is not None}

@@ -47,10 +47,10 @@ def check(record: Record, rig: Rig) -> Checked:
     record = _without(record, {n for n, c in record.channels.items() if not len(c)})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
-    masked, found = {}, {}
+    masked, marked = {}, {}
     for name in repaired.channels:
-        masked[name], found[name] = _masked(repaired, name)
-    frozen_ones = {n for n, own in found.items() if any(f.kind == "frozen_samples" for f in own)}
+        masked[name], marked[name] = _masked(repaired, name)
+    frozen_ones = {n for n, own in marked.items() if any(f.kind == "frozen_samples" for f in own)}
     finite = {n: not_finite(c, n) for n, c in repaired.channels.items()}
     filled = _filled(repaired, finite)
     compared = sides(filled, rig) if is_commanded(filled) else {}
@@ -58,7 +58,7 @@ def check(record: Record, rig: Rig) -> Checked:
     repaired = _without(repaired, {f.channel for f in dead})
     known = {(f.kind, f.channel) for f in faults}
     faults += [*clock_faults, *(f for f in dead if (f.kind, f.channel) not in known)]
-    faults += [f for n in repaired.channels for f in found[n]]
+    faults += [f for n in repaired.channels for f in marked[n]]
     masked = {n: bad for n, bad in masked.items() if n in repaired}
     faults += [f for n in rig.sensors if _has_steps(repaired, n) for f in coarse(repaired[n], n, rig)]
     alive = _without(repaired, {n for n, bad in masked.items() if bad.all() and n != "command"})
@@ -80,13 +80,13 @@ def _masked(record: Record, name: str) -> tuple[BoolArray, list[Fault]]:
     for kind, find in FINDERS.items():
         if kind in _WHILE_MOVING and not is_commanded(record):
             continue
-        found = find(channel, name) & ~bad
+        marked = find(channel, name) & ~bad
         if kind in _WHILE_MOVING:
-            found = while_others_moved(record, name, found, kind)
-        share = np.count_nonzero(found) / max(len(found), 1)
+            marked = while_others_moved(record, name, marked, kind)
+        share = np.count_nonzero(marked) / max(len(marked), 1)
         if share > (_SMALLEST_SHARE if kind == "frozen_samples" else 0.0):
             faults.append(Fault(kind, name, share))
-            bad |= found
+            bad |= marked
     return bad, faults
 
 
@@ -134,8 +134,8 @@ def outliers(channel: Channel, name: str) -> BoolArray:
     steps = np.abs(np.diff(channel.y))
     least = float(np.nanmedian(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     alone = (channel.y > around[:, -3]) | (channel.y < around[:, 2])
-    found: BoolArray = alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least))
-    return found
+    marked: BoolArray = alone & (np.abs(channel.y - middle) > _SPIKE * np.maximum(spread, least))
+    return marked
 
 
 def clipping(channel: Channel, name: str) -> BoolArray:

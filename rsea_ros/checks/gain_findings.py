@@ -27,8 +27,8 @@ RIGHT_RIG = "is this the right rig? name another with --rig, or another joint wi
 
 def gain_findings(readings: Readings, rig: Rig, axis: str) -> list[Finding]:
     """Return findings for each channel's sign and scale, and for the rig. axis: of the wrench now."""
-    found = [f for r in readings.channels.values() for f in _of_channel(r, axis)]
-    return [*found, *_of_rig(readings.applied, rig)]
+    findings = [f for r in readings.channels.values() for f in _of_channel(r, axis)]
+    return [*findings, *_of_rig(readings.applied, rig)]
 
 
 def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
@@ -49,9 +49,9 @@ def strangers(quotients: Sequence[Quotient]) -> list[Finding]:
 
 
 def _of_channel(r: Reading, axis: str) -> list[Finding]:
-    found = []
+    findings = []
     if r.sign < 0.0:
-        found.append(
+        findings.append(
             Finding(
                 "red",
                 "sign",
@@ -65,7 +65,7 @@ def _of_channel(r: Reading, axis: str) -> list[Finding]:
         )
     if r.factor is not None:
         meant = " or ".join(f.meaning for f in (r.factor, *r.also))
-        found.append(
+        findings.append(
             Finding(
                 "red",
                 "scale",
@@ -77,8 +77,8 @@ def _of_channel(r: Reading, axis: str) -> list[Finding]:
                 remedy=_unit(r.channel, r.factor),
             )
         )
-    if r.odd or not found:
-        found.append(
+    if r.odd or not findings:
+        findings.append(
             Finding(
                 "red" if r.odd else "green",
                 "wrong_rig" if r.odd else "scale",
@@ -90,7 +90,7 @@ def _of_channel(r: Reading, axis: str) -> list[Finding]:
                 remedy=RIGHT_RIG if r.odd else "",
             )
         )
-    return found
+    return findings
 
 
 def _turn(channel: str, axis: str) -> str:
@@ -108,14 +108,14 @@ def _unit(channel: str, factor: Factor) -> str:
 
 def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
     """Return how far the rig is from the machine: its values, and the shape of its response."""
-    found = []
+    findings = []
     for name, value in shape.values.items():
         factor, reach = value / rig[name] if rig[name] else 1.0, shape.reach[name]
         times = max(factor, 1.0 / max(factor, 1e-12))
         soft = name.endswith("damping")
         if times > (_FAR if soft else _MOVED) and reach > _ELSEWHERE and shape.told[name] > _TOLD:
             light: Light = "red" if times > _FAR and not soft else "amber"
-            found.append(
+            findings.append(
                 Finding(
                     light,
                     "wrong_rig",
@@ -130,7 +130,7 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
     for name, error in shape.error.items():
         if error > _STRANGE:
             far = error > _FOREIGN and not rig.rigid_spring
-            found.append(
+            findings.append(
                 Finding(
                     "red" if far else "amber",
                     "wrong_rig",
@@ -142,8 +142,8 @@ def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
                     remedy=RIGHT_RIG,
                 )
             )
-    if not found:
-        found.append(
+    if not findings:
+        findings.append(
             Finding("green", "wrong_rig", "", None, "", detail=f"the response has the shape of {rig.name}")
         )
-    return found
+    return findings

@@ -77,16 +77,16 @@ def _tried(fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient],
     signs = _signs(fit)
     free = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
     command, signs, gains = _command_apart(fit.channels, signs, free.gain)
-    found = {n: _named(n, signs[n], gains[n], rig) for n in fit.channels}
+    by_channel = {n: _named(n, signs[n], gains[n], rig) for n in fit.channels}
     if command is not None:
-        found["command"] = _named("command", command[0], command[1], rig)
-    elif any(r.odd for r in found.values()):
-        found = _in_a_unit_of_the_command(signs, gains, rig) or found
-    applied = fit.fit({n: _prior(n, found) for n in fit.channels})
+        by_channel["command"] = _named("command", command[0], command[1], rig)
+    elif any(r.odd for r in by_channel.values()):
+        by_channel = _in_a_unit_of_the_command(signs, gains, rig) or by_channel
+    applied = fit.fit({n: _prior(n, by_channel) for n in fit.channels})
     shaped = float(np.median(list(applied.error.values()))) < SHAPED
     if not shaped or applied.cost > plain.cost - _BETTER:
         return Readings({n: Reading(n, 1.0, None, plain.gain[n]) for n in fit.channels}, plain, plain)
-    return Readings({n: _believed(r, quotients, applied) for n, r in found.items()}, plain, applied)
+    return Readings({n: _believed(r, quotients, applied) for n, r in by_channel.items()}, plain, applied)
 
 
 def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: FittedShape) -> Reading:

@@ -35,8 +35,8 @@ _SHORTEST = 4.0
 
 def lags(compared: Mapping[str, Side]) -> dict[str, float]:
     """Return the lag of every channel that clearly comes later (positive) or earlier than predicted, s."""
-    found = {n: lag_of(side) for n, side in compared.items()}
-    return {n: lag for n, lag in found.items() if abs(lag) > NEAR}
+    lag_by_channel = {n: lag_of(side) for n, side in compared.items()}
+    return {n: lag for n, lag in lag_by_channel.items() if abs(lag) > NEAR}
 
 
 def lag_of(side: Side) -> float:

@@ -81,8 +81,8 @@ def _setting(
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
     record, masked = _cut(record, masked, begin, end)
-    told = channels_that_tell(record, rig)
-    timed = tuple(n for n in SENSED if n in told)  # a held motor torque shows no clock
+    informative = channels_that_tell(record, rig)
+    timed = tuple(n for n in SENSED if n in informative)  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
     state = LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))

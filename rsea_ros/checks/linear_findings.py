@@ -24,11 +24,11 @@ def clock_findings(linear: Linear, duration: float) -> list[Finding]:
     """Return offset and drift of every sensor's stamps against the command's. duration: of the record, s."""
     if not linear.settled:
         return [Finding("green", "clock_offset", "", detail="not determined beside what the rig leaves")]
-    found = []
+    findings = []
     for name, offset in linear.offset.items():
-        found.append(_offset(name, offset, linear))
-        found.append(_drift(name, linear.drift[name], linear, duration))
-    return found
+        findings.append(_offset(name, offset, linear))
+        findings.append(_drift(name, linear.drift[name], linear, duration))
+    return findings
 
 
 def _offset(name: str, offset: Number, linear: Linear) -> Finding:

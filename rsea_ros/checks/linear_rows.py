@@ -133,12 +133,12 @@ def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence
 
 def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> FloatArray:
     """Return the RMS over noise of each channel's residual, without bias and gain."""
-    found = []
+    misfits = []
     for k in range(m):
         columns, here = plain[of == k], residual[of == k]
         left = here - columns @ np.linalg.lstsq(columns, here, rcond=None)[0]
-        found.append(float(np.sqrt(np.mean(left**2))))
-    return np.array(found)
+        misfits.append(float(np.sqrt(np.mean(left**2))))
+    return np.array(misfits)
 
 
 def rows_of(setting: LinearSetting, left: Left, known: Slope | None = None) -> Rows:
@@ -149,8 +149,9 @@ def rows_of(setting: LinearSetting, left: Left, known: Slope | None = None) -> R
     moved = known.matrix
     t = _of_rows(case, case.t, setting.timed)
     of_channel = (left.of == np.arange(len(setting.timed))[:, None]).astype(float).T
-    own = [moved[:, n:] * (t - setting.start)[:, None]]
-    own += [of_channel * column[:, None] for column in left.plain.T]
+    columns = [moved[:, n:] * (t - setting.start)[:, None]]
+    columns += [of_channel * column[:, None] for column in left.plain.T]
     weight = 1.0 / np.maximum(left.misfit, _LEAST_MISFIT)[left.of]
     block = np.floor((t - t.min()) / min(BLOCK, case.duration / _BLOCKS)).astype(np.int64)
-    return Rows(left, known, left.residual * weight, np.column_stack([moved, *own]) * weight[:, None], block)
+    matrix = np.column_stack([moved, *columns]) * weight[:, None]
+    return Rows(left, known, left.residual * weight, matrix, block)

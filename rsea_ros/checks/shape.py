@@ -110,8 +110,8 @@ class ShapeFit:
             right = slope.T @ (weight * here) + (theta - centre) / doubt**2
             step = -np.linalg.lstsq(normal, right, rcond=None)[0]
             trials = [(theta + share * step) for share in (1.0, 0.3, 0.1)]
-            found = ((at, r, cost_of(r, at)) for at in trials for r in [self._residual(at, sign)])
-            better = next((t for t in found if t[2] < cost), None)
+            trial = ((at, r, cost_of(r, at)) for at in trials for r in [self._residual(at, sign)])
+            better = next((t for t in trial if t[2] < cost), None)
             if better is None:
                 break
             done = cost - better[2] < max(1e-3 * cost, 0.01)
@@ -153,10 +153,10 @@ class ShapeFit:
 
         Phases wrap: a fit that began far off would stop in another minimum.
         """
-        found = np.zeros(len(self.channels))
-        for k in range(len(found)):
-            found[k] = _DELAYS[int(np.argmin(self._phase_costs(self._of == k, sign)))]
-        return found
+        trial = np.zeros(len(self.channels))
+        for k in range(len(trial)):
+            trial[k] = _DELAYS[int(np.argmin(self._phase_costs(self._of == k, sign)))]
+        return trial
 
     def _phase_costs(self, of: BoolArray, sign: FloatArray) -> FloatArray:
         turned = np.exp(2j * np.pi * np.outer(_DELAYS, self._frequency[of])) * (sign * self._value)[of]

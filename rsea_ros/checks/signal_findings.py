@@ -88,7 +88,7 @@ def band(record: Record) -> tuple[float, float]:
 
 def noises(record: Record, rig: Rig) -> list[Finding]:
     """Return the noise of every sensor beside the rig's. record: finite values, rising stamps."""
-    found = []
+    findings = []
     for name, sensor in rig.sensors.items():
         if name not in record or "command" not in record or len(record[name]) < 64:
             continue
@@ -96,7 +96,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
         noise = noise_floor(record, name, sensor)
         loud = stated > 0.0 and min(noise, _rough(record[name])) > _LOUD * stated and name != "motor_torque"
         unit = UNITS[name]
-        found.append(
+        findings.append(
             Finding(
                 "amber" if loud else "green",
                 "noise",
@@ -108,7 +108,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
                 remedy="look at cable and filter, or state this noise in the rig" if loud else "",
             )
         )
-    return found
+    return findings
 
 
 def _rough(channel: Channel) -> float:

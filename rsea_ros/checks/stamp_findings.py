@@ -134,11 +134,11 @@ def natural_frequency(rig: Rig) -> float | None:
 
 def order(record: Record) -> list[Finding]:
     """Return the channels whose stamps go back."""
-    found = []
+    findings = []
     for name, channel in record.channels.items():
         back = int(np.count_nonzero(np.diff(channel.t) < 0.0))
         if back:
-            found.append(
+            findings.append(
                 Finding(
                     "amber",
                     "order",
@@ -150,4 +150,4 @@ def order(record: Record) -> list[Finding]:
                     remedy=_REMEDIES["out_of_order"],
                 )
             )
-    return found
+    return findings

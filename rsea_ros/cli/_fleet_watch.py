@@ -51,7 +51,7 @@ def _look(args: argparse.Namespace, held: list[Held], at_first: bool) -> int:
     summary = worked(args, args.store, held)
     if summary.rows:
         print(summary.sentence(), flush=True)
-    told = tell_alarms(open_store(args.store)) if summary.rows or at_first else []
-    for alarm in told:
+    alarms = tell_alarms(open_store(args.store)) if summary.rows or at_first else []
+    for alarm in alarms:
         print(f"alarm: {alarm.text}: {alarm.file}", flush=True)
-    return len(told)
+    return len(alarms)

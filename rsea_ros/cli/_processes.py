@@ -86,8 +86,8 @@ class Processes:
         stop([self._running.pop(node) for node in nodes])
 
     def _share(self, node: str) -> float:
-        found = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
-        return int(found[-1]) / 100.0 if found else 0.0
+        shares = re.findall(rb"\b(\d+)%", self.log(node).read_bytes())
+        return int(shares[-1]) / 100.0 if shares else 0.0
 
     def _failure(self, node: str, what: str) -> RseaError:
         """Return an error with the last line of a node."""

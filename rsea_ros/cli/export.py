@@ -68,14 +68,14 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or Path(f"{rig.name}{suffix}")
     check_free([out], force=args.force, inputs=[source])
     made = _exporters(args)[target](rig)
-    found, not_played = _played(made, rig, args)
+    difference, not_played = _played(made, rig, args)
     write_file(out, made.content, force=args.force)
     if args.json:
-        print(json.dumps(_document(made, rig, out, found, not_played), indent=2))
+        print(json.dumps(_document(made, rig, out, difference, not_played), indent=2))
     else:
-        for line in _lines(made, rig, out, found, not_played):
+        for line in _lines(made, rig, out, difference, not_played):
             say(line, indent=4)
-    too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in found)
+    too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in difference)
     return FOUND if too_far else 0
 
 
@@ -114,12 +114,12 @@ def _played(made: Export, rig: Rig, args: argparse.Namespace) -> tuple[tuple[Dif
         command = _excitation(rig, args, RATE)
         try:
             theirs = players[made.target](made.content, rig, command)
-            found = differences(rig, ours(rig, command, RATE), theirs)
-            why = "" if found else "the rig states no sensor noise, expected sensors.ft.noise or another"
+            difference = differences(rig, ours(rig, command, RATE), theirs)
+            why = "" if difference else "the rig states no sensor noise, expected sensors.ft.noise or another"
         except ParameterError as error:
-            found, why = (), str(error)
-        if found:
-            return found, ""
+            difference, why = (), str(error)
+        if difference:
+            return difference, ""
     if args.limit is not None:
         raise ParameterError(f"--limit {args.limit:g}: not played: {why}")
     return (), why

@@ -79,13 +79,13 @@ def _print(result: Identification, report: Path) -> None:
     for line in fault_lines(result.faults):
         say(f"data: {line}", indent=6)
     show(terminal_table(result, None))
-    found = statics_sentences(result.statics) if result.statics else ()
+    sentences = statics_sentences(result.statics) if result.statics else ()
     off, others = split_off_rig(result.remarks)
     ask = [right_rig(str(report.parent / MODEL))] if off else []
     for sentence in (
         *remark_sentences(off),
         *ask,
-        *found,
+        *sentences,
         *doubt_sentences(result),
         *remark_sentences([*others, *result.clocks]),
     ):

@@ -52,17 +52,17 @@ def margins(design: Design, spreads: Mapping[str, float] | None = None, seed: in
     inertia = r.inertia * draw["inertia"]
     inner = inertia + design.unit.spin * draw["rotor"]
     theta, limit = np.degrees(mechanism.deflection(k_s, r.torque)), float(np.degrees(r.deflection))
-    found = [
+    demands = [
         ("Bandwidth by Eq. (7)", "Hz", undamped_band(k_s, inertia), r.bandwidth, True),
         ("Bandwidth with the rotor's spin", "Hz", undamped_band(k_s, inner), r.bandwidth, True),
         ("Torque that the mechanism carries", "N m", mechanism.largest_torque(k_s), r.torque, True),
         ("Deflection", "deg", np.where(np.isnan(theta), np.inf, theta), limit, False),
         ("Peak torque of motor and gear", "N m", design.unit.strongest * draw["motor"], r.torque, True),
     ]  # fmt: skip
-    met = [values >= limit if least else values <= limit for _, _, values, limit, least in found]
+    met = [values >= limit if least else values <= limit for _, _, values, limit, least in demands]
     rows = [
         Margin(name, unit, _percentiles(values), limit, float(ok.mean()))
-        for (name, unit, values, limit, _), ok in zip(found, met, strict=True)
+        for (name, unit, values, limit, _), ok in zip(demands, met, strict=True)
     ]
     together = float(np.logical_and.reduce(met).mean())
     return (*rows, Margin("All at once", "", (np.nan, np.nan, np.nan), np.nan, together))

@@ -65,8 +65,8 @@ def effect_named(name: str) -> Effect:
 
 def look_alikes(name: str, effects: Iterable[Effect]) -> list[Effect]:
     """Return those of some effects that are said to be confused with one, from either side."""
-    own = effect_named(name).claims.confusable_with
-    return [e for e in effects if e.name in own or name in e.claims.confusable_with]
+    confused = effect_named(name).claims.confusable_with
+    return [e for e in effects if e.name in confused or name in e.claims.confusable_with]
 
 
 @lru_cache(maxsize=1)

@@ -90,8 +90,8 @@ def _sine(
     )
     rig = true.rig_at(true.if_there())
     for _ in range(3):
-        found = of_command(command, rate) | of_response(command, motion(rig, command, rate))
-        share = used(found, limits)
+        peaks = of_command(command, rate) | of_response(command, motion(rig, command, rate))
+        share = used(peaks, limits)
         if share <= 1.0:
             break
         command = command * (0.98 / share if np.isfinite(share) else 0.3)

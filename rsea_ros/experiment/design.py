@@ -125,7 +125,7 @@ def _per_second(
 def _final(judge: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = judge.asked, judge.hypotheses
-    command, found = held(judge.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
+    command, reached = held(judge.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
     responses = judge.responses(command, is_quick=False)
     table = _with_refits(judge, command, separations(hypotheses, responses))
     names = tuple(h.name for h in hypotheses)
@@ -135,7 +135,7 @@ def _final(judge: ShapeRater, shape: Shape, length: float, apart: BoolArray, tri
     energy = float(np.sum(command**2) / asked.rate)
     share = decided(table, judge.probability, apart) if k > 1 else 1.0
     return Proposal(
-        shape, length, asked.rate, command, names, table, pairs, share, narrow, found, tried,
+        shape, length, asked.rate, command, names, table, pairs, share, narrow, reached, tried,
         energy,
     )  # fmt: skip
 
@@ -149,9 +149,9 @@ def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[Fl
     low, high, best = math.log(_SMALLEST), 0.0, None
     scale = high
     for _ in range(_BISECTIONS):
-        found = peaks(math.exp(scale) * command, asked.rate, groups)
-        if share_used(found, asked.limits) <= 1.0:
-            low, best = scale, (math.exp(scale) * command, found)
+        reached = peaks(math.exp(scale) * command, asked.rate, groups)
+        if share_used(reached, asked.limits) <= 1.0:
+            low, best = scale, (math.exp(scale) * command, reached)
         else:
             high = scale
         if best is not None and high - low < 0.05:
@@ -161,7 +161,7 @@ def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[Fl
         raise ParameterError(
             "no run keeps the limits for all that the bench may be, expected wider limits: at a share of "
             f"{_SMALLEST:g} still "
-            + ", ".join(f"{n} {found.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.stated().items())
+            + ", ".join(f"{n} {reached.at_level[n]:.4g} of {v:g}" for n, v in asked.limits.stated().items())
         )
     return best
 

@@ -33,8 +33,8 @@ def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
     with_it = rig.with_effects(*rig.effects, EffectSetting(name, effect.complete(effect.null)))
     free = unknowns_of_effect(effect, effect.typical, rig.known)
     parameters = {f"{name}.{p.name}": p for p in effect.parameters}
-    own = tuple(_doubted(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
-    return Problem(tuple(cases), with_it, (*nominal, *own), MEASURED, stated=stated)
+    doubted = tuple(_doubted(u, parameters[u.name], u.name == f"{name}.{effect.main.name}") for u in free)
+    return Problem(tuple(cases), with_it, (*nominal, *doubted), MEASURED, stated=stated)
 
 
 def _doubted(unknown: Unknown, parameter: Parameter, is_size: bool) -> Unknown:

@@ -76,14 +76,14 @@ def refitted(true: Hypothesis, rival: Hypothesis, case: Case, run: Map = serial)
         step = -np.linalg.solve(slope.T @ slope + known, right)
         for _ in range(4):
             trial = np.clip(theta + step, low, high)
-            there = problem.residual(trial)
-            paid = power(there) + float((trial - start) @ known @ (trial - start))
+            shifted = problem.residual(trial)
+            paid = power(shifted) + float((trial - start) @ known @ (trial - start))
             if paid < cost:
                 break
             step = 0.3 * step
         else:
             break
-        fallen, theta, residual, cost = cost - paid, trial, there, paid
+        fallen, theta, residual, cost = cost - paid, trial, shifted, paid
         if fallen < 0.01 * cost:
             break
     return Refit(cost, power(residual))
@@ -106,7 +106,7 @@ def sharpened(hypothesis: Hypothesis, seen: Response) -> float:
 
     Half the logarithm of the ratio of the determinants of their information after and before.
     """
-    own = hypothesis.own or list(range(len(hypothesis.theta)))
-    before = np.linalg.inv(hypothesis.information)[np.ix_(own, own)]
-    after = np.linalg.inv(hypothesis.information + seen.slope.T @ seen.slope)[np.ix_(own, own)]
+    indices = hypothesis.own or list(range(len(hypothesis.theta)))
+    before = np.linalg.inv(hypothesis.information)[np.ix_(indices, indices)]
+    after = np.linalg.inv(hypothesis.information + seen.slope.T @ seen.slope)[np.ix_(indices, indices)]
     return 0.5 * float(np.linalg.slogdet(before)[1] - np.linalg.slogdet(after)[1])

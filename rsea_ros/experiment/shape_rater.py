@@ -47,8 +47,8 @@ class ShapeRater:
         """Return the share of the limits that a command uses at the likeliest values."""
         rate = self.asked.rate
         rig = hypothesis.rig_at(hypothesis.if_there())
-        found = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
-        return used(found, self.asked.limits)
+        peaks = of_response(command, motion(rig, command, rate)) | of_command(command, rate)
+        return used(peaks, self.asked.limits)
 
     def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
         """Return the prediction of each hypothesis for a command."""

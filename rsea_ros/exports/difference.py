@@ -51,11 +51,11 @@ def differences(
     rig: Rig, mine: Mapping[str, FloatArray], theirs: Mapping[str, FloatArray]
 ) -> tuple[Difference, ...]:
     """Return the difference of each channel whose noise the rig states, N samples against N."""
-    found = []
+    differences_found = []
     for name in CHANNELS:
         noise = rig.sensors[name].noise if name in rig.sensors else 0.0
         if noise > 0.0 and name in mine and name in theirs:
             apart = float(np.sqrt(np.mean((theirs[name] - mine[name]) ** 2)))
             apart = apart if math.isfinite(apart) else math.inf
-            found.append(Difference(name, UNITS[name], apart, float(np.std(mine[name])), noise))
-    return tuple(found)
+            differences_found.append(Difference(name, UNITS[name], apart, float(np.std(mine[name])), noise))
+    return tuple(differences_found)

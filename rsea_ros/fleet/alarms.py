@@ -46,10 +46,10 @@ def tell_alarms(store: Store) -> list[Told]:
 
 def _new(store: Store, folder: Path) -> Iterator[Told]:
     try:
-        found = alarms(history(store.path), recordings(store.path))
+        present = alarms(history(store.path), recordings(store.path))
     except FleetError:  # no row yet
         return
-    for alarm in found:
+    for alarm in present:
         file = folder / f"{alarm.joint}-{hashlib.sha256(alarm.key.encode()).hexdigest()[:12]}.json"
         with suppress(OutputError):
             write_text(file, json.dumps(webhook(alarm), indent=1, allow_nan=False, ensure_ascii=False) + "\n")

@@ -47,16 +47,16 @@ def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
     row |= {"time": run.time, "temperature": run.temperature, "duration": float(record.stop - record.start)}
     row |= {"excitation": excitation(record), "faults": faults(record.faults)}
     require_motion(record)
-    found = check_record(bounded(record), rig, joint.topics.axis)
-    row["faults"] = faults(found.faults)
-    result = identify([with_faults(_fit_for_fit(run, rig), found, masks=False)], rig)
+    findings = check_record(bounded(record), rig, joint.topics.axis)
+    row["faults"] = faults(findings.faults)
+    result = identify([with_faults(_fit_for_fit(run, rig), findings, masks=False)], rig)
     row |= identified(result)
     files = {
         IDENTIFICATION_JSON: json_text(identification_json(result)),
         MODEL: rig_text(result.rig),
     }
     if joint.diagnose == "always" or (joint.diagnose == "misfit" and result.verdict == "misfit"):
-        files |= _diagnosed(row, with_faults(record, found, masks=True), rig)
+        files |= _diagnosed(row, with_faults(record, findings, masks=True), rig)
     return files
 
 

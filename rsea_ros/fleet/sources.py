@@ -45,11 +45,11 @@ def bags_of(sources: Iterable[str], joints: Sequence[Joint]) -> list[tuple[Bag, 
         files |= _files(source)
     tables = [joint for joint in joints if joint.table is not None]
     others = [joint for joint in joints if joint.table is None]
-    found = [(bag, tuple(j for j in others if j.is_in(bag.url))) for bag in _bags(files)]
+    bags = [(bag, tuple(j for j in others if j.is_in(bag.url))) for bag in _bags(files)]
     if tables:
         placed = ((bag, tuple(j for j in tables if j.is_in(bag.url))) for bag in _all(files))
-        found += [(bag, held) for bag, held in placed if held]
-    return sorted(found, key=lambda item: item[0].url)
+        bags += [(bag, held) for bag, held in placed if held]
+    return sorted(bags, key=lambda item: item[0].url)
 
 
 def relisted(bag: Bag) -> Bag:
@@ -123,14 +123,14 @@ def _files(source: str) -> dict[str, Mapping[str, Any]]:
         roots = [inner] if files.exists(inner) else files.glob(inner)
         if not roots:
             raise FleetError(f"{source}: no such file or folder, expected recordings")
-        found: dict[str, Mapping[str, Any]] = {}
+        bags: dict[str, Mapping[str, Any]] = {}
         for root in roots:
-            found |= files.find(root, detail=True)
+            bags |= files.find(root, detail=True)
     except OSError as error:
         raise FleetError(f"{source}: {error.strerror or error}") from None
     if _is_local(files):
-        return {path: info for path, info in found.items() if not _is_hidden(path)}
-    return {files.unstrip_protocol(path): info for path, info in found.items() if not _is_hidden(path)}
+        return {path: info for path, info in bags.items() if not _is_hidden(path)}
+    return {files.unstrip_protocol(path): info for path, info in bags.items() if not _is_hidden(path)}
 
 
 def _parts(url: str) -> dict[str, Mapping[str, Any]]:

@@ -53,16 +53,16 @@ class Bank:
         """Return the evidence of a look."""
         by_channel = [whitened(observer, look) for observer in self._observers]
         p, n = len(self._steps), len(CHANNELS)
-        found = LookEvidence(np.zeros((n, p)), np.zeros((n, p, p)), np.zeros(n), np.zeros(n))
+        evidence = LookEvidence(np.zeros((n, p)), np.zeros((n, p, p)), np.zeros(n), np.zeros(n))
         for channel in range(n):
             w = np.array([each[channel] for each in by_channel])
             w = w[:, np.isfinite(w).all(axis=0)]
             weight = np.minimum(1.0, HEAVY / np.maximum(np.abs(w[0]), 1e-9))
             d = (w[1:] - w[0]) / self._steps
-            found.score[channel] = -(d * weight) @ w[0]
-            found.information[channel] = (d * weight) @ d.T
-            found.squares[channel], found.counts[channel] = float(w[0] @ (weight * w[0])), w.shape[1]
-        return found
+            evidence.score[channel] = -(d * weight) @ w[0]
+            evidence.information[channel] = (d * weight) @ d.T
+            evidence.squares[channel], evidence.counts[channel] = float(w[0] @ (weight * w[0])), w.shape[1]
+        return evidence
 
 
 def whitened(observer: BatchObserver, look: Look) -> tuple[FloatArray, ...]:

@@ -48,11 +48,11 @@ class Estimates:
 
     def take(self, score: FloatArray, information: FloatArray, phi: FloatArray) -> None:
         """Process a look: c (p,), A (p, p), dispersion (p,)."""
-        own = np.diag(information) / phi
-        self._held = own < self._prior
-        told = own / np.maximum(self._information / MEMORY, np.maximum(own, 1e-300))
-        forget = 1.0 - told / MEMORY
-        self._information = forget * self._information + own
+        single = np.diag(information) / phi
+        self._held = single < self._prior
+        learnt = single / np.maximum(self._information / MEMORY, np.maximum(single, 1e-300))
+        forget = 1.0 - learnt / MEMORY
+        self._information = forget * self._information + single
         self._score = forget * self._score + score / phi
 
     def hold(self) -> None:

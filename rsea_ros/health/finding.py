@@ -33,11 +33,11 @@ def unexplained(since: float, share: float) -> HealthFinding:
 
 def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[HealthFinding]:
     """Return the findings on the sensors themselves. jumps: of the stamps. late: samples left out."""
-    found = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
-    found += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
+    findings = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
+    findings += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
     counts = {"no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}
-    told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    return [*found, _plain("RSEA_BAD_DATA", told, math.nan)] if told else found
+    counted = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+    return [*findings, _plain("RSEA_BAD_DATA", counted, math.nan)] if counted else findings
 
 
 def _plain(code: str, name: str, since: float) -> HealthFinding:

@@ -61,30 +61,30 @@ class ChangeHypothesis:
 
 def hypotheses_of(rig: Rig, period: float) -> tuple[ChangeHypothesis, ...]:
     """Return the possible changes of a joint. period: s, between measurements."""
-    found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
-    found.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
-    found.append(_friction(rig))
+    hypotheses = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
+    hypotheses.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
+    hypotheses.append(_friction(rig))
     delay = _effect(rig, "command_delay", "delay", "RSEA_DELAY", 0.25, 0.5 * period, period)
-    found.append(replace(delay, grain=period))
+    hypotheses.append(replace(delay, grain=period))
     gain = _effect(rig, "torque_constant_error", "gain", "RSEA_TORQUE_CONSTANT", 0.0, 0.05, 0.05)
-    found.append(replace(gain, doubt=GAIN_DOUBT))
+    hypotheses.append(replace(gain, doubt=GAIN_DOUBT))
     if not rig.rigid_spring:
-        found.append(_field(rig, "spring.stiffness", "RSEA_STIFFNESS", 0.05))
+        hypotheses.append(_field(rig, "spring.stiffness", "RSEA_STIFFNESS", 0.05))
         if rig.ft_end == "spring_end":
-            found.append(_effect(rig, "backlash", "gap", "RSEA_BACKLASH", 0.25, 1e-3, 2e-3))
+            hypotheses.append(_effect(rig, "backlash", "gap", "RSEA_BACKLASH", 0.25, 1e-3, 2e-3))
     if "ft" in rig.sensors and not rig.rigid_spring:
         sigma = max(rig.sensors["ft"].noise, rig.sensors["ft"].quantum)
         gain = _effect(rig, "ft_gain_error", "gain", "RSEA_FT_GAIN", 0.0, 0.03, 0.05)
-        found.append(replace(gain, doubt=GAIN_DOUBT))
-        found.append(_effect(rig, "ft_bias", "bias", "RSEA_FT_BIAS", 0.0, 10.0 * sigma, 10.0 * sigma))
-    return tuple(h for h in found if h is not None)
+        hypotheses.append(replace(gain, doubt=GAIN_DOUBT))
+        hypotheses.append(_effect(rig, "ft_bias", "bias", "RSEA_FT_BIAS", 0.0, 10.0 * sigma, 10.0 * sigma))
+    return tuple(h for h in hypotheses if h is not None)
 
 
 def nuisances_of(rig: Rig) -> tuple[ChangeHypothesis, ...]:
     """Return parameters without a code that may be slightly wrong in the model: inertia, spring damping."""
     names = ["rotor.reflected_inertia", *([] if rig.rigid_spring else ["spring.damping"])]
-    found = (_field(rig, name, "", 0.1) for name in names)
-    return tuple(h for h in found if h is not None)
+    hypotheses = (_field(rig, name, "", 0.1) for name in names)
+    return tuple(h for h in hypotheses if h is not None)
 
 
 def _friction(rig: Rig) -> ChangeHypothesis:

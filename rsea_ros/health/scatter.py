@@ -52,8 +52,8 @@ def scatter_of(looks: Sequence[LookEvidence]) -> Scatter:
 
 def _loudness(evidence: LookEvidence) -> FloatArray:
     """Return the logarithm of the mean square by channel; zero for a missing one."""
-    there = evidence.counts > 0.0
-    mean = np.where(there, evidence.squares, 1.0) / np.where(there, evidence.counts, 1.0)
+    present = evidence.counts > 0.0
+    mean = np.where(present, evidence.squares, 1.0) / np.where(present, evidence.counts, 1.0)
     assert len(mean) == len(CHANNELS)
     loudness: FloatArray = np.log(np.maximum(mean, 1e-12))
     return loudness

@@ -84,11 +84,11 @@ class Fitter:
         weights = np.exp(np.clip(gains - gains.max(), -700.0, 0.0))
         shares = (weights / weights.sum()).tolist()
         explained = [(excess + usual - f.cost) / max(excess, 1.0) for f in fits]
-        found = [
+        candidates = [
             ChangeCause(f.hypothesis, f.change, _interval(f, phi), share, part, f.cost)
             for f, share, part in zip(fits, shares, explained, strict=True)
         ]
-        return sorted(found, key=lambda cause: -cause.probability)
+        return sorted(candidates, key=lambda cause: -cause.probability)
 
     def now(self) -> float:
         """Return the cost of the unchanged rig on the looks; zero without any."""

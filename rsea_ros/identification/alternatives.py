@@ -81,8 +81,8 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[A
 def _fitted(solution: Solution, effect: Effect, run: Map) -> Solution | None:
     """Return the fit with one more effect; None where the rig cannot have it."""
     try:
-        there = extended(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
-        return solve(*there, iterations=_ITERATIONS, run=run)
+        problem_and_start = extended(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
+        return solve(*problem_and_start, iterations=_ITERATIONS, run=run)
     except RseaError:
         return None
 

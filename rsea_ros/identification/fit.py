@@ -83,12 +83,12 @@ def _changed(before: Sequence[Case], after: Sequence[Case]) -> bool:
 
 def _better_start(problem: Problem, start: Rig | None, run: Map) -> FloatArray:
     """Return the coordinates of `start` where the residual is smaller there than at the rig's own values."""
-    own = start_vector(problem.unknowns)
+    stated = start_vector(problem.unknowns)
     if start is None:
-        return own
+        return stated
     other = vector_of(problem.unknowns, start)
-    costs = [float(r @ r) for r in run(lambda k: problem.residual((own, other)[k]), (0, 1))]
-    return other if costs[1] < costs[0] else own
+    costs = [float(r @ r) for r in run(lambda k: problem.residual((stated, other)[k]), (0, 1))]
+    return other if costs[1] < costs[0] else stated
 
 
 def unknowns_of(rig: Rig, cases: Sequence[Case]) -> tuple[Unknown, ...]:

@@ -38,7 +38,7 @@ def joint_start(record: Record, rig: Rig) -> Rig:
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return rig
     load = rig["spring_end.inertia"] + rig["chassis.inertia"]
-    found = {
+    coefficients = {
         INERTIA: max(inertia - load, _LEAST * rig[INERTIA]),
         DAMPING: max(damping, _LEAST * rig[DAMPING]),
         GRAVITY: math.hypot(sine, cosine),
@@ -46,8 +46,8 @@ def joint_start(record: Record, rig: Rig) -> Rig:
     }
     free = rig.free()
     if GRAVITY in free and ANGLE not in free:
-        found[GRAVITY] = max(sine, 0.0)
-    return rig.with_values({n: v for n, v in found.items() if n in free and math.isfinite(v)})
+        coefficients[GRAVITY] = max(sine, 0.0)
+    return rig.with_values({n: v for n, v in coefficients.items() if n in free and math.isfinite(v)})
 
 
 def _regression(record: Record, rig: Rig) -> FloatArray:

@@ -58,6 +58,6 @@ def _stretch(command: FloatArray, lag: int) -> Periods | None:
         return None
     longest = int(np.argmax(stops - starts))
     count = int((stops[longest] - starts[longest]) // lag + 1)
-    found = Periods(int(stops[longest] + lag - count * lag), lag, count)
-    period = command[found.first : found.first + lag]
-    return found if np.ptp(period) > _MOVES * np.std(command) else None
+    periods = Periods(int(stops[longest] + lag - count * lag), lag, count)
+    period = command[periods.first : periods.first + lag]
+    return periods if np.ptp(period) > _MOVES * np.std(command) else None

@@ -143,5 +143,5 @@ class Identification:
         if not self.at_noise or self.silent:
             return "misfit"
         physical = [p for p in self.parameters if not p.name.startswith(CLOCKS)]
-        told = any(p.is_told for p in physical)
-        return "adequate" if told or not physical else "not_identifiable"
+        is_any_determined = any(p.is_told for p in physical)
+        return "adequate" if is_any_determined or not physical else "not_identifiable"

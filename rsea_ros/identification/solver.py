@@ -80,10 +80,10 @@ def jacobian_columns(
         step = _DIFFERENCE * unknown.scale
         beyond = theta[i] + step > unknown.inner(unknown.high)
         moved[i] += -step if beyond else step
-        there = problem.residual(moved)
-        if power(there) == np.inf:
+        shifted = problem.residual(moved)
+        if power(shifted) == np.inf:
             return np.zeros(len(residual))
-        return np.asarray((there - residual) / (moved[i] - theta[i]))
+        return np.asarray((shifted - residual) / (moved[i] - theta[i]))
 
     columns = dict(zip(others, run(column, others), strict=True))
     if clocks:

@@ -186,13 +186,13 @@ def clock_rates(channels: Iterable[str]) -> tuple[Unknown, ...]:
 def apply(rig: Rig, unknowns: Sequence[Unknown], theta: FloatArray) -> tuple[Rig, Clocks]:
     """Return the rig with the values of theta, effects included, and the clocks of its sensors."""
     values = {u.name: u.outer(float(t)) for u, t in zip(unknowns, theta, strict=True)}
-    own = {n: v for n, v in values.items() if n in FIELDS}
+    of_rig = {n: v for n, v in values.items() if n in FIELDS}
     offset, rate = (
         {u.name.split(".")[1]: values[u.name] for u in unknowns if u.is_clock and u.is_rate == of_rate}
         for of_rate in (False, True)
     )
     effects = tuple(_moved(e, values) for e in rig.effects)
-    return rig.with_values(own).with_effects(*effects), Clocks(offset, rate)
+    return rig.with_values(of_rig).with_effects(*effects), Clocks(offset, rate)
 
 
 def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting:

@@ -58,11 +58,11 @@ def missing_torque(
     spectra = {n: np.fft.rfft(answer[n], size) for n in used}
     seen = {n: np.fft.rfft(_on_grid(case, residual[n], n, drive.start + t), size) for n in used}
     noise = {n: case.noise[n] ** 2 for n in used}
-    told: FloatArray = np.sum([np.abs(spectra[n]) ** 2 / noise[n] for n in used], axis=0)
+    information: FloatArray = np.sum([np.abs(spectra[n]) ** 2 / noise[n] for n in used], axis=0)
     right = np.sum([np.conj(spectra[n]) * seen[n] / noise[n] for n in used], axis=0)
-    prior = _prior(right, told, count)
-    d = right / (told + 1.0 / prior)
-    variance = 1.0 / (told + 1.0 / prior)
+    prior = _prior(right, information, count)
+    d = right / (information + 1.0 / prior)
+    variance = 1.0 / (information + 1.0 / prior)
     torque = np.fft.irfft(d, size)[:count]
     answers = {n: np.fft.irfft(d * np.fft.rfft(a, size), size)[:count] for n, a in answer.items()}
     return MissingTorque(t, torque, float(np.sqrt(np.mean(variance))), answers)

@@ -38,8 +38,8 @@ class FindingsPublisher:
 
     def publish(self) -> None:
         """Publish now."""
-        found = self._findings()
-        rows = [self._row(code.name, [f for f in found if f.code == code.name]) for code in TABLE]
+        findings = self._findings()
+        rows = [self._row(code.name, [f for f in findings if f.code == code.name]) for code in TABLE]
         self._publisher.publish(statuses_message(time.time_ns(), rows, self._joint))
 
     def _row(self, code: str, found: Sequence[HealthFinding]) -> Row:

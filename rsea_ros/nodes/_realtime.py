@@ -70,9 +70,9 @@ def raise_priority(first: threading.Thread, priority: int) -> None:
     ParameterError where the system does not permit it.
     """
     for thread in _threads():
-        own = priority if thread == first.native_id else max(1, priority - 1)
+        level = priority if thread == first.native_id else max(1, priority - 1)
         try:
-            _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, own)
+            _schedule(thread, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, level)
         except PermissionError as error:
             raise ParameterError(
                 f"parameter realtime_priority = {priority}: {error.strerror}, expected a user who may"

@@ -116,8 +116,8 @@ class HealthNode:
 
     def _report(self) -> Report:
         monitor, inputs = self._monitor, self._inputs
-        found = monitor.findings()
-        troubles = [f"{f.code}: {sentence(f)}" for f in found]
+        findings = monitor.findings()
+        troubles = [f"{f.code}: {sentence(f)}" for f in findings]
         if time.monotonic() - self._heard > SILENT:
             missing = [name for name, count in inputs.counts.items() if not count]
             troubles.append(f"nothing to judge, expected {' and '.join(missing) or 'joint_states and ft'}")

@@ -57,5 +57,5 @@ def _decibel(rig: Rig, hz: FloatArray) -> FloatArray:
 def _sharpened(hz: FloatArray, at: int, cost: Callable[[float], float]) -> float:
     """Return the minimum of a cost over log frequency, between the neighbours of a grid point."""
     low, high = (math.log(hz[k]) for k in (max(at - 1, 0), min(at + 1, len(hz) - 1)))
-    found = minimize_scalar(lambda x: cost(math.exp(x)), bounds=(low, high), method="bounded")
-    return math.exp(found.x)
+    best = minimize_scalar(lambda x: cost(math.exp(x)), bounds=(low, high), method="bounded")
+    return math.exp(best.x)

@@ -50,8 +50,8 @@ class Guarded(RequestHandler):
 
     def write_error(self, status_code: int, **more: Any) -> None:
         """Say it in a line."""
-        told = "open the address that rsea watch printed: it has the token"
-        self.finish(f"{status_code}: {told if status_code == 403 else self._reason}\n")
+        message = "open the address that rsea watch printed: it has the token"
+        self.finish(f"{status_code}: {message if status_code == 403 else self._reason}\n")
 
 
 class Front(Guarded):

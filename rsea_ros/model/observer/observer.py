@@ -121,10 +121,10 @@ class Observer:
             t += self._delay
         elif not t < self._newest:
             self._newest = t
-        there = receive(
+        has_estimate = receive(
             self._handle, self._rest, self._reads_load, self._hold, t, kind, a, b, self._estimate
         )
-        return Estimate._make(self._estimate.tolist()) if there else None
+        return Estimate._make(self._estimate.tolist()) if has_estimate else None
 
 
 def observe(observer: Observer, record: Record) -> tuple[FloatArray, FloatArray]:

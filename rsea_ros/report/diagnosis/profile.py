@@ -46,11 +46,11 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
     residuals = [((o[channel].measured - o[channel].simulated) / noise)[counted] for o in (before, after)]
     if counted.sum() < _FEWEST:
         return ()
-    found = []
+    shown = []
     for what, unit, values, equal in _respects(diagnosis, before, here):
         edges = edges_of(values[counted], BINS, equal=equal)
-        found.append(Profile(what, unit, edges, *(rms_in(edges, values[counted], r) for r in residuals)))
-    return tuple(found)
+        shown.append(Profile(what, unit, edges, *(rms_in(edges, values[counted], r) for r in residuals)))
+    return tuple(shown)
 
 
 def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
