@@ -70,7 +70,7 @@ def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) ->
     torque = cause["parameters"]["torque"]
     noise = torque["statistical_ci95"][1] - torque["value"]
     assert 0.0 < noise < torque["ci95"][1] - torque["value"]
-    assert np.hypot(noise, 1.96 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    assert np.hypot(noise, 1.959964 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
     assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
 
 
