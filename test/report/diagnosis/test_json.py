@@ -68,9 +68,9 @@ def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) ->
     """The simulation's 0.25 % dominated nearly every interval, and neither file nor page said so."""
     (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
     torque = cause["parameters"]["torque"]
-    noise = torque["statistical_ci95"][1] - torque["value"]
-    assert 0.0 < noise < torque["ci95"][1] - torque["value"]
-    assert np.hypot(noise, 1.959964 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    noise, both = (torque[interval][1] - torque["value"] for interval in ("statistical_ci95", "ci95"))
+    assert 0.0 < noise < both
+    assert np.hypot(noise, 1.959964 * torque["model_sd"]) == pytest.approx(both)
     assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
 
 
