@@ -142,7 +142,7 @@ def test_impossible_commands_change_nothing_and_are_reported(bench):
     count = len(bench.states)
     told = bench.listener.until(lambda: _values(bench.health[-1]).get("refused_commands") == "2")
     assert told and all(m.effort[0] == 0.0 for m in bench.states[count:])
-    assert any("2 joints (a, b), expected one" in line for line in bench.process.output)
+    assert any("2 joints (a, b), expected 'joint' once" in line for line in bench.process.output)
 
 
 def test_diagnostics_give_period_and_command_age(bench):
