@@ -18,13 +18,13 @@ IN_TIME = 0.8
 """Of a period: so long a driver waits for both replies."""
 
 
-def wire_alone(rate: float, priority: int, folder: Path, bench: RemoteBench) -> str:
-    """Run the two requests of each cycle and nothing else; return what came of it, in words."""
+def wire_alone(rate: float, priority: int, folder: Path, bench: RemoteBench) -> tuple[int, str]:
+    """Run the two requests of each cycle and nothing else; return the faults and what came of it in words."""
     cycles = BareLoop(rate, ALONE, folder, priority, bench.port).cycles()
     limit = limits_of({p.name: p.default for p in TABLE} | {"rate": rate}).lost_cycles
     late, longest, faults = outcome(cycles, rate, limit)
     told = f"{late:.1%} of the cycles late, longest {longest:.1f} ms without an answer"
-    return f"{told}: {faults} faults no_reply"
+    return faults, f"{told}: {faults} faults no_reply"
 
 
 def outcome(cycles: np.ndarray, rate: float, limit: int) -> tuple[float, float, int]:

@@ -45,6 +45,10 @@ class Outcome:
         return self.kind in FAULTS
 
 
+Play = Callable[[Path, bytes, int], Outcome]
+"""Reads the bytes of a file in a folder, the n-th of its format."""
+
+
 def limit_child(seconds: int = SECONDS) -> None:
     """Put the ceilings on this process, counted from now."""
     limit_seconds(seconds)

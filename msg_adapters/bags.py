@@ -18,6 +18,8 @@ SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
 }
 PACKED = ".zstd"
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq")
+"""Suffixes of files that `rsea import` converts."""
 
 BagPath = str | Path
 
@@ -110,7 +112,8 @@ def _suffix(file: Path) -> str:
 def _scan(file: Path, contents: Contents) -> Contents:
     """Return the contents of a file; its notes and faults are added to those of the bag."""
     if _suffix(file) not in SCANNERS:
-        raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file")
+        table = f"; a table becomes a bag by rsea import {file} --map MAP" if _suffix(file) in TABLES else ""
+        raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file{table}")
     if file.stat().st_size == 0:
         raise BagError(f"{file}: empty file")
     part = Contents(contents.wanted)

@@ -18,7 +18,7 @@ from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 from rsea_ros.stamps import far_apart, in_order, repair_stamps, stray_fault
-from rsea_ros.wording import brief
+from rsea_ros.wording import brief, did_you_mean
 
 _MOST_NAMED = 20
 """Topics or joints that a message lists."""
@@ -45,8 +45,13 @@ def read_record(
     """
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
-    contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
-    return record_from(contents, source, topics, strict=strict)
+    try:
+        contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
+        return record_from(contents, source, topics, strict=strict)
+    except MemoryError:
+        raise BagError(
+            f"{source}: needs more memory than this process may have: split it, or record fewer topics"
+        ) from None
 
 
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
@@ -100,18 +105,27 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             raise BagError(
                 f"{source}: {topics.topic(role)} is {brief(found.msgtype)}, expected {TYPES[role]}"
             )
+        if role in topics.required and topics.topic(role) not in contents.topics:
+            near = did_you_mean(topics.topic(role), contents.topics)
+            raise BagError(
+                f"{source}: no topic {brief(topics.topic(role))} for {role}{near}; the bag holds "
+                f"{_held(contents)}"
+            )
         if found.raw:
             filled.add(role)
     for roles, others in _NEEDED if strict else [(ROLES, ())]:
         if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)
-            topics_held = sorted(contents.topics.items())[:_MOST_NAMED]
-            have = ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics_held)
-            have = have or "no topic at all"
             raise BagError(
-                f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}; "
+                f"{source}: no message on {wanted}; the bag holds {_held(contents)}{contents.told()}; "
                 "record one, or name its topic with --topic or --namespace"
             )
+
+
+def _held(contents: Contents) -> str:
+    """Return the topics of a bag with their types, for a message."""
+    topics = sorted(contents.topics.items())[:_MOST_NAMED]
+    return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
 
 
 def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:

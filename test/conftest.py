@@ -40,7 +40,7 @@ def _take_domain() -> int:
 
 
 if os.environ.get("PYTEST_XDIST_WORKER", "gw0") != "gw0":  # what computes makes way for what must be in time
-    os.nice(10)
+    os.nice(5)
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(_take_domain())

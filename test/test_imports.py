@@ -14,7 +14,7 @@ MODULES = sorted(path for top in ("rsea_ros", "msg_adapters") for path in (ROOT 
 
 YAML = {"units", "decimal_number", "checked", "strict_yaml", "keys"}
 FILES = {"interrupts", "locked_folder", "replaced", "files", "staging", "new_files", "processes"}
-FACTS = {"errors", "fault_kinds", "normal", "signals", "stamps", "version"}
+FACTS = {"errors", "fast_length", "fault_kinds", "normal", "signals", "stamps", "version"}
 BASE = FACTS | {"progress", "wording", "plugins"} | FILES | YAML
 CORE = BASE | {"effects", "model", "identification", "checks", "diagnosis", "control", "design"}
 AROUND = {"laws", "experiment", "health", "trends", "exports"}
@@ -23,6 +23,7 @@ OWN = {
     "signals": {"errors", "arrays"},
     "stamps": {"errors", "signals"},
     "fault_kinds": set(),
+    "fast_length": set(),
     "normal": set(),
     "progress": set(),
     "wording": set(),

@@ -15,6 +15,8 @@ from rsea_ros.signals import MEASURED, Channel, Fault, Record
 
 _VISIBLE = 3.0
 """Times the sensor's noise: a smaller signal than that may well be lost in it."""
+_CONFIRMED = 0.5
+"""Correlation of a speed with the rate of the position, far above what noise has by chance, either sign."""
 _SHOWS = 0.3
 """Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
 
@@ -36,7 +38,7 @@ def dead_channels(
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
         alone = shows and q.is_unrelated and lag_of(compared[n]) == 0.0
-        if n in found and not found[n] and n not in frozen and alone:
+        if n in found and not found[n] and n not in frozen and alone and not _is_confirmed(record, n):
             found[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
 
@@ -48,6 +50,17 @@ def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
     if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
         return ""
     return f"constant at {channel.y[0]:.4g}"
+
+
+def _is_confirmed(record: Record, name: str) -> bool:
+    """Return whether position and velocity agree: one is the rate of the other, whatever the rig says."""
+    if name not in ("position", "velocity") or not {"position", "velocity"} <= record.channels.keys():
+        return False
+    position, velocity = record["position"], record["velocity"]
+    rate = np.interp(velocity.t, position.t, np.gradient(position.y, position.t))
+    if not (np.std(rate) > 0.0 and np.std(velocity.y) > 0.0):
+        return False
+    return bool(abs(np.corrcoef(rate, velocity.y)[0, 1]) > _CONFIRMED)
 
 
 def _noise(rig: Rig, name: str) -> float:

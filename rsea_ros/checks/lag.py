@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from numpy.fft import irfft, rfft
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
+from rsea_ros.fast_length import next_fast_length
 from rsea_ros.signals import Channel, FloatArray, Record
 
 REACH = 2.0
@@ -57,7 +58,7 @@ def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> t
     """Return lags (s) within the reach, and the size of the correlation of y with p earlier by each."""
     y, p = y - y.mean(), p - p.mean()
     most = int(reach / period)
-    size = next_fast_len(len(y) + most)
+    size = next_fast_length(len(y) + most)
     both = irfft(rfft(y, size) * rfft(p, size).conj(), size)
     alike = np.abs(np.concatenate([both[-most:], both[: most + 1]]))
     scale = float(np.linalg.norm(y) * np.linalg.norm(p))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.fft import rfft, rfftfreq
+from numpy.fft import rfft, rfftfreq
 
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.motion import at_rest
@@ -82,7 +82,7 @@ def band(record: Record) -> tuple[float, float]:
     even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)
     frequency, power = rfftfreq(len(even), 1.0 / command.rate), np.abs(rfft(even - even.mean())) ** 2
     share = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    low, high = (float(frequency[min(np.searchsorted(share, q), len(share) - 1)]) for q in _BAND)
+    low, high = (float(frequency[min(int(np.searchsorted(share, q)), len(share) - 1)]) for q in _BAND)
     return low, high
 
 

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._output import path
 from rsea_ros.cli._runs import RIG
 from rsea_ros.errors import ParameterError
 from rsea_ros.hardware.peer.bus import Bus
@@ -34,7 +35,7 @@ PLANT_RATE = 10_000.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the verb's arguments."""
     add = parser.add_argument
-    add("--port", type=Path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
+    add("--port", type=path, default=Path("rsea-bench-tty"), help="name of the link to the pseudo-terminal")
     add("--model", type=int, nargs="+", default=[54024], choices=sorted(MODELS), metavar="NUMBER",
         help="number of the motor; several form a line with the IDs 1, 2, …, the sensor on the first")
     add("--rig", default=RIG, help="rig of the plant: a name in config/rigs, or a file")

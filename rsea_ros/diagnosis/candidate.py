@@ -40,8 +40,8 @@ class Candidate:
 
     @property
     def newest(self) -> str:
-        """Name of the effect that was added last. Raises IndexError for the nominal model."""
-        return self.causes[-1]
+        """Name of the effect that was added last; empty where it was removed, and for the nominal model."""
+        return self.problem.newest
 
     @property
     def size(self) -> int:
@@ -62,7 +62,7 @@ class Candidate:
     def is_at_bound(self) -> bool:
         """Whether the main parameter of the newest effect is at its bound, so that it is not that effect."""
         near = self.settings.acceptance.near_bound
-        return bool(self.causes) and is_at_bound(self.solution, self.newest, near)
+        return bool(self.newest) and is_at_bound(self.solution, self.newest, near)
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,7 @@ class Evaluated:
     @property
     def added(self) -> str:
         """Name of the effect that the model adds to the one before; empty for the nominal model."""
-        added = self.solution.problem.added
-        return added[-1] if added else ""
+        return self.solution.problem.newest
 
     @cached_property
     def confidence(self) -> Confidence:

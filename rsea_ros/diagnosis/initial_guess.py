@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.residual_peaks import (
 )
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
-from rsea_ros.effects.signal_table import ROTOR_ANGLE
+from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
 from rsea_ros.identification.machine_scale import LARGEST, torque_size
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
@@ -47,6 +47,8 @@ _LIMITS = (1.0, 0.9, 0.7)
 
 def initial_guesses(effect: Effect, view: RecordView) -> list[Guess]:
     """Return the guesses from which fits of an effect begin; empty where it has nothing to act on."""
+    if view.rigid_spring and effect.port is Port.SPRING:
+        return []
     is_torque = effect.main.unit == "N m" and ROTOR_ANGLE not in effect.reads
     if view.is_joint and is_torque:
         return joint_guesses(effect, torque_size(view.case, view.rig))

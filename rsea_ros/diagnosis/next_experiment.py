@@ -59,7 +59,7 @@ def separating(
     """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
-        "other_amplitude", accepted.problem.added[-1], tuple(r.problem.added[-1] for r in rivals)
+        "other_amplitude", accepted.problem.newest, tuple(r.problem.newest for r in rivals)
     )
     if not isinstance(case.drive, Drive):
         return undecided

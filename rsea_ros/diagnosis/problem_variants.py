@@ -50,7 +50,9 @@ def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Prob
     """Return a problem without one of its effects, and theta without its parameters."""
     keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-    return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+    newest = "" if problem.newest == name else problem.newest
+    unknowns = tuple(problem.unknowns[i] for i in keep)
+    return replace(problem, rig=rig, unknowns=unknowns, newest=newest), theta[keep]
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:

@@ -18,6 +18,7 @@ import numpy as np
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.inverse import Motion
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -80,11 +81,9 @@ def missing_torque(
 
     outputs: simulated channels of the case. None without a position, or for a free housing.
     """
-    if (
-        not isinstance(case.drive, Drive)
-        or "position" not in case.measured
-        or "housing_end" not in rig.clamped
-    ):
+    if isinstance(case.drive, Motion):
+        return _along(case.drive, case, outputs)
+    if "position" not in case.measured or "housing_end" not in rig.clamped:
         return None
     t, q = case.t["position"], residual_of(case, outputs, "position")
     v = _residual_at(t, case, outputs, "velocity", np.gradient(q, t))
@@ -96,10 +95,18 @@ def missing_torque(
     return case.measured["position"][1:-1][keep], torque[keep]
 
 
+def _along(
+    motion: Motion, case: Case, outputs: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the angles of a measured motion (rad), and the torque that its motor did not need there, N m."""
+    keep = case.mask["motor_torque"]
+    return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
+
+
 def _residual_at(
     t: FloatArray, case: Case, outputs: Mapping[str, FloatArray], channel: str, otherwise: FloatArray
 ) -> FloatArray:
-    """Return the residual of a channel at stamps t, s; otherwise, shape of t, where it was not measured."""
+    """Return the residual of a channel at the stamps t, s; `otherwise`, shape of t, without that channel."""
     if channel not in case.measured:
         return otherwise
     return np.interp(t, case.t[channel], residual_of(case, outputs, channel))

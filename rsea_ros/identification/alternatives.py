@@ -56,7 +56,8 @@ def extended(
 ) -> tuple[Problem, FloatArray]:
     """Return the present problem with one more effect whose parameters may move, and its start."""
     unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
-    problem = replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
+    rig = with_effect(present.rig, effect.name, start)
+    problem = replace(present, rig=rig, unknowns=unknowns, newest=effect.name)
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 

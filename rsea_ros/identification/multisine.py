@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import rfft
+from numpy.fft import rfft
 
 from rsea_ros.identification.lines import Lines, widened
 from rsea_ros.identification.periodicity import Periods

@@ -188,6 +188,7 @@ class Problem:
     """Records, the rig, and the unknowns. channels: of the residual.
 
     stated: names of the effects that belong to the nominal rig; a search adds others beside them.
+    newest: name of the effect that the search added last; empty for none.
     """
 
     cases: tuple[Case, ...]
@@ -196,6 +197,7 @@ class Problem:
     channels: tuple[str, ...]
     ride: bool = False
     stated: frozenset[str] = frozenset()
+    newest: str = ""
 
     @property
     def acting(self) -> tuple[str, ...]:

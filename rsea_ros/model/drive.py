@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -59,10 +59,15 @@ class Drive:
     whole: float = math.nan
     jumps: bool = True
 
-    @property
+    @cached_property
     def kinks(self) -> FloatArray:
         """Command by step where velocities have a kink: nowhere for one that does not jump."""
         return self.command if self.jumps else np.zeros(len(self.command))
+
+    @cached_property
+    def impulsive(self) -> frozenset[str]:
+        """The channels that are read where the held command has brought more or less than its mean."""
+        return frozenset(n for n, impulse in self.impulse.items() if impulse.any())
 
     @property
     def drift_time(self) -> float:

@@ -178,6 +178,11 @@ class Rig:
         sensor = self.sensors.get(channel, Sensor())
         return sensor.clock + 1e-6 * sensor.clock_rate * since
 
+    def is_on_time(self, channel: str) -> bool:
+        """Return whether a channel is read when its stamps say."""
+        sensor = self.sensors.get(channel)
+        return sensor is None or sensor.clock == sensor.clock_rate == 0.0
+
     def clock_doubt(self, channel: str) -> float:
         """Return one sigma of the error of a channel's clock beside `clock`, s."""
         return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT

@@ -106,11 +106,19 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
-    since = {n: drive.origin + drive.step * drive.at[n] for n in channels}
-    at = {n: drive.at[n] + rig.clock(n, since[n]) / drive.step for n in channels}
-    kinks = drive.kinks
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
-    return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
+    at = {n: _instants(rig, drive, n) for n in channels}
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.kinks) for n in channels}
+    for n in drive.impulsive.intersection(channels):
+        sampled[n] += _kick(machine, n) * drive.impulse[n]
+    return sampled
+
+
+def _instants(rig: Rig, drive: Drive, channel: str) -> FloatArray:
+    """Return when a channel is read, in steps since the start of the drive."""
+    at = drive.at[channel]
+    if rig.is_on_time(channel):
+        return at
+    return np.asarray(at + rig.clock(channel, drive.origin + drive.step * at) / drive.step)
 
 
 def _kick(machine: Machine, channel: str) -> float:

@@ -14,6 +14,20 @@ from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_names
 
 
+def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, capsys):
+    (tmp_path / "run.csv").write_text("t,u\n0,1\n")
+    assert cli.main(["diagnose", str(tmp_path / "run.csv")]) == 2
+    assert f"rsea import {tmp_path}/run.csv --map MAP" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["identify x", "diagnose x", "export --mjcf x", "watch"])
+def test_an_empty_name_is_no_folder(words, capsys):
+    """It was the working directory, where the results were written."""
+    with pytest.raises(SystemExit) as end:
+        cli.main([*words.split(), "--out", ""])
+    assert end.value.code == 2 and "'', expected a name" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "suggestion"),
     [

@@ -248,3 +248,11 @@ def test_the_test_verb_hands_its_arguments_to_pytest():
 
 def test_the_test_verb_returns_the_status_of_pytest():
     assert run_python("-m", "rsea_ros", "test", "-n", "0", "test/cli/no_such_file.py").returncode == 4
+
+
+@pytest.mark.parametrize("name", ["stdin", "stdout", "stderr"])
+def test_a_standard_stream_that_the_parent_closed_is_the_null_device(name, monkeypatch):
+    monkeypatch.setattr(sys, name, None)
+    assert cli.main(["maps"]) == 0
+    with getattr(sys, name) as stream:
+        assert stream.name == os.devnull

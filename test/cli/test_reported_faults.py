@@ -79,7 +79,7 @@ def run(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", DAMAGE)
-def test_every_verb_reports_damage_alike_and_the_intervals_hold(run, tmp_path, capsys, name):
+def test_verbs_report_damage_alike_and_the_intervals_hold(run, tmp_path, capsys, name):
     """Seven such bags gave intervals that missed the truth without a word."""
     damage, kind = DAMAGE[name]
     bag, truth = str(write(tmp_path / "a.mcap", damage(run))), load_rig(RIG)

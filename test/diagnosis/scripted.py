@@ -48,7 +48,8 @@ def problem(*causes, stated=()):
     rig = RIG.with_effects(*(EffectSetting(n, dict(effect_named(n).typical)) for n in names))
     moved = [f"{n}.{p.name}" for n in causes for p in effect_named(n).parameters]
     unknowns = (unknown("prior", doubt=1.0), *map(unknown, moved))
-    return Problem((), rig, unknowns, ("ft",), stated=frozenset(stated))
+    newest = causes[-1] if causes else ""
+    return Problem((), rig, unknowns, ("ft",), stated=frozenset(stated), newest=newest)
 
 
 @dataclass

@@ -11,7 +11,7 @@ from foreign import run_rows, write_foreign
 from mcap_bytes import McapFile, chunk, write
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
-from msg_adapters import compression, read_record
+from msg_adapters import compression, read_record, reading
 from msg_adapters.bags import read_contents
 from rsea_ros.errors import BagError
 
@@ -187,3 +187,15 @@ def test_messages_that_all_differ_in_layout_are_sorted_once(monkeypatch):
     found = list(cdr.blocks(raw, "sensor_msgs/msg/JointState", "here"))
     assert sorted(int(row) for block in found for row in block.rows) == list(range(400))
     assert sum(compared) <= 400 * 32
+
+
+def test_a_bag_beyond_the_memory_is_refused_in_one_line(tmp_path, monkeypatch):
+    """12 million messages of ten minutes at 8 kHz ended in the last net."""
+
+    def full(*arguments, **options):
+        raise MemoryError
+
+    bag = write(tmp_path / "a.mcap", McapFile().file())
+    monkeypatch.setattr(reading, "record_from", full)
+    with pytest.raises(BagError, match=r"a\.mcap: needs more memory than .*: split it, or record fewer"):
+        read_record(bag)

@@ -12,6 +12,7 @@ from foreign import EPOCH, joint_state, make, run_rows, wrench, write_foreign
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from msg_adapters import TopicMap, iterate, read_record
+from rsea_ros.errors import BagError
 
 MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 COUNT = 50
@@ -82,6 +83,14 @@ def test_other_topic_names_and_unrelated_topics_are_read(tmp_path):
     bag = write_foreign(tmp_path / "bag", rows)
     topics = TopicMap(namespace="lab/knee").renamed(["ft=/wrist/wrench"])
     assert_is_the_run(read_record(bag, topics=topics))
+
+
+@pytest.mark.parametrize("strict", [True, False])
+def test_a_topic_that_was_named_must_be_in_the_bag(tmp_path, strict):
+    """Without it a record without F/T torque was identified, and nobody was told."""
+    bag = write_foreign(tmp_path / "bag", run_rows(COUNT))
+    with pytest.raises(BagError, match=r"no topic /rsea/fft for ft, did you mean /rsea/ft\?; the bag holds"):
+        read_record(bag, topics=TopicMap().renamed(["ft=fft"]), strict=strict)
 
 
 def test_split_bags_and_several_files_are_one_run(tmp_path):
