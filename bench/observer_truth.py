@@ -1,9 +1,9 @@
 """A bench that is simulated, with the true torques on both ends, got without the observer's output equations.
 
-T_h is what the load on the housing's end feels, from its motion: T_h = -(J w' + b w + K q); where that end is
-clamped, from the momentum of what is between the ends: T_h = T_s + (J_sc + n J_r) q_c''. Means over each of
-the last two steps before a stamp (0.45 ms at most), drawn on to it. T_s: the spring, its effects included.
-A spring before the housing's end is read instead. Which of the two is T_d, the rig says.
+T_h is what the load on the housing's end feels, from its motion: T_h = -(J w' + b w + K q + m g l sin(q));
+where that end is clamped, from the momentum of what is between the ends: T_h = T_s + (J_sc + n J_r) q_c''.
+Means over each of the last two steps before a stamp (0.45 ms at most), drawn on to it. T_s: the spring, its
+effects included. A spring before the housing's end is read instead. Which of the two is T_d, the rig says.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def true_run(rig: Rig, command: FloatArray, rate: float, seed: int = 0) -> Truth
     """Simulate a rig on a command (N m, one a sample) and return what was measured and what was true."""
     count = max(2, steps_per_sample(1.0 / rate))
     h, n = 1.0 / rate / count, len(command)
-    machine, placement = build(rig, h, n / rate), mechanics(structured(rig)).placement
+    machine, changed = build(rig, h, n / rate), structured(rig)
+    placement = mechanics(changed).placement
     out, rows = np.empty((count, 4)), np.empty((n, 4))
     spring, housing, sprung = np.empty(n), np.empty(n), math.isfinite(rig["proximal_spring.stiffness"])
     for k, torque in enumerate(command):
@@ -45,7 +46,7 @@ def true_run(rig: Rig, command: FloatArray, rate: float, seed: int = 0) -> Truth
             before, held = machine.x.copy(), _spring(machine)
             run(machine, np.full(1, torque), out[i : i + 1], start=k / rate + i * h)
             mean = 0.5 * (held + _spring(machine))
-            means.append(_housing(rig, placement, before, machine.x, h, mean))
+            means.append(_housing(changed, placement, before, machine.x, h, mean))
         rows[k], spring[k] = out[-1], _spring(machine)
         housing[k] = means[-1] if sprung else 1.5 * means[-1] - 0.5 * means[-2]
     t, rng = np.arange(n) / rate, np.random.default_rng(seed)
@@ -77,5 +78,8 @@ def _housing(
         return float(rig["proximal_spring.stiffness"] * twist + rig["proximal_spring.damping"] * turn)
     if not rig.end_is_free("housing_end"):
         return spring + inner_inertia(rig) * float(rate[C])
-    inertia, damping, stiffness = (rig[f"housing_end.{name}"] for name in ("inertia", "damping", "stiffness"))
-    return -float(inertia * rate[P] + damping * speed[P] + stiffness * angle[P])
+    inertia, damping, stiffness, weight, hanging = (
+        rig[f"housing_end.{name}"] for name in ("inertia", "damping", "stiffness", "gravity", "gravity_angle")
+    )
+    held = stiffness * angle[P] + weight * math.sin(angle[P] + hanging)
+    return -float(inertia * rate[P] + damping * speed[P] + held)

@@ -2,8 +2,9 @@
 
 Run: python bench/torque_control.py [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
 Sections: trials (all that is asked, the worst of the set beside the nominal; the whole set swept), followed
-(5 Hz on every simulated bench of the set), impedance (the outer loop), late (samples that come when they
-come), baselines (docs/baselines.md), cost. Through real nodes: bench/torque_control_nodes.py.
+(5 Hz on every simulated bench of the set), free (a free load, unknown, by frequency and amplitude, without
+and with an encoder on the link), impedance (the outer loop), link (what that encoder is worth), late (samples
+that come when they come), baselines (docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
 """
 
 from __future__ import annotations
@@ -22,15 +23,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.torque_control_baselines import baselines
 from rsea_ros.cli.control import motors
-from rsea_ros.control.controller import Reading, TorqueController
+from rsea_ros.control.controller import Limits, Reading, TorqueController
 from rsea_ros.control.harness import Arrivals, irregular
 from rsea_ros.control.human import measured
 from rsea_ros.control.impedance import moved
-from rsea_ros.control.loads import LOCKED, load_range
+from rsea_ros.control.large_signal import largest
+from rsea_ros.control.link import link_share
+from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import Design, design
-from rsea_ros.control.trials import hardest, tracked
+from rsea_ros.control.trials import LEARNED, LONG, hardest, sine, tracked
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -69,6 +72,35 @@ def followed(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     for found in designs(rig, loads, rates):
         for case in hardest(loads, every=True):
             yield f"{found.rate:g} Hz, {case}: {100.0 * tracked(loads[LOCKED], loads, case, found):.2f} %"
+
+
+def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Follow sines on the free load, which the controller does not know, at what the motor can do there."""
+    loads = load_range(rig, free)
+    for found in designs(rig, loads, rates):
+        share = link_share(rig, loads, found)
+        for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
+            most = min(10.0, 0.8 * largest(free, hz, Limits().torque, math.inf))
+            errors = [
+                sine(free, locked(rig), found, part * most, hz, seconds=LONG, settle=LEARNED, link=link)
+                for link in (None, share)
+                for part in (1.0, 0.3)
+            ]
+            cells = ", ".join(f"{100.0 * error:.1f}" for error in errors)
+            yield f"{found.rate:g} Hz, {hz:g} Hz, {most:.1f} N m: error {cells} % (all, 0.3 of it; with link)"
+
+
+def linked(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
+    """Print the output impedance without and with an encoder on the link."""
+    loads = load_range(rig, free)
+    for found in designs(rig, loads, rates):
+        share = link_share(rig, loads, found)
+        yield f"{found.rate:g} Hz: {share}"
+        spring = np.abs(moved(rig, found.rate, SWEEP).spring)
+        for link in (None, share):
+            over = np.abs(measured(rig, found, Virtual(0.0, 0.0), SWEEP, link)) / spring
+            cells = [f"{f:g} Hz {r:.2f}" for f, r in zip(SWEEP, over, strict=True)]
+            yield f"{'with' if link else 'without'}: |Z| over the spring's {', '.join(cells)}"
 
 
 def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
@@ -135,8 +167,8 @@ def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[
 
 
 SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
-    "trials": trials, "followed": followed, "impedance": outer, "late": late, "baselines": baselines,
-    "cost": cost,
+    "trials": trials, "followed": followed, "free": unknown, "impedance": outer, "link": linked,
+    "late": late, "baselines": baselines, "cost": cost,
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MO
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
-    from rsea_ros.experiment.files import Model
+    from rsea_ros.experiment.files import ModelFile
     from rsea_ros.experiment.hypothesis import Hypothesis
     from rsea_ros.identification.solver import Map
 
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     return FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
 
 
-def models_in(path: str) -> list[Model]:
+def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
     from rsea_ros import strict_yaml
     from rsea_ros.experiment.documents import models_of
@@ -95,7 +95,7 @@ def models_in(path: str) -> list[Model]:
 
 
 def _possible(
-    models: Sequence[Model], args: argparse.Namespace, run: Map
+    models: Sequence[ModelFile], args: argparse.Namespace, run: Map
 ) -> tuple[list[Hypothesis], dict[str, float], dict[str, float]]:
     """Return the hypotheses; from bags, the noise by channel and the excluded causes.
 

@@ -43,12 +43,12 @@ def run(args: argparse.Namespace) -> int:
         records = checked(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.laws.writing import Provenance
+        from rsea_ros.laws.writing import LawProvenance
         from rsea_ros.report.law.files import write_law
 
         where = provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
-        result = learn(records, rig, Provenance(where.date, where.version, bags, ""), tell)
+        result = learn(records, rig, LawProvenance(where.date, where.version, bags, ""), tell)
         report = write_law(result, place, where)
     if args.json:
         print_file(report.parent / LAW_JSON)

@@ -5,6 +5,7 @@
              what its load takes more, as far as it has been learned       learning.py
     u_fb   = PID on (torque of the model - ft), damping of the gear's
              speed about the model's, disturbance observer                 law.py
+             and the measured motion of the link, in part                  link.py
     u_c    = friction, ripple, backlash, from the model's own motion       compensation.py
     u      = u_ff + u_fb + u_c within the limits
 
@@ -26,6 +27,7 @@ from rsea_ros.control.acted import Acted
 from rsea_ros.control.compensation import Compensation, compensation
 from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
 from rsea_ros.control.learning import Learning
+from rsea_ros.control.link import LinkMotion, LinkShare
 from rsea_ros.control.loads import lightest, load_range, locked
 from rsea_ros.control.prediction import Prediction
 from rsea_ros.control.reference import Reference
@@ -61,6 +63,7 @@ class Reading:
     position: float
     motor_torque: float = math.nan
     ft_age: float = 0.0
+    link: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -83,12 +86,13 @@ class TorqueController:
 
     def __init__(self, rig: Rig, rate: float, gains: Gains | None = None, *, limits: Limits | None = None,
                  compensate: Collection[str] | None = None, preview: bool = False, learn: bool = True,
-                 corner: float = CORNER) -> None:  # fmt: skip
+                 corner: float = CORNER, link: LinkShare | None = None) -> None:  # fmt: skip
         """rate: Hz. gains: by default those of `synthesis.design`, which takes 2 to 3 s.
 
         limits: torque, slew and ramp. compensate: effects of the rig to compensate, by default all that have
         a law for it. preview: the desired torque is known two samples ahead, so it is not predicted. corner:
-        of the prediction, Hz. learn: learn load and drive; use False inside an outer loop whose desired
+        of the prediction, Hz. link: what of the motion in `Reading.link` is fed forward (link.link_share), by
+        default nothing. learn: learn load and drive; use False inside an outer loop whose desired
         torque follows the motion (virtual.py), because learning would change its impedance.
         Raises ParameterError for a rig whose torque cannot be controlled.
         """
@@ -98,6 +102,7 @@ class TorqueController:
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction, self._acted = Prediction(corner, 1.0 / rate), Acted(1.0 / rate)
+        self._link = LinkMotion(self._law, link or LinkShare())
         self._preview, self._learn, self._limits = preview, learn, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
 
@@ -107,6 +112,7 @@ class TorqueController:
         self._reference.start(reading.ft, reading.velocity, desired)
         self.learned.start(reading.ft, reading.velocity)
         self._prediction.start(desired)
+        self._link.start(reading.link)
         self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
         self._acted.start(torque)
         self._begin = self._sent = self._sent_before = torque
@@ -141,8 +147,9 @@ class TorqueController:
         more, learned = model.more(forward)
         more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
-        self._hear(reading, missed, error, slowness, sure=self._learn and trust == 1.0 and not late)
+        self._hear(reading, missed, error, slowness, in_time=trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
+        back += self._link.torque(reading.link, model.yielding, missed, offset)
         back = 0.0 if late else trust * back
         known, crossing = learned + self._compensated(reading, forward), self._crossing(ahead)
         asked = forward + more + back + known + crossing
@@ -187,7 +194,7 @@ class TorqueController:
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
         return torque - reading.ft, speed - reading.velocity, placed
 
-    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, sure: bool) -> None:
+    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, in_time: bool) -> None:
         """Learn from a sample, and take the measured motor torque for the one that acted.
 
         After lost samples, those between are read on a straight line.
@@ -196,10 +203,10 @@ class TorqueController:
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
             torque = s.applied + self._learned[0]
-            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
+            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=self._learn and in_time)
         share = missed / (missed + 1)
         acted = self._acted.over_sample(
-            reading.motor_torque, self._sent_before, self._sent, sure=sure and not missed
+            reading.motor_torque, self._sent_before, self._sent, sure=in_time and not missed
         )
         acted -= self._known[0]
         self._state = s._replace(

@@ -6,6 +6,7 @@ with its trust included, unlike an impulse: above the predicted band the torque 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,10 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
 UNLIMITED = Limits(torque=1e6, slew=1e12, ramp=0.0)
-SHARES = (0.007, 0.018, 0.035, 0.055, 0.075, 0.11, 0.16, 0.25, 0.45)
-"""Of the rate: the frequencies of the sines."""
-PERIODS, WAIT, BAND = 5.0, 0.7, 0.05
+SINES = (1.0, 2.0, 3.0, 5.0, 10.0, 15.0, 20.0, 27.0, 35.0, 50.0, 70.0, 120.0, 200.0, 400.0)
+"""Hz, of which those below HIGHEST of the rate are tried."""
+HIGHEST = 0.46
+PERIODS, FEW, WAIT, BAND = 5, 2, 0.7, 0.05
 STEP = 5.0
 """N m: a step that the motor's limits hardly meet."""
 
@@ -35,18 +37,38 @@ class Following:
 
     @property
     def bandwidth(self) -> float:
-        """Where it leaves -3 dB, Hz; inf where it never does, to the highest frequency looked at."""
-        below = 20.0 * np.log10(np.abs(self.torque)) < -3.0
-        return float(self.hz[np.argmax(below)]) if below.any() else float("inf")
+        """Where it first falls below -3 dB, Hz, between the sines on a straight line over log f; inf where it
+        does not, to the highest frequency looked at."""
+        return fall(self.hz, self.gain)
+
+    @property
+    def gain(self) -> FloatArray:
+        """|T_d / desired|, dB, shape (n,)."""
+        return np.asarray(20.0 * np.log10(np.abs(self.torque)))
+
+    def gain_at(self, hz: FloatArray) -> FloatArray:
+        """Return the gain, dB, between the sines, shape of hz."""
+        return np.interp(np.log(hz), np.log(self.hz), self.gain)
 
     @property
     def peak(self) -> float:
         """The largest gain, dB."""
-        return float(20.0 * np.log10(np.abs(self.torque).max()))
+        return float(self.gain.max())
 
     def motor_at(self, hz: float) -> float:
         """Return the motor torque per N m, between the frequencies."""
         return float(np.interp(hz, self.hz, self.motor))
+
+
+def fall(hz: FloatArray, gain: FloatArray) -> float:
+    """Return where a gain (dB, shape (n,)) first falls below -3 dB, Hz; inf where it does not."""
+    over = gain + 3.0
+    falls = np.nonzero((over[:-1] >= 0.0) & (over[1:] < 0.0))[0]
+    if not len(falls):
+        return math.inf if over[-1] >= 0.0 else 0.0
+    k = int(falls[0])
+    share = over[k] / (over[k] - over[k + 1])
+    return float(hz[k] * (hz[k + 1] / hz[k]) ** share)
 
 
 @dataclass(frozen=True)
@@ -60,18 +82,18 @@ class Step:
     settling: float
 
 
-def following(true: Rig, model: Rig, design: Design, *, late: int = 0) -> Following:
+def following(true: Rig, model: Rig, design: Design, *, late: int = 0, learn: bool = True) -> Following:
     """Follow sines on a bench without noise and limits; the controller does not know its load."""
-    hz = design.rate * np.array(SHARES)
-    found = [_sine(true, locked(model), design, float(f), late) for f in hz]
+    hz = np.array([f for f in SINES if f < HIGHEST * design.rate])
+    found = [_sine(true, locked(model), design, float(f), late, learn) for f in hz]
     return Following(hz, np.array([t for t, _ in found]), np.array([m for _, m in found]))
 
 
-def _sine(true: Rig, model: Rig, design: Design, hz: float, late: int) -> tuple[complex, float]:
+def _sine(true: Rig, model: Rig, design: Design, hz: float, late: int, learn: bool) -> tuple[complex, float]:
     rate = design.rate
-    n = round((WAIT + max(PERIODS / hz, 0.25)) * rate)
+    n = round((WAIT + max((PERIODS if hz > FEW else FEW) / hz, 0.25)) * rate)
     wanted = np.sin(2.0 * np.pi * hz * np.arange(n) / rate)
-    controller = TorqueController(model, rate, design.gains, limits=UNLIMITED)
+    controller = TorqueController(model, rate, design.gains, limits=UNLIMITED, learn=learn)
     run = closed_loop(true, rate, controller, wanted, noise=False, late=late)
     turn = np.exp(-2j * np.pi * hz * run.t) * (run.t >= WAIT)
     scale = np.sum(wanted * turn)

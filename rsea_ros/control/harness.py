@@ -121,4 +121,5 @@ def irregular(
 
 
 def _reading(sample: Sample) -> Reading:
-    return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque)
+    link = sample.position - sample.deflection
+    return Reading(sample.ft, sample.velocity, sample.position, sample.motor_torque, link=link)

@@ -17,6 +17,7 @@ from rsea_ros.control.law import Gains, Law, law_of
 from rsea_ros.control.loads import locked
 from rsea_ros.control.loop import actions, returns
 from rsea_ros.control.sampled import FT, responses, sampled, z_of
+from rsea_ros.control.uncertainty import Case, Uncertainty, bench, lags_of, mode_of
 from rsea_ros.model import outputs
 from rsea_ros.model.equations import COORDINATES, D
 from rsea_ros.model.outputs import Output
@@ -37,26 +38,33 @@ class Impedance:
 
 @dataclass(frozen=True)
 class Moved:
-    """The locked rig's answer to the motor, shape (3, n), and without it to a moved distal side: torque and
-    speed of the gear, per rad/s; the spring's impedance; all at hz."""
+    """The locked rig's answer to the motor, shape (4, n), and without it to a moved distal side: torque and
+    speed of the gear, per rad/s; the spring's impedance; all at hz. sensor: what the F/T sensor makes of the
+    torque; path, current: as `returns` has them."""
 
     hz: FloatArray
     plant: ComplexArray
     torque: ComplexArray
     speed: ComplexArray
     spring: ComplexArray
+    sensor: ComplexArray | float = 1.0
+    path: ComplexArray | float = 1.0
+    current: ComplexArray | float = 1.0
 
-    def impedance(self, law: Law) -> ComplexArray:
-        """Return T / w_d under a law, N m s/rad, shape (n,)."""
+    def impedance(self, law: Law, on_link: ComplexArray | float = 0.0) -> ComplexArray:
+        """Return T / w_d under a law, N m s/rad, shape (n,). on_link: of `linked`, N m/rad."""
         on_ft, on_velocity, _ = actions(law, self.hz)
-        _, whole = returns(law, self.plant, self.hz)
-        asked = (on_ft * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
-        felt: ComplexArray = self.torque - self.plant[FT] * asked / whole
+        sensed = self.plant.copy()
+        sensed[FT] *= self.sensor
+        _, whole = returns(law, sensed, self.hz, self.path, self.current)
+        asked = (on_ft * self.sensor * self.torque + on_velocity * self.speed) / z_of(law.period, self.hz)
+        asked = asked - on_link / (2j * np.pi * self.hz)
+        felt: ComplexArray = self.torque - self.plant[FT] * self.path * asked / whole
         return felt
 
-    def ratio(self, law: Law) -> FloatArray:
-        """Return |T / w_d| over that of the bare spring."""
-        return np.abs(self.impedance(law) / self.spring)
+    def ratio(self, law: Law, on_link: ComplexArray | float = 0.0) -> FloatArray:
+        """Return |T / w_d| over that of the bare spring. on_link: as `impedance` has it."""
+        return np.abs(self.impedance(law, on_link) / self.spring)
 
 
 def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
@@ -65,6 +73,13 @@ def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
     torque, speed = _without_motor(rig, hz, s)
     spring = -(rig["spring.stiffness"] / s + rig["spring.damping"])
     return Moved(hz, responses(sampled(locked(rig), rate), hz), torque, speed, spring)
+
+
+def moved_bench(rig: Rig, rate: float, hz: FloatArray, case: Case, u: Uncertainty) -> Moved:
+    """Return what moving the distal side of a bench of the set does. hz: below half the rate."""
+    path, current = lags_of(case, rate, hz)
+    still = moved(bench(rig, case), rate, hz)
+    return replace(still, sensor=mode_of(u.mode, case.participation, hz), path=path, current=current)
 
 
 def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> Impedance:

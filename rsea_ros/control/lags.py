@@ -16,7 +16,7 @@ from rsea_ros.signals import ComplexArray, FloatArray
 
 
 def lagging(rig: Rig, plant: Sampled, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return the response of a sampled rig, shape (3, n), and of the path from command to current, (n,)."""
+    """Return the response of a sampled rig, shape (4, n), and of the path from command to current, (n,)."""
     response, path = responses(plant, hz), np.ones(len(hz), dtype=np.complex128)
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     for setting in rig.effects:

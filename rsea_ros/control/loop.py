@@ -25,6 +25,15 @@ def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, Compl
     return on_ft, g.k_w * wash + q * explained, q * back
 
 
+def linked(law: Law, inertia: float, damping: float, corner: float, hz: FloatArray) -> ComplexArray:
+    """Return what the law makes of the link's angle (N m/rad), its one sample of delay included: link.py."""
+    back, pole = 1.0 / z_of(law.period, hz), np.exp(-2.0 * np.pi * corner * law.period)
+    rate = (1.0 - back) / law.period
+    wanted = inertia * law.inertia * rate + 0.5 * damping * law.damping * (1.0 + back)
+    action: ComplexArray = back * (1.0 - pole) / (1.0 - pole * back) * wanted * rate
+    return action
+
+
 def returns(
     law: Law,
     plant: ComplexArray,
@@ -34,7 +43,7 @@ def returns(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return the loop's memory N and D = N + the rest of the loop, shape (…, n): L = D / N - 1.
 
-    plant: of `responses`, without the path; shape (3, …, n). path, current: from a command to the motor
+    plant: of `responses`, without the path; shape (4, …, n). path, current: from a command to the motor
     torque and to its measurement, beyond the one sample that is always present. N is 1 less the torque
     that is fed back; N / D is the sensitivity to a torque on the gear, 1 / D that to one on the command.
     """

@@ -25,7 +25,7 @@ _mean_tanh: Callable[[float, float, float], tuple[float, float]] = mean_tanh.py_
 
 
 class Reference:
-    """now, next: ft, velocity, position of the model at this sample and at the next one, shape (3,).
+    """now, next: the outputs of `Sampled` of the model at this sample and at the next one, shape (4,).
 
     promised: the desired torques (N m) that the model was steered to at these two. turning: the speed that
     the gear should have at this sample with its load, rad/s.
@@ -90,6 +90,11 @@ class Reference:
         """Return torque (N m) and speed (rad/s) a number of samples after this one, on a straight line."""
         torque = float(self.now[FT] + part * (self.next[FT] - self.now[FT]))
         return torque, self.turning + part * (self._turning - self.turning)
+
+    @property
+    def yielding(self) -> float:
+        """The speed at which the learned load should give way at this sample, rad/s."""
+        return self.turning - float(self.now[VELOCITY])
 
     @property
     def angle(self) -> float:

@@ -15,14 +15,15 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.model.transfer import read
 from rsea_ros.signals import ComplexArray, FloatArray
 
-FT, VELOCITY, POSITION = range(3)
+FT, VELOCITY, POSITION, LINK = range(4)
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """x[k+1] = A x[k] + B u[k], y[k] = C x[k]: y is ft (N m), velocity (rad/s), position (rad) of the gear.
+    """x[k+1] = A x[k] + B u[k], y[k] = C x[k]: y is ft (N m), velocity (rad/s) and position (rad) of the
+    gear, and position (rad) of the link, all against the housing.
 
-    a: shape (n, n). b: shape (n,). c: shape (3, n). period: s.
+    a: shape (n, n). b: shape (n,). c: shape (4, n). period: s.
     """
 
     a: FloatArray
@@ -39,7 +40,7 @@ def sampled(rig: Rig, rate: float) -> Sampled:
     check_controllable(rig)
     position = outputs.position()
     velocity = Output(np.roll(position.c, 1, axis=0), position.d)
-    wanted = (outputs.end_torque(rig, rig.ft_end), velocity, position)
+    wanted = (outputs.end_torque(rig, rig.ft_end), velocity, position, outputs.link())
     system = propagator.state_space(rig)
     n = len(system.a)
     generator = np.zeros((n + 1, n + 1))
@@ -59,7 +60,7 @@ def check_controllable(rig: Rig) -> None:
 
 
 def responses(plant: Sampled, hz: FloatArray) -> ComplexArray:
-    """Return ft, velocity and position per N m at frequencies, Hz, below half the rate: shape (3, n)."""
+    """Return the outputs of `Sampled` per N m at frequencies, Hz, below half the rate: shape (4, n)."""
     z = z_of(plant.period, hz)[:, None, None]
     x = np.linalg.solve(z * np.eye(len(plant.a)) - plant.a, plant.b[:, None].astype(complex))[..., 0]
     response: ComplexArray = plant.c @ x.T

@@ -13,6 +13,7 @@ from rsea_ros.control.impedance import Impedance, impedance
 from rsea_ros.control.large_signal import Reach, reach
 from rsea_ros.control.loads import LOCKED, load_range, with_ends
 from rsea_ros.control.robustness import Robustness, robustness
+from rsea_ros.control.spread import Softness, Spread, softness, spread
 from rsea_ros.control.synthesis import Demand, Design, design
 from rsea_ros.control.trials import Compensated, Trial, compensations, hard, trials
 from rsea_ros.errors import ParameterError
@@ -35,7 +36,7 @@ class Motor:
 @dataclass(frozen=True)
 class AtRate:
     """One rate: design, the set swept, trials, gain of each compensation, impedance; T_d / desired of the
-    clamped bench, of the free one, and of the hardest of the set."""
+    clamped bench and of the free one, and what the set makes of each and of the impedance."""
 
     design: Design
     swept: Robustness
@@ -43,8 +44,10 @@ class AtRate:
     compensations: tuple[Compensated, ...]
     locked: Following
     free: Following
-    hard: Following
+    locked_spread: Spread
+    free_spread: Spread
     impedance: Impedance
+    softness: Softness
 
 
 @dataclass(frozen=True)
@@ -99,15 +102,18 @@ def _at_rate(clamped: Rig, light: Rig, loads: Mapping[str, Rig], found: Design) 
     grid = np.geomspace(0.1, 0.45 * found.rate, 300)
     near = following(clamped, clamped, found)
     far = following(hard(loads), clamped, found, late=1)
+    apart, softest = spread(clamped, loads, found, (LOCKED,)), softness(clamped, found, grid)
     return AtRate(
         found,
         swept,
-        tuple(trials(clamped, loads, found, swept, near, far)),
+        tuple(trials(clamped, loads, found, swept, near, far, apart, softest.worst)),
         tuple(compensations(clamped, found)),
         near,
         following(light, clamped, found),
-        far,
+        apart,
+        spread(clamped, loads, found),
         impedance(clamped, found.rate, found.gains, grid),
+        softest,
     )
 
 

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.control.controller import Limits, TorqueController
-from rsea_ros.control.following import Following, Step, step_response
+from rsea_ros.control.following import Following, Step, fall, step_response
 from rsea_ros.control.harness import closed_loop
 from rsea_ros.control.large_signal import largest
+from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LOCKED, locked
 from rsea_ros.control.robustness import Robustness
+from rsea_ros.control.spread import Spread
 from rsea_ros.control.synthesis import Demand, Design
 from rsea_ros.control.uncertainty import Case, Uncertainty, bench
 from rsea_ros.model.rig import EffectSetting, Rig
@@ -80,11 +82,13 @@ class Compensated:
 
 
 def trials(
-    rig: Rig, loads: Mapping[str, Rig], design: Design, swept: Robustness, near: Following, far: Following
+    rig: Rig, loads: Mapping[str, Rig], design: Design, swept: Robustness, near: Following, far: Following,
+    apart: Spread, stiffest: float,
 ) -> Iterator[Trial]:
     """Yield the trials of a clamped rig, its loads and the whole set.
 
-    near, far: how torque follows on the rig, and on the hardest bench of the set.
+    near, far: how torque follows on the rig, and on the hardest bench of the set. apart: what the set makes
+    of the first. stiffest: largest impedance of the set over that of the spring.
     """
     nominal, worst, demand = design.margins, swept.margins, Demand()
     each = list(nominal.values())
@@ -96,9 +100,10 @@ def trials(
     yield Trial("gain margin", min(m.gain for m in each), "dB", 6.0, True, worst.gain)
     yield Trial("delay margin", min(m.delay for m in each), "samples", 1.0, True, worst.delay)
     yield Trial("crossover", nominal[LOCKED].crossover, "Hz", worst=worst.crossover)
-    yield Trial("output impedance, largest over the spring's", design.impedance, "1", 1.01 * demand.impedance)
+    yield Trial("output impedance, largest over the spring's", design.impedance, "1", 1.01 * demand.impedance,
+                worst=stiffest)  # fmt: skip
     yield from _followed(rig, loads, design)
-    yield from _bandwidth(near, far)
+    yield from _bandwidth(near, far, apart)
     yield from _stepped(step_response(rig, rig, design), step_response(hard(loads), rig, design, late=1))
     rough = rig.with_effects(EFFECTS[0])
     yield Trial("3 N m friction, not in the model", 100.0 * sine(rough, rig, design), "%", 6.0)
@@ -118,9 +123,13 @@ def _followed(rig: Rig, loads: Mapping[str, Rig], design: Design) -> Iterator[Tr
         yield Trial(f"5 Hz, {amplitude:.1f} N m, {name}, load unknown", error, "%", 5.0)
 
 
-def _bandwidth(near: Following, far: Following) -> Iterator[Trial]:
-    yield Trial("torque bandwidth, -3 dB", near.bandwidth, "Hz", 19.1, True, far.bandwidth)
-    yield Trial("T_d / desired, largest", near.peak, "dB", 3.0, worst=far.peak)
+def _bandwidth(near: Following, far: Following, apart: Spread) -> Iterator[Trial]:
+    least, most = (near.gain_at(apart.hz) + edge for edge in apart.gain)
+    yield Trial("torque bandwidth, -3 dB", near.bandwidth, "Hz", 19.1, True,
+                min(far.bandwidth, fall(apart.hz, least)))  # fmt: skip
+    yield Trial("T_d / desired, largest", near.peak, "dB", 3.0, worst=max(far.peak, float(most.max())))
+    at = min(near.bandwidth, float(near.hz[-1]))
+    yield Trial("motor torque per N m at that bandwidth", near.motor_at(at), "1", worst=far.motor_at(at))
     yield Trial("motor torque per N m at 20 Hz", near.motor_at(20.0), "1", worst=far.motor_at(20.0))
 
 
@@ -195,11 +204,12 @@ def sine(
     seconds: float = SECONDS,
     settle: float = SETTLE,
     late: int = 0,
+    link: LinkShare | None = None,
 ) -> float:
     """Return the RMS error of a sine (N m, Hz), over its own RMS, from `settle` s on."""
     t = np.arange(round(seconds * design.rate)) / design.rate
     rise = np.minimum(1.0, 4.0 * t) ** 2
-    controller = TorqueController(model, design.rate, design.gains, limits=limits)
+    controller = TorqueController(model, design.rate, design.gains, limits=limits, link=link)
     wanted = amplitude * rise * np.sin(2.0 * np.pi * hz * t)
     return closed_loop(true, design.rate, controller, wanted, late=late).error(settle)
 

@@ -62,7 +62,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Family:
-    """Cases with their responses at hz (n,): plant (3, m, n) as `responses` has it, the path from a command
+    """Cases with their responses at hz (n,): plant (4, m, n) as `responses` has it, the path from a command
     to the torque and that to the current as it is measured, at the end of a sample: both (m, n)."""
 
     cases: tuple[Case, ...]
@@ -106,7 +106,6 @@ def family(
 ) -> Family:
     """Return the responses of cases at frequencies, Hz, below half the rate."""
     made: dict[tuple[str, float, float], tuple[ComplexArray, ComplexArray]] = {}
-    s, back = np.asarray(2j * np.pi * hz, dtype=np.complex128), 1.0 / z_of(1.0 / rate, hz)
     plants, paths, currents = [], [], []
     for case in cases:
         key = case.load, case.stiffness, case.damping
@@ -115,14 +114,24 @@ def family(
             made[key] = lagging(rig, sampled(rig, rate), hz)
         response, path = made[key]
         seen = response.copy()
-        seen[FT] *= _mode(s, u.mode, case.participation)
+        seen[FT] *= mode_of(u.mode, case.participation, hz)
+        late, current = lags_of(case, rate, hz)
         plants.append(seen)
-        paths.append(path * back**case.samples * np.exp(-case.delay * s))
-        currents.append(path * back ** (case.samples + int(case.delay * rate + 1e-9)))
+        paths.append(path * late)
+        currents.append(path * current)
     return Family(tuple(cases), hz, np.stack(plants, axis=1), np.array(paths), np.array(currents))
 
 
-def _mode(s: ComplexArray, mode: tuple[float, float, float], participation: float) -> ComplexArray:
-    w = 2.0 * np.pi * mode[0]
+def lags_of(case: Case, rate: float, hz: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return what a case adds to the path from a command to the torque, and to the measured current."""
+    back = 1.0 / z_of(1.0 / rate, hz)
+    path: ComplexArray = back**case.samples * np.exp(-2j * np.pi * hz * case.delay)
+    current: ComplexArray = back ** (case.samples + int(case.delay * rate + 1e-9))
+    return path, current
+
+
+def mode_of(mode: tuple[float, float, float], participation: float, hz: FloatArray) -> ComplexArray:
+    """Return what a mode of the F/T sensor's mount makes of the torque. mode: as Uncertainty has it."""
+    s, w = 2j * np.pi * hz, 2.0 * np.pi * mode[0]
     factor: ComplexArray = 1.0 - participation * s * s / (s * s + 2.0 * mode[1] * w * s + w * w)
     return factor

@@ -53,6 +53,11 @@ def position() -> Output:
     return _of_coordinates({C: 1.0, H: -1.0})
 
 
+def link() -> Output:
+    """Return the angle of what hangs on the spring against the housing, rad."""
+    return _of_coordinates({D: 1.0, H: -1.0})
+
+
 def deflection() -> Output:
     """Return the spring's angle, rad."""
     return _of_coordinates({C: 1.0, D: -1.0})

@@ -253,12 +253,13 @@ def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator)
 
 @dataclass(frozen=True)
 class Sample:
-    """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure)."""
+    """One measurement of the plant: rad, rad/s, N m, N m (nan without a spring to measure), rad."""
 
     position: float
     velocity: float
     motor_torque: float
     ft: float
+    deflection: float
 
 
 class Plant:
@@ -288,4 +289,5 @@ class Plant:
         if self._noise:
             values = {n: float(measure(self._rig, n, v, self._rng)) for n, v in values.items()}
         ft = math.nan if self._rig.rigid_spring else float(values["ft"])
-        return Sample(float(values["position"]), float(values["velocity"]), float(values["motor_torque"]), ft)
+        position, velocity, torque = (float(values[n]) for n in ("position", "velocity", "motor_torque"))
+        return Sample(position, velocity, torque, ft, float(values["deflection"]))

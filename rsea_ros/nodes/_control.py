@@ -66,7 +66,7 @@ def design_of(values: Values) -> Design:
 def controller_of(values: Values, found: Design) -> TorqueController:
     """Return the controller for the parameters."""
     limits = Limits(values["torque_limit"], values["slew_limit"], values["ramp"])
-    options = {} if values["compensate"] else {"compensate": ()}
+    options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
     return TorqueController(
         load_rig(values["rig"]),
         values["rate"],

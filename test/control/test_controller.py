@@ -56,6 +56,15 @@ def test_an_effect_costs_little_known_or_learned(effect, hz, without, with_model
     assert sine(true, true, DESIGN, hz=hz) < with_model
 
 
+@pytest.mark.parametrize(("hz", "amplitude"), [(4.0, 0.5), (3.0, 1.0)])
+def test_small_motion_teaches_no_load_that_is_not_there(hz, amplitude):
+    """Samples above a limit were those with the most noise: held at both ends, half a N m was 52 % off."""
+    wanted = amplitude * np.sin(2.0 * np.pi * hz * np.arange(560) / RATE)
+    errors = [closed_loop(RIG, RATE, TorqueController(RIG, RATE, GAINS, learn=learn), wanted).error(1.0)
+              for learn in (True, False)]  # fmt: skip
+    assert errors[0] < 1.5 * errors[1]
+
+
 def test_backlash_makes_no_limit_cycle():
     assert restlessness(RIG, DESIGN) < 1.1
 

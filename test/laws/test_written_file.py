@@ -20,11 +20,11 @@ from rsea_ros.laws.law import Curve, Law, Part
 from rsea_ros.laws.memory import remembered
 from rsea_ros.laws.refinement import effect_from
 from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
-from rsea_ros.laws.writing import Provenance, source_of
+from rsea_ros.laws.writing import LawProvenance, source_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import simulate_drive, synthesize
 
-WHERE = Provenance("2026-01-01", "0.0", {"run.mcap": "ab12"}, "Gain: 50 %.")
+WHERE = LawProvenance("2026-01-01", "0.0", {"run.mcap": "ab12"}, "Gain: 50 %.")
 RANGES = {"w": 0.6, "q": 0.02, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
 NOTHING = Claims("velocity", "neither", None)
 

@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from rsea_ros.control.following import Following
+from rsea_ros.control.spread import Spread
 from rsea_ros.control.study import AtRate, Study
 from rsea_ros.model import outputs
 from rsea_ros.model.response import frequency_response
+from rsea_ros.model.rig import Rig
 from rsea_ros.report.control.tables import control_tables, gains_words
-from rsea_ros.report.figures.figure import Figure, axis, frequency_axis, label, layout, line
-from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH
-from rsea_ros.report.figures.response import Mark, Response, response_figure
+from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
+from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 
 _COLOURS = (AFTER, BEFORE, TRUTH)
+
+BAND = (
+    "Band: all benches of the set with that load (K_s ± 10 %, b_m ± 50 %, one sample and 2 ms late, the mode "
+    "of 33 Hz at the sensor, whose own ringing is not in the torque)."
+)
+LEARNING = (
+    "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of "
+    "the load; below about 3 Hz only feedback is left."
+)
 
 
 def control_report(study: Study) -> str:
@@ -24,7 +37,8 @@ def control_report(study: Study) -> str:
     blocks: list[Block] = [
         key_numbers(_keys(study)),
         section("Gains", bullets(list(gains_words(study)))),
-        _following(study),
+        _held(study),
+        _free(study),
         _feeling(study),
         *control_tables(study),
     ]
@@ -50,40 +64,65 @@ def _keys(study: Study) -> list[tuple[str, str]]:
     value = {trial.what: trial for trial in at.trials}
     errors = [(f"{t.value:.1f} %", what) for what, t in value.items() if t.unit == "%"][:1]
     return [
-        (f"{study.resonance:.1f} Hz", "resonance of the open loop"),
-        (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz, one sample of delay"),
+        (f"{study.resonance:.1f} Hz", "open-loop resonance"),
+        (f"{_crossover(at):.1f} Hz", f"crossover at {at.design.rate:g} Hz"),
         (f"{at.design.margins['locked'].phase:.0f}°", "phase margin, locked"),
-        (f"{at.swept.margins.phase:.0f}°", "smallest of the whole set"),
+        (f"{at.swept.margins.phase:.0f}°", "least of the whole set"),
         *errors,
     ]
 
 
-def _following(study: Study) -> Figure:
-    """Return T_d over desired torque, locked and free apart, the worst case of the set, and the open loop."""
-    curves = []
-    for at, colour in zip(study.rates, _COLOURS, strict=False):
-        rate = f"{at.design.rate:g} Hz"
-        for name, seen, width, dash in (
-            ("locked", at.locked, 2.4, "solid"),
-            ("free", at.free, 1.6, "dot"),
-            ("worst case", at.hard, 1.0, "dash"),
-        ):
-            curves.append(Response(f"{rate}, {name}", colour, seen.hz, seen.torque, width, dash))
-    hz = np.geomspace(0.5, 0.45 * max(at.design.rate for at in study.rates), 300)
-    for rig, dash in ((study.rig, "solid"), (study.free, "dot")):
-        opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
-        name = "open loop, locked" if rig is study.rig else "open loop, free"
-        curves.append(Response(name, MEASURED, hz, opened, 1.2, dash))
-    caption = (
-        "Distal over desired torque, sine by sine, in simulation; the controller does not know the load. "
-        "Slow torques are predicted along a parabola; fast ones go through a low pass and come two "
-        "samples late. Hardest of the set: stiffer spring, less drag, one sample more, 2 ms of lag, a "
-        "mode of 33 Hz at the sensor."
+def _held(study: Study) -> Figure:
+    """Return T_d over desired torque of the clamped actuator, with what the set makes of it."""
+    seen = [(at, at.locked, at.locked_spread) for at in study.rates]
+    reached = " and ".join(f"{at.locked.bandwidth:.0f} Hz at {at.design.rate:g} Hz" for at in study.rates)
+    return _following(study, study.rig, f"Held at both ends, torque follows to {reached}", seen)
+
+
+def _free(study: Study) -> Figure:
+    """Return the same with the free load, which the controller has not been told of."""
+    seen = [(at, at.free, at.free_spread) for at in study.rates]
+    return _following(study, study.free, _free_title(study), seen, LEARNING)
+
+
+def _free_title(study: Study) -> str:
+    first = study.rates[0].free
+    followed = np.nonzero(np.abs(first.gain) < 3.0)[0]
+    if not len(followed):
+        return "On a free load that it does not know, small torques are not followed"
+    return (
+        "On a free load that it does not know, small torques are followed from "
+        f"{first.hz[followed[0]]:g} Hz to {first.bandwidth:.0f} Hz at {study.rates[0].design.rate:g} Hz"
     )
-    title = "The torque tracks equally well with the actuator clamped and free"
-    return response_figure(
-        title, curves, [Mark(3.0 * study.resonance, "3 × resonance")], caption, (-60.0, 20.0)
-    )
+
+
+def _following(
+    study: Study,
+    rig: Rig,
+    title: str,
+    seen: Sequence[tuple[AtRate, Following, Spread]],
+    more: str = "",
+) -> Figure:
+    curves = [
+        ResponseCurve(f"{at.design.rate:g} Hz", colour, curve.hz, curve.torque, 2.0, band=_band(curve, apart))
+        for (at, curve, apart), colour in zip(seen, _COLOURS, strict=False)
+    ]
+    hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
+    opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
+    curves.append(ResponseCurve("without control", MEASURED, hz, opened, 1.2, "dot"))
+    caption = f"Distal over desired torque, 1 N·m, sine by sine, in simulation. {BAND} {more}".strip()
+    marks = [Mark(3.0 * study.resonance, "3 × resonance")]
+    return response_figure(title, curves, marks, caption, (-50.0, 15.0))
+
+
+def _band(curve: Following, apart: Spread) -> Band:
+    """Return what the set makes of a curve, from its first sine to its last."""
+    inside = (apart.hz >= curve.hz[0]) & (apart.hz <= curve.hz[-1])
+    hz = apart.hz[inside]
+    turned = np.degrees(np.interp(np.log(hz), np.log(curve.hz), np.unwrap(np.angle(curve.torque))))
+    low, high = (curve.gain_at(hz) + edge[inside] for edge in apart.gain)
+    late, early = (turned + np.degrees(edge[inside]) for edge in apart.phase)
+    return Band(hz, (low, high), (late, early))
 
 
 def _feeling(study: Study) -> Figure:
@@ -93,7 +132,11 @@ def _feeling(study: Study) -> Figure:
              for at, c in zip(study.rates, _COLOURS, strict=False)]  # fmt: skip
     items += [("motor off", first.hz, first.motor_off, QUIET, "dash"),
               ("passive spring", first.hz, first.spring, MEASURED, "dot")]  # fmt: skip
-    data = [
+    data: list[Json] = [
+        band(at.softness.hz, at.softness.low, at.softness.high, faint(c, 0.18))
+        for at, c in zip(study.rates, _COLOURS, strict=False)
+    ]
+    data += [
         line(hz, np.abs(z), name, colour, line={"color": colour, "width": 1.8, "dash": dash})
         for name, hz, z, colour, dash in items
     ]
@@ -106,7 +149,8 @@ def _feeling(study: Study) -> Figure:
     highest = max(float(at.impedance.hz[-1]) for at in study.rates)
     return Figure(
         title=f"At 1 Hz the moved output is {softer:.0f} times softer than the spring alone",
-        caption="Torque error for each rad/s of the distal side, housing clamped. Spring alone: K_s/s + b_s.",
+        caption="Torque error for each rad/s of the distal side, housing clamped. Spring alone: K_s/s + b_s. "
+        "Band: the locked benches of the set.",
         data=data,
         layout=layout(
             xaxis=frequency_axis(float(first.hz[0]), highest),

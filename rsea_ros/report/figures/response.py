@@ -7,13 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.report.figures.figure import Figure, Json, axis, frequency_axis, label, layout, line
-from rsea_ros.report.figures.palette import QUIET
+from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
+from rsea_ros.report.figures.palette import QUIET, faint
 from rsea_ros.signals import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)
-class Response:
+class Band:
+    """Limits about a curve at hz, shape (n,): least and largest gain, dB, and phase, deg."""
+
+    hz: FloatArray
+    gain: tuple[FloatArray, FloatArray]
+    phase: tuple[FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class ResponseCurve:
     """A curve: name in the legend at its end, hz and values of shape (n,)."""
 
     name: str
@@ -22,6 +31,7 @@ class Response:
     values: ComplexArray
     width: float = 1.8
     dash: str = "solid"
+    band: Band | None = None
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,7 @@ class Mark:
 
 def response_figure(
     title: str,
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark] = (),
     caption: str = "",
     decibel: tuple[float, float] | None = None,
@@ -44,6 +54,10 @@ def response_figure(
     """Return gain and phase over frequency; marks are vertical lines. decibel: range of the gain axis."""
     data: list[Json] = []
     for r in responses:
+        if r.band is not None:
+            shade = faint(r.colour, 0.18)
+            data.append(band(r.band.hz, *r.band.gain, shade))
+            data += [band(r.band.hz, *r.band.phase, shade, yaxis="y2")] if phase else []
         gain = 20.0 * np.log10(np.abs(r.values))
         parts: Json = {"line": {"color": r.colour, "width": r.width, "dash": r.dash}}
         data.append(line(r.hz, gain, r.name, r.colour, hovertemplate="%{y:.2f} dB", **parts))
@@ -55,7 +69,7 @@ def response_figure(
 
 
 def _layout(
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark],
     decibel: tuple[float, float] | None,
     phase: bool,
@@ -64,7 +78,7 @@ def _layout(
     gain = axis("gain, dB", domain=[0.44, 1.0] if phase else [0.0, 1.0])
     if decibel:
         gain["range"] = list(decibel)
-    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=90)} if phase else {}
+    parts = {"yaxis2": axis("phase, °", domain=[0.0, 0.36], dtick=_phase_tick(responses))} if phase else {}
     return layout(
         xaxis=frequency_axis(low, high, anchor="y2" if phase else "y"),
         yaxis=gain,
@@ -76,7 +90,14 @@ def _layout(
     )
 
 
-def _names(responses: Sequence[Response]) -> list[Json]:
+def _phase_tick(responses: Sequence[ResponseCurve]) -> float:
+    """Return 90 degrees, or 180 where that would be more than eight marks."""
+    turned = [np.degrees(np.ptp(np.unwrap(np.angle(r.values)))) for r in responses]
+    turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
+    return 90.0 if max(turned) <= 720.0 else 180.0
+
+
+def _names(responses: Sequence[ResponseCurve]) -> list[Json]:
     return [
         label(r.name, 1.015, 1.0 - 0.075 * i, r.colour, xref="paper", yref="paper", yanchor="top")
         for i, r in enumerate(responses)

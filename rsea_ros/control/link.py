@@ -1,0 +1,105 @@
+"""The load's motion fed forward from an encoder on the link, as far as the whole set of benches lets it.
+
+    u = Q (p_J J_m w_l' + p_b b_m w_l),   Q = 1 / (1 + s / w_c),   w_l: the link's speed against the housing
+
+less what the load has been learned to do for the desired torque (learning.py), which is fed forward in full.
+A link that someone else moves is a disturbance that is measured, no feedback. With a free load it is one: the
+torque moves the load, which moves the encoder. In full (p_J = p_b = 1) the actuator would have neither
+inertia nor drag for the load, and any lag would swing a pendulum up: the parts are the largest of a list for
+which every bench of the set keeps the largest sensitivities of the design.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from rsea_ros.control.impedance import moved
+from rsea_ros.control.law import Law, law_of
+from rsea_ros.control.loop import linked, returns
+from rsea_ros.control.margins import encirclements
+from rsea_ros.control.sampled import LINK
+from rsea_ros.control.synthesis import HEAVY, SOFT, Demand, Design, grid
+from rsea_ros.control.uncertainty import Uncertainty, corners, family
+from rsea_ros.model.rig import Rig
+from rsea_ros.signals import ComplexArray, FloatArray
+
+INERTIAS, DAMPINGS = (0.0, 0.25, 0.5, 0.75, 1.0), (0.0, 0.2, 0.4)
+"""Parts of J_m and b_m that are tried. Half of b_m is the least that a bench of the set has."""
+CORNERS = (5.0, 8.0, 12.0, 20.0, 30.0, 50.0)
+"""Hz, of Q."""
+SOFTEST = (*SOFT, 5.0, 10.0)
+"""Hz, at which the output should be soft."""
+MORE = 1.02
+"""Of a demand: as far as the search of the gains comes as well."""
+
+
+@dataclass(frozen=True)
+class LinkShare:
+    """inertia, damping: parts of J_m and b_m that are fed forward. corner: of Q, Hz."""
+
+    inertia: float = 0.0
+    damping: float = 0.0
+    corner: float = CORNERS[0]
+
+
+class LinkMotion:
+    """Follows the link's speed beyond what the load does for the desired torque, one sample at a time."""
+
+    def __init__(self, law: Law, share: LinkShare) -> None:
+        self._inertia, self._damping = share.inertia * law.inertia, share.damping * law.damping
+        self._period = law.period
+        self._pole = math.exp(-2.0 * math.pi * share.corner * law.period)
+        self.start(math.nan)
+
+    def start(self, angle: float) -> None:
+        """Begin at rest at an angle of the link against the housing, rad; nan: not known."""
+        self._angle, self._speed, self._torque, self._since = angle, 0.0, 0.0, 0
+
+    def torque(self, angle: float, expected: float, missed: int = 0, offset: float = 0.0) -> float:
+        """Return the torque, N m, for the motion of the sample that ends.
+
+        angle: rad; nan: not measured, and the torque fades. expected: rad/s, the learned load's speed.
+        missed: samples that were lost before. offset: samples by which the angle was read after its place.
+        """
+        self._since, wanted = self._since + 1 + missed, 0.0
+        placed = angle - offset * self._period * (self._speed + expected)
+        if math.isfinite(placed):
+            if math.isfinite(self._angle):
+                time = self._since * self._period
+                speed = (placed - self._angle) / time - expected
+                rise, mean = (speed - self._speed) / time, 0.5 * (speed + self._speed)
+                wanted, self._speed = self._inertia * rise + self._damping * mean, speed
+            self._angle, self._since = placed, 0
+        self._torque += (1.0 - self._pole) * (wanted - self._torque)
+        return self._torque
+
+
+def link_share(rig: Rig, loads: Mapping[str, Rig], design: Design, demand: Demand | None = None) -> LinkShare:
+    """Return the parts that make the output softest with every bench of the set as robust as demanded."""
+    demand, law, u = demand or Demand(), law_of(rig, design.rate, design.gains), Uncertainty()
+    hz = grid(design.rate, 60)
+    few = [name for name in loads if not name.endswith(HEAVY)]
+    f, still = family(loads, corners(few, u), u, design.rate, hz), moved(rig, design.rate, hz)
+    own, alone = returns(law, f.plant, hz, f.path, f.current)
+    before = _peaks(own, alone)
+    allowed = np.maximum(MORE * np.where(f.nominal, demand.sensitivity, demand.robust), before)
+    best, softest = LinkShare(), math.inf
+    for share in (LinkShare(*parts) for parts in product(INERTIAS, DAMPINGS, CORNERS)):
+        on_link = linked(law, share.inertia, share.damping, share.corner, hz)
+        whole, ratio = alone - f.path * on_link * f.plant[LINK], still.ratio(law, on_link)
+        soft = float(np.mean(np.log(np.interp(SOFTEST, hz, ratio))))
+        robust = (_peaks(own, whole) <= allowed).all() and (encirclements(whole) < 0.5).all()
+        if robust and soft < softest and ratio.max() <= MORE * demand.impedance:
+            best, softest = share, soft
+    return best
+
+
+def _peaks(own: ComplexArray, whole: ComplexArray) -> FloatArray:
+    """Return the largest sensitivity of each bench, shape (m,)."""
+    peaks: FloatArray = (np.maximum(np.abs(own), 1.0) / np.abs(whole)).max(axis=1)
+    return peaks
