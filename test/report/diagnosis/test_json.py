@@ -12,6 +12,7 @@ import pytest
 from rsea_ros.diagnosis.result import Estimate, Experiment
 from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.normal import Z95
 from rsea_ros.report.diagnosis.json import diagnosis_json
 from rsea_ros.report.file_names import DIAGNOSIS
 from rsea_ros.signals import Fault
@@ -70,7 +71,7 @@ def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) ->
     torque = cause["parameters"]["torque"]
     noise = torque["statistical_ci95"][1] - torque["value"]
     assert 0.0 < noise < torque["ci95"][1] - torque["value"]
-    assert np.hypot(noise, 1.96 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
+    assert np.hypot(noise, Z95 * torque["model_sd"]) == pytest.approx(torque["ci95"][1] - torque["value"])
     assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
 
 
