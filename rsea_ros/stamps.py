@@ -298,7 +298,8 @@ def polls_unevenly(step: FloatArray, period: float) -> bool:
     if np.count_nonzero(long) < max(_AROUND, _OFTEN * len(step)):
         return False
     off = np.abs(step / period - np.rint(step / period))
-    return float(np.median(off[long])) > max(_NO_MULTIPLE, _TIMES * float(np.median(off[~long])))
+    usual = 0.0 if long.all() else float(np.median(off[~long]))
+    return float(np.median(off[long])) > max(_NO_MULTIPLE, _TIMES * usual)
 
 
 def _ticks(step: FloatArray, period: float) -> FloatArray:

@@ -77,6 +77,9 @@ RESULTS = {
     "a sample of 1e308 in position and velocity": (
         "predict", {"dead": "1e308", "channels": ("position", "velocity")}
     ),
+    "no value in position and velocity": (
+        "predict", {"dead": "all 1e300", "channels": ("ft", "position", "velocity")}
+    ),
     "a sample of 1e308 of a drive without a spring": ("predict", {"rig": "bare_drive", "dead": "1e308"}),
     "too few samples to compare": ("predict", {"dead": "few"}),
     "a sensor of 1e-300": ("identify", {"channels": ("position", "velocity"), "sensors": "left out",

@@ -132,9 +132,11 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     epoch = round(start * 1e9) if start > UNDATED else START_NS
     _check_range(start, stop, epoch)
     channels, faults = {}, [fault for part in parts for fault in part.faults]
-    held = [(name, part.t - start, y) for part in parts for name, y in part.values.items()]
-    for name, t, y in held:
+    columns = [(name, part.t - start, y) for part in parts for name, y in part.values.items()]
+    for name, t, y in columns:
         channels[name], lost = _channel(name, t, y, mapping.channels[name])
+        if any(term.held for term in mapping.channels[name]):
+            channels[name] = _arrivals(name, channels[name])
         faults += lost
     told = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
@@ -209,6 +211,14 @@ def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> 
     first = float(t[np.argmax(missing)])
     detail = f"{count} of {len(y)} values of {columns} are missing, the first at {first:.6g} s"
     return Channel(t[~missing], y[~missing]), [Fault("missing_values", name, count / len(y), detail)]
+
+
+def _arrivals(name: str, channel: Channel) -> Channel:
+    """Return the samples at which another value arrived. Raises ImportMapError for a channel without any."""
+    new = np.diff(channel.y, prepend=np.nan) != 0.0
+    if np.count_nonzero(new) < 2:
+        raise ImportMapError(f"{name} is held at {channel.y[0]:g}, expected values that change")
+    return Channel(channel.t[new], channel.y[new])
 
 
 def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:

@@ -48,6 +48,7 @@ TERM = (
     Key("sign", "1 or -1", "1", "-1 reverses the axis"),
     Key("scale", "number other than 0", "1", "SI units of the channel per SI unit of the column"),
     Key("constant", "number, SI unit of the channel", "0", "added after scale and sign"),
+    Key("held", "`true`, `false`", "false", "rows repeat a value until the next one arrives: keep the first"),
 )
 CHANNEL = tuple(Key(name, dimension, "not measured") for name, dimension in CHANNELS.items())
 SECTIONS: Mapping[str, Sequence[Key]] = {

@@ -24,7 +24,7 @@ class Term:
     """A part of a channel, in SI: sign · scale · column · (SI factor of its unit) + constant.
 
     expression: of columns, in the place of the column. file: in the directory that is read; empty for the one
-    file that is.
+    file that is. held: the log repeats a value until the next one arrives.
     """
 
     column: str
@@ -33,6 +33,7 @@ class Term:
     constant: float = 0.0
     file: str = ""
     expression: Expression | None = None
+    held: bool = False
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -86,7 +87,8 @@ def term_of(field: str, value: object, dimension: str) -> Term:
     column = expression.text if expression else column_name(body["column"], f"{field}.column")
     constant = number(body.get("constant", 0), f"{field}.constant")
     file = _file(body.get("file", ""), f"{field}.file")
-    return Term(column, str(body["unit"]), sign * factor * scale, constant, file, expression)
+    held = _flag(body.get("held", False), f"{field}.held")
+    return Term(column, str(body["unit"]), sign * factor * scale, constant, file, expression, held)
 
 
 def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
@@ -103,6 +105,12 @@ def _expression(body: Mapping[str, Any], field: str) -> Expression | None:
         return parse(text)
     except ValueError as error:
         raise FieldError(f"{field}.expression {error}", f"{field}.expression") from None
+
+
+def _flag(value: object, field: str) -> bool:
+    if isinstance(value, bool):
+        return value
+    raise FieldError(f"{field} is {shown(value)}, expected true or false", field)
 
 
 def number(value: object, field: str) -> float:

@@ -57,7 +57,7 @@ def check_record(
             return Findings(record.source, rig.name, (_no_targets(record),), record.faults)
         record = bounded(record if rig.loop is None else commanded(record, rig))
         checked = check(record, rig)
-        found = [*_topics(record), *(fault_finding(f) for f in checked.faults)]
+        found = [*_topics(record, rig), *(fault_finding(f) for f in checked.faults)]
         found += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             found += excitation(checked.record, rig)
@@ -87,8 +87,10 @@ def _of_targets(f: Finding) -> Finding:
     return replace(f, channel="reference", unit=unit, detail=detail)
 
 
-def _topics(record: Record) -> list[Finding]:
+def _topics(record: Record, rig: Rig) -> list[Finding]:
     have = ", ".join(record.channels)
+    unused = ", ".join(n for n in record.channels if not _takes(rig, n))
+    have += f"; a rig without a spring makes no use of {unused}" if unused else ""
     if "command" in record:
         return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
     return [
@@ -101,6 +103,11 @@ def _topics(record: Record) -> list[Finding]:
             remedy="record the commands, or name their topic with --topic",
         )
     ]
+
+
+def _takes(rig: Rig, channel: str) -> bool:
+    """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
+    return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")
 
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:

@@ -9,7 +9,7 @@ import numpy as np
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
-from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.signals import Channel, Fault, FloatArray, Record
 from rsea_ros.stamps import polls_unevenly
 
 _RED_SHARE = 0.2
@@ -18,6 +18,12 @@ _PER_CYCLE = 4.0
 """Samples to a cycle of the rig's natural frequency, at least."""
 _SLOW = 0.6
 """Of the command's rate: a slower sensor folds what is above its Nyquist frequency."""
+_FEWEST_VALUES = 32
+"""Fewer say nothing of how often they come."""
+_REPEATED, _REGULAR = 3.0, 1.6
+"""Samples that a value lasts, at least, and times as long that nine of ten last at most."""
+_MANY_STEPS = 4.0
+"""Times the smallest step: a sensor that goes on by one step or two is coarse, not slow."""
 _REMEDIES = {
     "missing_topic": "record it, or name its topic with --topic",
     "frozen_samples": "look at the sensor's driver: it repeats its last value",
@@ -62,7 +68,7 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
     steps = np.diff(channel.t)
     rate = channel.rate
     longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
-    if rate and polls_unevenly(steps[steps > 0.0], 1.0 / rate):
+    if 0.0 < rate < math.inf and polls_unevenly(steps, 1.0 / rate):
         low, high = 1e3 * np.quantile(steps, (0.05, 0.95))
         longest = f"uneven, mostly {low:.3g} to {high:.3g} ms; {longest}"
     if natural is not None and rate < _PER_CYCLE * natural:
@@ -88,7 +94,33 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
             detail="slower than the commands: what is faster folds",
             remedy="record it faster",
         )
+    repeats = 1 if name in ("command", "reference") else repeats_of(channel.y)
+    if repeats > 1:
+        return Finding(
+            "amber",
+            "rate",
+            name,
+            rate / repeats,
+            "Hz",
+            expected=f"{rate:.4g} Hz as the log",
+            detail=f"the log repeats every value {repeats} times",
+            remedy=f"`held: true` for {name} in the import map, or log it as it arrives",
+        )
     return Finding("green", "rate", name, rate, "Hz", detail=longest)
+
+
+def repeats_of(values: FloatArray) -> int:
+    """Return in how many samples in a row a value arrives, 1 where each is a reading of its own.
+
+    A coarse sensor repeats values too, but as long as the motion has it, and then goes on by a step or two.
+    """
+    new = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    if len(new) < _FEWEST_VALUES:
+        return 1
+    usual, long = np.quantile(np.diff(new), (0.5, 0.9))
+    steps = np.abs(np.diff(values[new]))
+    regular = usual >= _REPEATED and long < _REGULAR * usual
+    return int(usual) if regular and np.median(steps) > _MANY_STEPS * steps.min() else 1
 
 
 def natural_frequency(rig: Rig) -> float | None:

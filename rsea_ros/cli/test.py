@@ -22,15 +22,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run pytest on the tree with two workers and return its exit status."""
+    """Run pytest on the tree with two workers and return its exit status.
+
+    Raises Stopped, once pytest has ended, when a signal asks this process to stop.
+    """
     root = Path(__file__).resolve().parents[2]
     if not (root / "test" / "conftest.py").is_file():
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
     workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
     pytest = subprocess.Popen([sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on], cwd=root)
+    stopped: KeyboardInterrupt | None = None
     while True:
         try:
-            return pytest.wait()
+            status = pytest.wait()
         except KeyboardInterrupt as stop:
+            stopped = stop
             if isinstance(stop, Stopped) and stop.number != signal.SIGINT:  # which the terminal sends it
                 pytest.send_signal(signal.SIGINT)
+        else:
+            if stopped is not None:
+                raise stopped
+            return status

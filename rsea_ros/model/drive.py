@@ -191,7 +191,7 @@ def _finite(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
         good = np.isfinite(y)
         if np.count_nonzero(good) > 1:
             return t[good], y[good]
-    return np.zeros(2), np.zeros(2)
+    return np.arange(2.0), np.zeros(2)
 
 
 def _first(record: Record) -> tuple[float, float]:

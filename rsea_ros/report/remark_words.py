@@ -10,12 +10,13 @@ from rsea_ros.report import words
 from rsea_ros.wording import listed
 
 _TORQUE_BY_MOTOR_CONSTANT = (
-    "Without the F/T sensor every torque is known only through the motor constant: "
+    "No F/T sensor takes part in this fit, so every torque is known only through the motor constant: "
     "a constant g times as large scales inertia, damping and stiffness by g."
 )
 _TORQUE_BY_LOOP_GAINS = (
-    "Without the F/T sensor every torque is known only through the loop's gains, and through the motor "
-    "constant where a current was measured: gains g times as large scale inertia, damping and friction by g."
+    "No F/T sensor takes part in this fit, so every torque is known only through the loop's gains, and "
+    "through the motor constant where a current was measured: gains g times as large scale inertia, damping "
+    "and friction by g."
 )
 _ON_MEASURED_ANGLE = (
     "The torque ripple was fitted and judged on the measured rotor angle: a simulation that moves freely "

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from rsea_ros import simulate
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.model.rig_file import load_rig
@@ -68,3 +69,24 @@ def test_another_axis_is_tried_on_stamps_put_right():
     record = Record({"command": command, "position": position, "ft": dead})
     said = check_record(record, RIG, wrench=lambda: {"torque.x": alive})
     assert {f.kind for f in said.findings if f.channel == "ft"} >= {"dead_channel", "duplicate_stamps"}
+
+
+def test_channels_that_a_rig_without_a_spring_does_not_use_are_named():
+    """A torque sensor's channel was left out without a word."""
+    t = np.arange(800) / 100.0
+    run = simulate(load_rig("bare_drive"), 20.0 * np.sin(3.0 * t), rate=100.0)
+    record = run.with_channels(ft=Channel(run["position"].t, np.sin(run["position"].t)))
+    (topics,) = [f for f in check_record(record, load_rig("bare_drive")).findings if f.kind == "topics"]
+    assert topics.detail.endswith("a rig without a spring makes no use of velocity, ft")
+
+
+def test_a_log_faster_than_its_sensors_is_noticed():
+    """Every light was green for a log at 1 kHz in which a new reading came every 15 ms."""
+    t = np.arange(3000) / 1000.0
+    run = simulate(RIG, 20.0 * np.sin(12.0 * t), rate=1000.0)
+    slow = np.arange(len(run["ft"])) // 15 * 15
+    record = run.with_channels(ft=Channel(run["ft"].t, run["ft"].y[slow]))
+    light = {f.channel: f for f in check_record(record, RIG).findings if f.kind == "rate"}
+    assert (light["ft"].light, light["position"].light) == ("amber", "green")
+    assert light["ft"].value == pytest.approx(1000.0 / 15.0)
+    assert "`held: true`" in light["ft"].remedy

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import importlib
 import os
 import signal
 import subprocess
@@ -109,6 +110,36 @@ def test_signals_are_one_line_and_their_status(verb, capsys, number, line):
     assert verb(lambda args: signal.raise_signal(number) or 0) == 128 + number
     assert capsys.readouterr() == ("", f"rsea fake: {line}\n")
     assert signal.getsignal(number) == before
+
+
+@pytest.mark.parametrize(
+    ("number", "passed_on", "line"),
+    [
+        (signal.SIGINT, [], "interrupted"),  # the terminal sends it to pytest too
+        (signal.SIGTERM, [signal.SIGINT], "stopped by SIGTERM"),
+        (signal.SIGHUP, [signal.SIGINT], "stopped by SIGHUP"),
+    ],
+)
+def test_a_stopped_suite_waits_for_pytest_and_has_the_status_of_the_signal(
+    monkeypatch, capsys, number, passed_on, line
+):
+    sent, waits = [], []
+
+    class Pytest:
+        def __init__(self, command, cwd):
+            self.send_signal = sent.append
+
+        def wait(self):
+            waits.append(1)
+            if len(waits) == 1:
+                signal.raise_signal(number)
+            return 2
+
+    module = importlib.import_module("rsea_ros.cli.test")
+    monkeypatch.setattr(module, "subprocess", types.SimpleNamespace(Popen=Pytest))
+    assert cli.main(["test"]) == 128 + number
+    assert (sent, len(waits)) == (passed_on, 2)
+    assert capsys.readouterr().err == f"rsea test: {line}\n"
 
 
 def test_a_stop_that_a_destructor_swallows_is_asked_for_again(verb, capsys):

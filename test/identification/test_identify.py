@@ -92,7 +92,7 @@ def test_the_encoder_alone_does_not_separate_the_dampings():
     result = identify([only(recorded(true, 3, 10.0), "position")], nominal)
     scale, sentence = remark_sentences(result.remarks)
     assert sentence.startswith("spring.damping")
-    assert scale.startswith("Without the F/T sensor every torque is known only through the motor constant")
+    assert scale.startswith("No F/T sensor takes part in this fit, so every torque is known only")
     both = [rig["rotor.reflected_damping"] + rig["spring.damping"] for rig in (result.rig, true)]
     assert both[0] == pytest.approx(both[1], rel=0.01)
 

@@ -41,6 +41,7 @@ def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, lis
     states = listener.hear(JointState, "/main/joint_states", MEASUREMENT)
     wrenches = listener.hear(WrenchStamped, "/main/ft", MEASUREMENT)
     wire.push(lambda: len(states) > 50 and len(wrenches) > 50 and states[-1].effort[0] > 9.0)
+    wire.push(lambda: 8.0 < wrenches[-1].wrench.torque.z < 12.0)  # a busy listener hears them after states
     assert wire.goal() == (wire.counts(10.0), True)
     table = TABLES[54024]
     start = table.sample[0]
@@ -51,7 +52,6 @@ def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, lis
     for message in states:
         assert round(message.position[0] * table.pulses / 6.283185307179586) in positions
         assert round(message.velocity[0], 12) in velocities
-    assert 8.0 < wrenches[-1].wrench.torque.z < 12.0
 
 
 def test_commands_beyond_the_limit_are_cut_down_and_counted(wire, listener):

@@ -190,3 +190,17 @@ def test_docs_show_every_key():
     """To mend it: write what `tables()` returns behind the mark in docs/import.md."""
     page = (Path(__file__).parents[3] / "docs" / "import.md").read_text(encoding="utf-8")
     assert page.partition("<!-- tables -->\n")[2] == tables()
+
+
+def test_of_a_value_that_the_log_repeats_the_first_row_is_kept(files):
+    """A controller's log at 1 kHz repeated each reading for 15 ms, and each row counted as one."""
+    held = "channels: {position: {column: phi, unit: rad, held: true}, command: {column: load, unit: N m}}"
+    csv = "t;phi;load\n0;1;1\n1;1;2\n2;1;3\n3;2;4\n4;2;5\n5;4;6\n"
+    record = files("time: {column: t, unit: s}\n" + held, csv)
+    assert record["position"].t.tolist() == [0.0, 3.0, 5.0]
+    assert record["position"].y.tolist() == [1.0, 2.0, 4.0]
+    assert len(record["command"]) == 6
+    with pytest.raises(ImportMapError, match="held at 1, expected values that change"):
+        files("time: {column: t, unit: s}\n" + held, "t;phi;load\n0;1;1\n1;1;2\n2;1;3\n")
+    with pytest.raises(ImportMapError, match="held is 'yes', expected true or false"):
+        files("time: {column: t, unit: s}\n" + held.replace("true", "'yes'"), csv)
