@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -15,9 +15,11 @@ from rsea_ros.diagnosis.selection import Selection, Trial, trial_of
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.effects.catalogue import effect_named, look_alikes
 from rsea_ros.effects.effect import Effect
+from rsea_ros.effects.guess import Guess
 from rsea_ros.identification.problem import Problem
 from rsea_ros.identification.unknowns import apply
 from rsea_ros.identification.workers import Pools
+from rsea_ros.model.rig_fields import FIELDS
 from rsea_ros.signals import FloatArray
 
 
@@ -47,11 +49,14 @@ class ReducedModels:
             self.fitted[model.causes] = dict(zip(model.causes, models, strict=True))
         return self.fitted[model.causes]
 
-    def with_rivals(self, model: Candidate) -> list[tuple[str, str, Candidate]]:
+    def with_rivals(
+        self, model: Candidate, trials: Sequence[Trial] = ()
+    ) -> list[tuple[str, str, Candidate]]:
         """Return cause, another effect that it is said to be confused with, and the model with that.
 
         The other is simpler, or as simple where the choice between them was made without the other causes
         and the model is near the floor: far from it priors say nothing.
+        trials: of the steps forward. Where one was of the same effects, the fit begins with what it reached.
         """
         as_simple = len(model.causes) > 1 and not self._is_far(model)
         pairs = [
@@ -62,7 +67,8 @@ class ReducedModels:
             and effect_size(rival.name) < effect_size(name) + as_simple
         ]
         rests = self.without(model) if pairs else {}
-        models = self.pools.fits.map(lambda pair: self._with(model, rests[pair[0]], *pair), pairs)
+        tried = partial(self._with, model, rests, trials)
+        models = self.pools.fits.map(lambda pair: tried(*pair), pairs)
         return [
             (name, rival.name, m) for (name, rival), m in zip(pairs, models, strict=True) if m is not None
         ]
@@ -76,12 +82,22 @@ class ReducedModels:
         """Fit a model again without one of its causes."""
         return self._fit(model, *without_effect(model.problem, model.solution.theta, name))
 
-    def _with(self, model: Candidate, rest: Candidate, name: str, rival: Effect) -> Candidate | None:
+    def _with(
+        self,
+        model: Candidate,
+        rests: Mapping[str, Candidate],
+        trials: Sequence[Trial],
+        name: str,
+        rival: Effect,
+    ) -> Candidate | None:
         """Fit a model again with a rival, of the same size where that is one, in the place of a cause."""
-        old, solution = effect_named(name).main, rest.solution
+        rest, old = rests[name], effect_named(name).main
+        solution = rest.solution
         same = {rival.main.name: model.solution.values[f"{name}.{old.name}"]}
-        rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
-        guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
+        guesses = [reached_by(t, rival) for t in trials if is_trial_of(t, rival.name, rest)][-1:]
+        if not guesses:
+            rig, _ = apply(rest.problem.rig, rest.problem.unknowns, solution.theta)
+            guesses = initial_guesses(rival, RecordView(model.cases[0], rig, rest.outputs[0]))
         guesses += [{**rival.typical, **same}] if old.unit == rival.main.unit else []
         screened = screen(solution, rival, guesses, self.settings.forward)
         return None if screened is None else self._fit(model, screened.problem, screened.theta)
@@ -108,7 +124,7 @@ def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
 def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
     """Put in a cause's place one that it is said to be confused with, if that is simpler or likelier."""
     last = selection.last
-    for name, rival, other in models.with_rivals(last):
+    for name, rival, other in models.with_rivals(last, selection.trials):
         if models.is_needed(last, other):
             continue
         without = models.without(last)[name]
@@ -134,6 +150,20 @@ def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
         rests = models.without(largest).values()
         nested.append(min(rests, key=lambda m: float(m.validation.loss(largest.validation).sum())))
     return replace(selection, models=(selection.models[0], *_in_order(list(reversed(nested)))))
+
+
+def is_trial_of(trial: Trial, name: str, model: Candidate) -> bool:
+    """Return whether a trial is of an effect beside a model, or one with the same causes."""
+    return trial.name == name and set(trial.beside.causes) == set(model.causes)
+
+
+def reached_by(trial: Trial, effect: Effect) -> Guess:
+    """Return the parameters of an effect that its trial reached; of a mode, the rig's values with them."""
+    unknowns = zip(trial.problem.unknowns, trial.theta, strict=True)
+    values = {u.name: u.outer(float(t)) for u, t in unknowns}
+    rig = {n: v for n, v in values.items() if n in FIELDS} if "mode" in effect.tags else {}
+    mine = {p.name: f"{effect.name}.{p.name}" for p in effect.parameters}
+    return {**rig, **{p: values[n] for p, n in mine.items() if n in values}}
 
 
 def _in_order(models: list[Candidate]) -> list[Candidate]:

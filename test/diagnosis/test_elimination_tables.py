@@ -11,7 +11,7 @@ from scripted import POOLS, Script, script
 
 from rsea_ros.diagnosis import backward_elimination as elimination
 from rsea_ros.diagnosis.backward_elimination import ReducedModels, eliminate_backwards, nested_sequence
-from rsea_ros.diagnosis.selection import Selection
+from rsea_ros.diagnosis.selection import Selection, trial_of
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
 
@@ -208,6 +208,17 @@ def test_a_rival_begins_with_the_size_of_the_cause_where_that_is_one(world, caus
         assert len(begun) == 1
     else:
         assert begun[1:] == [{**effect_named(rival).typical, effect_named(rival).main.name: 0.75}]
+
+
+@pytest.mark.parametrize(("beside", "is_used"), [((), True), ((GAP,), False)])
+def test_a_rival_begins_where_its_trial_beside_the_same_causes_ended(world, beside, is_used):
+    it = world(script({"": 9.0, STRIBECK: 1.0, FRICTION: 4.0, GAP: 5.0, f"{FRICTION}+{GAP}": 4.0}), FRICTION)
+    tried = it.fits.candidate(*beside, FRICTION)
+    tried.solution.theta[1:] = 0.5
+    trial = trial_of(tried, FRICTION, it.fits.candidate(*beside), "explains_less")
+    it.models.with_rivals(it.fits.candidate(STRIBECK), [trial])
+    reached = {p.name: 0.5 for p in effect_named(FRICTION).parameters}
+    assert it.guesses[FRICTION][0] == (reached if is_used else {"from": "residual"})
 
 
 def test_models_nest_from_the_most_useful_cause_on(world):
