@@ -1,7 +1,8 @@
 """A loop that does nothing at absolute deadlines: what the machine allows, measured beside what is judged.
 
-Run: bare_loop.py RATE SECONDS PRIORITY FILE [PORT]. The file gets a row for each cycle: due, begun, ns. With
-a PORT each cycle does what a driver cannot leave out: two requests to the motor there, each with its reply.
+Run: bare_loop.py RATE SECONDS PRIORITY FILE [PORT]. The file gets a row for each cycle: due, begun, done, ns.
+With a PORT each cycle does what a driver cannot leave out: two requests to the motor there, each with its
+reply.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class BareLoop:
         self._process = subprocess.Popen([sys.executable, *words], stdin=subprocess.DEVNULL)
 
     def cycles(self) -> np.ndarray:
-        """Wait for its end and return due and begun of each cycle, shape (n, 2), ns."""
+        """Wait for its end and return due, begun and done of each cycle, shape (n, 3), ns."""
         self._process.wait()
         return np.load(self._file)
 
@@ -74,10 +75,11 @@ def main() -> None:
         wait = due - time.monotonic_ns()
         if wait > 0:
             time.sleep(wait / 1e9)
-        cycles.extend((due, time.monotonic_ns()))
+        begun = time.monotonic_ns()
         if port is not None:
             exchange(port)
-    np.save(sys.argv[4], np.array(cycles).reshape(-1, 2))
+        cycles.extend((due, begun, time.monotonic_ns()))
+    np.save(sys.argv[4], np.array(cycles).reshape(-1, 3))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ judged on the latter.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
 
+from calibration_laws import LAWS, RATE
 from independent.bench import drawn_bench, record_command
 from independent.hidden import OFF_CATALOGUE, hide, hide_off_catalogue
 from independent.severities import SEVERITIES, SIZES, drawn_parameters
@@ -28,7 +29,6 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import measure, simulate
 from rsea_ros.signals import Channel, FloatArray, Record
 
-RATE = 280.0
 FAMILIES = ("open", "second", "loop", "second", "sea", "second", "rigid", "second")
 """Plants in the order in which records are made; `second` judges the others."""
 GROUPS = {
@@ -259,92 +259,3 @@ def _with_colour(record: Record, plan: Plan, rng: np.random.Generator) -> Record
     slow = np.convolve(white, np.exp(-np.arange(40) / 8.0), mode="same")
     ft = record["ft"].y + plan.coloured * slow / slow.std()
     return record.with_channels(ft=Channel(record["ft"].t, ft))
-
-
-@dataclass(frozen=True)
-class Law:
-    """A law for the diagnosis not to know, in the command before it acts or in what the sensors say.
-
-    on: the plants that show it. known_as: the effect of the catalogue that it is, which is left out then.
-    """
-
-    on: tuple[str, ...]
-    command: Callable[[FloatArray, float], FloatArray] | None = None
-    sensor: Callable | None = None
-    known_as: str = ""
-
-
-def _dead_zone(u: FloatArray, size: float) -> FloatArray:
-    width = 3.0 * size
-    return np.sign(u) * np.maximum(np.abs(u) - width, 0.0)
-
-
-def _rate_limit(u: FloatArray, size: float) -> FloatArray:
-    step, out = 1500.0 / size / RATE, np.empty_like(u)
-    last = 0.0
-    for k, wanted in enumerate(u):
-        last += min(max(wanted - last, -step), step)
-        out[k] = last
-    return out
-
-
-def _fade(u: FloatArray, size: float) -> FloatArray:
-    return u * (1.0 - 0.2 * size * np.linspace(0.0, 1.0, len(u)))
-
-
-def _one_sided(u: FloatArray, size: float) -> FloatArray:
-    return np.where(u > 0.0, (1.0 + 0.12 * size) * u, u)
-
-
-def _overshoot(u: FloatArray, size: float) -> FloatArray:
-    from scipy.signal import cont2discrete, lfilter
-
-    w, zeta = 2.0 * np.pi * 40.0, 0.5 / (1.0 + size)
-    b, a, _ = cont2discrete(([w * w], [1.0, 2.0 * zeta * w, w * w]), 1.0 / RATE)
-    return lfilter(b.ravel(), a, u)
-
-
-def _sensor(channel: str, error: Callable[..., FloatArray]) -> Callable:
-    def apply(measured, size, t, rng):
-        y = measured[channel]
-        return {**measured, channel: y + size * error(y, t, rng)}
-
-    return apply
-
-
-LAWS = {
-    "dead_zone": Law(("open", "sea"), command=_dead_zone, known_as="dead_zone"),
-    "rate_limit": Law(("open", "sea"), command=_rate_limit),
-    "fade": Law(("open", "sea"), command=_fade, known_as="torque_constant_drift"),
-    "one_sided_gain": Law(("open", "sea"), command=_one_sided),
-    "overshoot": Law(("open", "sea"), command=_overshoot, known_as="current_loop_overshoot"),
-    "quadratic_ft": Law(("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 0.004 * y**2)),
-    "thermal_ft": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("ft", lambda y, t, rng: -np.expm1(-t / (0.2 * t[-1]))),
-        known_as="ft_drift",
-    ),
-    "walking_ft": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("ft", lambda y, t, rng: 0.15 * np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)),
-    ),
-    "cubic_ft": Law(
-        ("open", "sea", "loop"), sensor=_sensor("ft", lambda y, t, rng: 2.0e-4 * y**3 / (1.0 + 0.01 * y**2))
-    ),
-    "eccentric_encoder": Law(
-        ("open", "sea", "loop"),
-        sensor=_sensor("position", lambda y, t, rng: 1.0e-4 * np.sin(502.0 * y)),
-        known_as="encoder_eccentricity",
-    ),
-    "torque_by_position": Law(
-        ("rigid",), sensor=_sensor("motor_torque", lambda y, t, rng: 1.5 * np.sin(2.0 * np.pi * t / 1.7))
-    ),
-    "torque_squared": Law(("rigid",), sensor=_sensor("motor_torque", lambda y, t, rng: 0.01 * y * np.abs(y))),
-    "torque_walk": Law(
-        ("rigid",),
-        sensor=_sensor(
-            "motor_torque", lambda y, t, rng: 0.5 * np.cumsum(rng.normal(size=len(y))) / np.sqrt(RATE)
-        ),
-    ),
-}
-"""Laws outside the catalogue by name."""

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from diagnosis_outcome import FLOOR, OUTSIDE, Found, Outcome
+from diagnosis_outcome import OUTSIDE, Found, Outcome
 from independent.hidden import BESIDE_THE_CONTRACT, CATALOGUE
+
+from rsea_ros.diagnosis.settings import DEFAULT
 
 HIDDEN = ("single", "newer", "pair", "drawn_pair", "drawn_triple")
 NAMES = tuple(dict.fromkeys((*CATALOGUE, *BESIDE_THE_CONTRACT)))
@@ -36,6 +38,7 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
     """Return the issue's measures, in the issue's order; one without a case is left out."""
     found = [f for o in outcomes if o.group in HIDDEN for f in o.found if f.main]
     ended = [o for o in outcomes if o.group in (*HIDDEN, "clean") and not o.error]
+    floor = DEFAULT.floor.reached
     groups = {name: [o for o in outcomes if o.group == name] for name in {o.group for o in outcomes}}
     lines = [
         _at_least("first cause right, one effect, %", _right(groups.get("single", ())), 97.0),
@@ -65,10 +68,10 @@ def measures(outcomes: Sequence[Outcome]) -> list[Measure]:
         _at_most("main parameter, median error, %", [100.0 * f.error for f in found], 3.0),
         _at_least("main parameter within 10 %, %", [f.error <= 0.1 for f in found], 100.0),
         _at_least("main parameter in its 95 % interval, %", [f.covered for f in found], 90.0),
-        _at_least("held-out residual at the noise floor, %", [o.times_noise <= FLOOR for o in ended], 95.0),
+        _at_least("held-out residual at the noise floor, %", [o.times_noise <= floor for o in ended], 95.0),
         _at_least(
             "residual on a fresh record at the noise floor, %",
-            [o.times_noise_fresh <= FLOOR for o in ended if isfinite(o.times_noise_fresh)],
+            [o.times_noise_fresh <= floor for o in ended if isfinite(o.times_noise_fresh)],
             95.0,
         ),
         _at_least(

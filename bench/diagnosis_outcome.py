@@ -22,8 +22,6 @@ from rsea_ros.signals import Record
 ERROR = "error"
 OUTSIDE = ("off_catalogue", "taken_out", "unsearched")
 """Groups whose effect the diagnosis does not have, or does not try unless a rig states it."""
-FLOOR = 1.1
-"""A held-out residual at most so many times the noise is at the noise floor."""
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """Controller and driver together on the bench on a wire, quiet and beside processes that burn every core.
 
 A sine of 5 Hz, 10 N m, 4.7 N m with a free end: its error, RMS, and the largest |ft|, which a load may not
-raise. The bare loop of the same minute tells what the machine can. The bench on a wire runs at SCHED_FIFO
-if that is permitted: motor and sensor have processors of their own; at 1 kHz a bench that waits for one is
-a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where permitted
-(--priority): the machine's other work is then out of their way, but for the kernel's worker that carries
-the bytes of a pseudo-terminal.
+raise. The bare loop of the same minute tells what the machine can, and so does a loop of nothing but the
+two requests to the motor, on the same terminal once the driver has left it: how long it waits for a reply,
+and how many faults the driver's rule would make of that. The bench on a wire runs at SCHED_FIFO if that is
+permitted, above both nodes: motor and sensor have processors of their own; at 1 kHz a bench that waits for
+one is a motor that does not answer. Each rate as any process, and with both nodes at SCHED_FIFO where
+permitted (--priority): the machine's other work is then out of their way, but for the kernel's worker that
+carries the bytes of a pseudo-terminal.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from bench.bare_loop import permitted
+from bench.bare_wire import ALONE, wire_alone
 from bench.driver_lateness import Torques, noted_controller, row, to_zero
 from bench.torque_control_nodes import Outside, running, sine
 from msg_adapters.ros import Trigger
@@ -43,11 +46,23 @@ class Kind(NamedTuple):
     asked: float
 
 
+class Trial(NamedTuple):
+    """What came of one: in words; largest |ft|, N m; whether replies were lost; what the wire does alone."""
+
+    told: str
+    largest: float
+    lost: bool
+    wire_faults: int
+    alone: str
+
+
 LOCKED = Kind("locked", "paper_high_impedance", 10.0, 2.0)
 FREE = Kind("free", "paper_moving_output", 4.7, 4.0)
 """4.7 N m: more on a free end is beyond a motor of 68 N m."""
 PATIENT = {"lost_cycles": 100, "ft_timeout": 1.0, "command_timeout": 1.0}
 """Of the driver on a machine whose terminals stall: then the error says what the controller does between."""
+TRIES = 3
+"""Of a quiet trial in which the wire itself lost the replies."""
 MEASURED, ATTEMPTS = 3, 8
 """Faults by lateness that are measured, and how often one is tried for."""
 BURN = "while True: pass"
@@ -75,47 +90,63 @@ def controller(args: argparse.Namespace, folder: Path) -> list[tuple[str, str, s
         for priority in filter(permitted, args.priority):
             for bench, load in ((LOCKED, 0), (FREE, 0), (LOCKED, os.cpu_count() or 1)):
                 place = folder / f"{bench.name}{rate:g}-{load}-{priority}"
-                rows += _trial(bench, rate, load, priority, place, PATIENT if args.patient else {})
+                rows += _tried(bench, rate, load, priority, place, PATIENT if args.patient else {})
         rows.append(_lateness_fault(rate, max(filter(permitted, args.priority)), folder))
     rclpy.shutdown()
     return rows
 
 
-def _trial(
+def _tried(
     kind: Kind, rate: float, load: int, priority: int, path: Path, patient: Mapping[str, object]
 ) -> list[tuple[str, str, str]]:
-    """Run one trial; a fault ends the sine, which is part of what is asked."""
+    """Run one trial; again where the driver lost replies while nothing ran beside it that should, and the
+    wire alone makes such faults: that is no answer to what is asked."""
+    for again in range(TRIES):
+        trial = _trial(kind, rate, load, priority, path.with_name(f"{path.name}-{again}"), patient)
+        if load or not trial.lost or not trial.wire_faults:
+            break
+    beside = f"beside {load} that burn" if load else "quiet"
+    name = f"{kind.name}, {rate:g} Hz, {beside}"
+    name += (f", FIFO {priority}" if priority else "") + (", patient" if patient else "")
+    done = f"; done {again} times before: the wire alone makes such faults" if again else ""
+    return [
+        (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", trial.told + done),
+        (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N m", f"{trial.largest:.2f} N m"),
+        (f"{name}: the two requests alone, {ALONE:g} s", "", trial.alone),
+    ]
+
+
+def _trial(
+    kind: Kind, rate: float, load: int, priority: int, path: Path, patient: Mapping[str, object]
+) -> Trial:
+    """Run one trial once; a fault ends the sine, which is part of what is asked."""
     outside = Outside()
-    with ExitStack() as kept:
+    with ExitStack() as kept, ExitStack() as nodes:
         bench = kept.enter_context(RemoteBench(path, "--rig", kind.rig))
-        bench.hurry()
+        bench.hurry(priority + 1 if priority else 50)
         own = {**bench.parameters(), "baud": 4_000_000, "autostart": "true", "rig": kind.rig}
         both = {"rate": rate, "realtime_priority": priority}
-        kept.enter_context(running("driver", 0, **own, **both, **patient))
-        kept.enter_context(running("controller", 0, rig=kind.rig, **both))
+        nodes.enter_context(running("driver", 0, **own, **both, **patient))
+        nodes.enter_context(running("controller", 0, rig=kind.rig, **both))
         outside.until(lambda: outside.wrenches and len(outside.commands) > 50)
         kept.enter_context(burning(load))
         late = _lateness(rate)
         _drive(outside)
         begun = time.monotonic_ns()
         errors = sine(outside, kind.amplitude, rate) or [math.nan]  # none where ft was lost for good
-        largest = max(abs(torque) for _, torque, _ in outside.wrenches)
-        faults = _faults(outside)
+        largest, faults = max(abs(torque) for _, torque, _ in outside.wrenches), _faults(outside)
         acting = sum(goal != 0 and on for _, goal, on in bench.log(begun)["torque"])
+        nodes.close()
+        wire_faults, alone = wire_alone(rate, priority, path.parent, bench)
     outside.node.destroy_node()
-    beside = f"beside {load} that burn" if load else "quiet"
-    name = f"{kind.name}, {rate:g} Hz, {beside}"
-    name += (f", FIFO {priority}" if priority else "") + (", patient" if patient else "")
     own = outside.health.get("controller", {})
     share, missed = own.get("feedback_share"), own.get("missed_measurements")
-    told = f"feedback at the end {share}, {own.get('late_commands')} late, {missed} measurements missed"
-    told += f", faults {faults or 'none'}, bare loop late in {late:.1%} of its cycles"
-    error = f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
-    told = f"{error}, {acting} writes of torque, {told}"
-    return [
-        (f"{name}: error", f"≤ {kind.asked:g} %" if not load else "", told),
-        (f"{name}: largest |ft|", f"≤ {1.3 * kind.amplitude:.3g} N m", f"{largest:.2f} N m"),
-    ]
+    told = f"median of periods {100.0 * median(errors):.2f} %, worst {100.0 * max(errors):.1f} %"
+    told += f", {acting} writes of torque, feedback at the end {share}, {own.get('late_commands')} late"
+    told += f", {missed} measurements missed, faults {faults or 'none'}"
+    told += f", bare loop late in {late:.1%} of its cycles"
+    lost = any(fault.startswith("no_reply") for fault in faults)
+    return Trial(told, largest, lost, wire_faults, alone)
 
 
 def _lateness_fault(rate: float, priority: int, folder: Path) -> tuple[str, str, str]:

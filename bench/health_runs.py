@@ -20,6 +20,7 @@ from rsea_ros.health.settings import Settings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import Channel, FloatArray, Record
 
 RATE, PIECE = 280.0, 60.0
@@ -64,7 +65,7 @@ def drawn(rng: np.random.Generator) -> tuple[Bench, Rig]:
     for name, key in names.items():
         sigma = DOUBT[name] * values[key]
         value = values[key] + sigma * rng.standard_normal()
-        quantities[name] = Quantity(value, 0.05, "drawn", (value - 1.96 * sigma, value + 1.96 * sigma))
+        quantities[name] = Quantity(value, 0.05, "drawn", (value - Z95 * sigma, value + Z95 * sigma))
     torque = values["coulomb"] * (1.0 + FRICTION_DOUBT * rng.standard_normal())
     known = replace(rig, quantities=quantities)
     return Bench().having(**values), known.with_effects(EffectSetting("coulomb_friction", {"torque": torque}))

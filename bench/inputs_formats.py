@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import io
 import json
 import random
 from collections.abc import Callable, Sequence
@@ -17,7 +16,22 @@ from inputs_arrays import damaged_npz, damaged_parquet
 from inputs_bag_files import bag_of_views, damaged_mcap, damaged_sqlite
 from inputs_bytes import damaged
 from inputs_documents import damaged_json, damaged_table, damaged_yaml
-from inputs_outcome import REFUSED, RESULT, Outcome, call
+from inputs_outcome import REFUSED, RESULT, Outcome, Play, call
+from inputs_tables import (
+    CSV,
+    EXPRESSED,
+    LISTED,
+    MAP,
+    RATED,
+    STRUCTS,
+    damaged_gzip,
+    json_tables,
+    mat_files,
+    npz_files,
+    parquet_files,
+    play_import,
+    struct_files,
+)
 
 from msg_adapters import iterate, read_record, write_record
 from rsea_ros.cli.simulate import parse_effect
@@ -33,7 +47,6 @@ RIG = "paper_high_impedance"
 EVERY = 8
 """Of what is read without complaint, one in so many goes on into a verb that computes with it."""
 Damage = Callable[[random.Random, bytes, bytes], bytes]
-Play = Callable[[Path, bytes, int], Outcome]
 
 
 @dataclass(frozen=True)
@@ -128,122 +141,6 @@ def _play_rig(folder: Path, data: bytes, number: int) -> Outcome:
         ["simulate", str(rig), "--out", str(bag), "--duration", "1", "--no-noise", "--excitation", "steps"],
     )
     return call(verbs[number % 3])
-
-
-CSV = "t,phi,i,load\n" + "".join(f"{k / 100:.2f},{k % 7},{k % 11 - 5},{k}\n" for k in range(60))
-MAP = """about: a bench
-time: {column: t, unit: s}
-where: {column: load, below: 50}
-channels:
-  position: {column: phi, unit: deg, sign: -1}
-  command: [{column: i, unit: mA, scale: 6.8}, {column: load, unit: N m, constant: 0.5}]
-"""
-
-
-RATED = """delimiter: ","
-time: {rate: 100}
-where: {column: load, from: 3}
-channels: {velocity: {column: phi, unit: rpm}, position: [{column: i, unit: mrad, scale: 1, constant: 0}]}
-"""
-
-
-EXPRESSED = """header: true
-time: {expression: "t + 0 * i", unit: s}
-runs: {column: load}
-channels:
-  position: {expression: "derivative(clip(phi, -3, 3)) * column('i') ** 2", unit: deg}
-"""
-LISTED = """time: {column: t, unit: s}
-channels:
-  position: {column: "q[1]", unit: deg}
-  command: {expression: "i * column('q[0]')", unit: mA, scale: 3}
-"""
-
-
-def _play_import(file_name: str, is_map: bool, of_file: str = MAP) -> Play:
-    def play(folder: Path, data: bytes, number: int) -> Outcome:
-        table, maps = folder / file_name, folder / "map.yaml"
-        table.write_bytes(_CSV_AS[file_name] if is_map else data)
-        maps.write_bytes(data if is_map else of_file.encode())
-        return call(["import", str(table), "--map", str(maps), "--out", str(folder / f"bag{number}.mcap")])
-
-    return play
-
-
-def _mat() -> list[bytes]:
-    from scipy.io import savemat
-
-    rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
-    columns = dict(zip(("t", "phi", "i", "load"), rows.T, strict=True))
-    kinds = ({"do_compression": False}, {"do_compression": True}, {"format": "4"})
-    files = []
-    for options in kinds:
-        buffer = io.BytesIO()
-        savemat(buffer, columns, **options)
-        files.append(buffer.getvalue())
-    return files
-
-
-def _columns() -> dict[str, np.ndarray]:
-    """Return t, i and load, and q with a matrix of two columns."""
-    rows = np.array([[float(c) for c in line.split(",")] for line in CSV.splitlines()[1:]])
-    return dict(zip(("t", "phi", "i", "load"), rows.T, strict=True)) | {"q": rows[:, 1:3]}
-
-
-def _npz() -> list[bytes]:
-    files = []
-    for save in (np.savez, np.savez_compressed):
-        buffer = io.BytesIO()
-        save(buffer, **_columns())
-        files.append(buffer.getvalue())
-    return files
-
-
-def _parquet() -> list[bytes]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    files = []
-    for codec in ("snappy", "none"):
-        buffer = io.BytesIO()
-        columns = {name: pa.array(list(y)) for name, y in _columns().items()}
-        pq.write_table(pa.table(columns), buffer, row_group_size=20, compression=codec)
-        files.append(buffer.getvalue())
-    return files
-
-
-def _json() -> list[bytes]:
-    columns = {name: y.tolist() for name, y in _columns().items()}
-    records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return [json.dumps(columns).encode(), json.dumps(records).encode()]
-
-
-def _structs() -> list[bytes]:
-    from scipy.io import savemat
-
-    buffer = io.BytesIO()
-    savemat(buffer, {"log": {**_columns(), "notes": "a bench"}, "spare": np.zeros(3)})
-    return [buffer.getvalue()]
-
-
-STRUCTS = """time: {column: log.t, unit: s}
-channels: {position: {column: "log.q(:,2)", unit: deg}, command: {column: log.i, unit: mA, scale: 3}}
-"""
-_CSV_AS = {
-    "run.csv": CSV.encode(),
-    "run.tsv": CSV.replace(",", "\t").encode(),
-    "run.csv.gz": gzip.compress(CSV.encode()),
-}
-
-
-def _gzipped(rng: random.Random, data: bytes, other: bytes) -> bytes:
-    try:
-        plain = gzip.decompress(data)
-    except Exception:
-        return damaged(rng, data, other)
-    if rng.random() < 0.02:
-        return gzip.compress(bytes(400_000_000), compresslevel=1)
-    return gzip.compress(damaged_table(rng, plain)) if rng.random() < 0.5 else damaged(rng, data, other)
 
 
 def _units() -> list[bytes]:
@@ -343,16 +240,16 @@ FORMATS = (
         "map",
         lambda: [MAP.encode(), RATED.encode(), EXPRESSED.encode()],
         damaged_yaml,
-        _play_import("run.csv", True),
+        play_import("run.csv", True),
     ),
-    Format("structs.mat", _structs, damaged, _play_import("run.mat", False, STRUCTS)),
-    Format("npz", _npz, damaged_npz, _play_import("run.npz", False, LISTED)),
-    Format("parquet", _parquet, damaged_parquet, _play_import("run.parquet", False, LISTED)),
-    Format("json.table", _json, damaged_json, _play_import("run.json", False, LISTED)),
-    Format("csv", lambda: [CSV.encode()], damaged_table, _play_import("run.csv", False)),
-    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, _play_import("run.tsv", False)),
-    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], _gzipped, _play_import("run.csv.gz", False)),
-    Format("mat", _mat, damaged, _play_import("run.mat", False)),
+    Format("structs.mat", struct_files, damaged, play_import("run.mat", False, STRUCTS)),
+    Format("npz", npz_files, damaged_npz, play_import("run.npz", False, LISTED)),
+    Format("parquet", parquet_files, damaged_parquet, play_import("run.parquet", False, LISTED)),
+    Format("json.table", json_tables, damaged_json, play_import("run.json", False, LISTED)),
+    Format("csv", lambda: [CSV.encode()], damaged_table, play_import("run.csv", False)),
+    Format("tsv", lambda: [CSV.replace(",", "\t").encode()], damaged_table, play_import("run.tsv", False)),
+    Format("csv.gz", lambda: [gzip.compress(CSV.encode())], damaged_gzip, play_import("run.csv.gz", False)),
+    Format("mat", mat_files, damaged, play_import("run.mat", False)),
     Format("catalogue", _units, damaged_yaml, _play_units),
     Format("calibration", lambda: [PAGE, BOMB], damaged, _play_page),
     Format("json", _noise, damaged_json, _play_noise),

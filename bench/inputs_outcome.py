@@ -15,12 +15,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from rsea_ros.cli.main import FAULT, main
+
 MEMORY = 1_500 * 1024**2
 """Bytes of private writable memory (RLIMIT_DATA): address space alone says nothing with compiled code."""
 SPARE = 256 * 1024**2
 SECONDS = 60
 """s of processor time, all threads together: a busy machine does not change it."""
-LAST_NET = "this is a fault of rsea"
 RESULT, REFUSED = "result", "refused"
 TOLERATED = (0, 1)
 """Exit statuses of a result: done, and a finding that was asked for by status."""
@@ -42,6 +43,10 @@ class Outcome:
     def is_fault(self) -> bool:
         """Whether the promise was broken."""
         return self.kind in FAULTS
+
+
+Play = Callable[[Path, bytes, int], Outcome]
+"""Reads the bytes of a file in a folder, the n-th of its format."""
 
 
 def limit_child(seconds: int = SECONDS) -> None:
@@ -70,8 +75,6 @@ def more_memory() -> None:
 
 def call(arguments: list[str]) -> Outcome:
     """Run `rsea ARGUMENTS` in this process and judge status and output."""
-    from rsea_ros.cli.main import main
-
     warned: list[str] = []
     os.environ["RSEA_TRACEBACK"] = "1"
 
@@ -128,7 +131,7 @@ def judge(status: int | str | None, out: str, err: str, is_json: bool) -> Outcom
     """Hold status and output to the promise: a result, or status 2 and one line that says what is wrong."""
     lines = err.strip().splitlines()
     last = lines[-1] if lines else ""
-    if LAST_NET in err:
+    if FAULT in err:
         return Outcome("last net", _pattern(last), err[-3000:])
     if "Traceback" in err:
         return Outcome("traceback", last, err[-3000:])

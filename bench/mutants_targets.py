@@ -14,7 +14,10 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "identification/noise": ("identification/test_noise_tables.py",),
     "identification/quantum": ("identification/test_noise_tables.py",),
     "identification/noise_level": ("identification/test_noise_level_tables.py",),
-    "identification/coloured": ("identification/test_coloured_tables.py",),
+    "identification/coloured": (
+        "identification/test_coloured_tables.py",
+        "identification/test_coloured_measures.py",
+    ),
     "identification/clocks": ("identification/test_clock_tables.py",),
     "diagnosis/criteria": ("diagnosis/test_criteria_edges.py", "diagnosis/test_criteria.py"),
     "diagnosis/stepwise": ("diagnosis/test_stepwise_tables.py",),

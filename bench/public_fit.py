@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rsea_ros.effects.catalogue import effect_named
+from rsea_ros.identification.fit import unknowns_of
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution, solve
-from rsea_ros.identification.unknowns import apply, unknowns_of_effect, unknowns_of_rig
+from rsea_ros.identification.unknowns import apply
 from rsea_ros.model.drive import Drive, drive_from
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.simulation import simulate_drive
@@ -68,8 +68,7 @@ def case_of(
 
 def fitted(rig: Rig, cases: Sequence[Case], iterations: int = 60) -> Solution:
     """Return the fit of all free values of a rig and its effects, by output error on position."""
-    effects = [unknowns_of_effect(effect_named(e.name), e.parameters, rig.known) for e in rig.effects]
-    unknowns = (*unknowns_of_rig(rig), *(u for group in effects for u in group))
+    unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
     return solve(Problem(tuple(cases), rig, unknowns, ("position",)), iterations=iterations)
 
 

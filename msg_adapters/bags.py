@@ -18,6 +18,8 @@ SCANNERS: Mapping[str, Callable[[Path, Contents, Allowance], None]] = {
     ".db3": lambda path, contents, allowance: sqlite_file.scan(path, contents),
 }
 PACKED = ".zstd"
+TABLES = (".csv", ".tsv", ".txt", ".dat", ".mat", ".npz", ".npy", ".json", ".parquet", ".pq")
+"""Suffixes of files that `rsea import` converts."""
 
 BagPath = str | Path
 
@@ -25,8 +27,8 @@ BagPath = str | Path
 def read_contents(paths: BagPath | Sequence[BagPath], wanted: Collection[str] | None = None) -> Contents:
     """Read the serialised messages of one bag, or of several that belong together.
 
-    wanted: topics whose messages are kept, None for all; the types of the others are told all the same.
-    Raises BagError for what is missing, unreadable, no bag, or damaged.
+    wanted: topics whose messages are kept, None for all; the types of the others are returned too.
+    Raises BagError for files that are missing, unreadable, damaged, or not a bag.
     """
     contents = Contents(wanted)
     parts: list[Contents] = []
@@ -89,7 +91,7 @@ def _bag(path: Path, contents: Contents) -> list[Contents]:
 
 
 def _scan_all(files: Sequence[Path], contents: Contents) -> list[Contents]:
-    """Return what each file holds. One that cannot be read is left out and reported, if others can."""
+    """Return the contents of each file. One that cannot be read is left out and reported, if others can."""
     parts = []
     errors = []
     for file in files:
@@ -108,9 +110,10 @@ def _suffix(file: Path) -> str:
 
 
 def _scan(file: Path, contents: Contents) -> Contents:
-    """Return what a file holds; its notes and faults go to the contents of the whole."""
+    """Return the contents of a file; its notes and faults are added to those of the bag."""
     if _suffix(file) not in SCANNERS:
-        raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file")
+        table = f"; a table becomes a bag by rsea import {file} --map MAP" if _suffix(file) in TABLES else ""
+        raise BagError(f"{file}: no bag, expected a directory, or a .mcap or .db3 file{table}")
     if file.stat().st_size == 0:
         raise BagError(f"{file}: empty file")
     part = Contents(contents.wanted)

@@ -143,7 +143,7 @@ def blocks(
 ) -> Iterator[Block]:
     """Sort the messages of a topic by layout.
 
-    damaged: takes index and reason of each message that is none; they are left out.
+    damaged: called with index and reason of each damaged message; they are left out.
     Raises BagError where no message is left; `where` (file and topic) is for its text.
     """
     damaged = {} if damaged is None else damaged

@@ -1,4 +1,4 @@
-"""What is refused before a model is fitted to it."""
+"""Records that are refused before a model is fitted to them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def note_repeats(series: Series, notes: list[str]) -> None:
 def on_the_clock_of_the_command(series: Mapping[str, Series], told: Contents) -> dict[str, Series]:
     """Leave out channels without a moment in common with the command: their stamps come from another clock.
 
-    Whoever simulated from the command's first stamp to their last would go through all the years between.
+    A simulation from the command's first stamp to their last would go through all the years between.
     """
     command = series.get("command")
     kept = {}

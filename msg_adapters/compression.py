@@ -1,7 +1,7 @@
 """The three places where a bag may be compressed: the whole file, each chunk, each message.
 
-A few bytes may unpack to as many gigabytes as their maker likes. So every file has an allowance, in
-proportion to its size, and nothing is unpacked beyond it or beyond the size that was declared.
+A few bytes may unpack to any number of gigabytes. So every file has an allowance, in
+proportion to its size, and nothing is unpacked beyond it or beyond the declared size.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Allowance:
         self._limit = self.left = SLACK + RATIO * packed
 
     def take(self, count: int) -> None:
-        """Use some of it up. Raises ValueError when that is more than is left."""
+        """Use up a part of the allowance. Raises ValueError when that is more than the rest."""
         if count > self.left:
             raise ValueError(
                 f"unpacks to more than {self._limit} bytes, expected at most {RATIO} times its size"

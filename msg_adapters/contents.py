@@ -1,4 +1,4 @@
-"""What lies in the files of a bag, before anything is decoded."""
+"""The contents of a bag's files before decoding."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Messages:
 
 @dataclass
 class Contents:
-    """All topics of a file or bag, the messages of those asked for, and what happened on reading.
+    """All topics of a file or bag, the requested messages, and faults and notes of reading.
 
     wanted: topics whose messages are kept, None for all.
-    faults: damage, with counts and where. notes: what was taken for granted.
+    faults: damage, with counts and places. notes: assumptions.
     """
 
     wanted: Collection[str] | None = None
@@ -54,12 +54,12 @@ class Contents:
         unit: str = "",
         share: float = math.nan,
     ) -> None:
-        """Add a fault of a topic or a file, once if two sources report the same."""
+        """Add a fault of a topic or a file, once if two sources report it."""
         if not any((f.kind, f.channel, f.size) == (kind, where, size) for f in self.faults):
             self.faults.append(Fault(kind, where, share, detail, size, unit))
 
     def compare(self, topic: str, expected: int, got: int, witness: str) -> None:
-        """Tell where a topic has fewer or more messages than a witness has counted."""
+        """Report topics with fewer or more messages than another count says."""
         if not self.wants(topic) or got == expected:
             return
         kind = "missing_messages" if got < expected else "surplus_messages"
@@ -68,7 +68,7 @@ class Contents:
         self.tell(kind, topic, detail, abs(expected - got), "messages", share)
 
     def told(self) -> str:
-        """Return notes and faults for the text of a refusal, empty where there are none."""
+        """Return notes and faults for the text of a refusal, empty without any."""
         faults = (f"{f.kind.replace('_', ' ')}: {f.detail}" for f in self.faults)
         parts = dict.fromkeys([*self.notes, *faults])
         return f" ({'; '.join(parts)})" if parts else ""

@@ -59,7 +59,7 @@ class Decoded:
                 self.filled[field][rows] = True
 
     def tell_empty(self, topic: str, told: Contents) -> None:
-        """Tell of a field that some messages leave empty though their other fields come along with it."""
+        """Report a field that some messages leave empty although they have the other fields."""
         for field, filled in self.filled.items():
             beside = [
                 other for name, other in self.filled.items() if name != field and (other & filled).any()

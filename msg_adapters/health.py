@@ -1,6 +1,6 @@
-"""What the nodes said on /diagnostics during a run, where the bag is then not what it seems.
+"""Faults that the nodes published on /diagnostics during a run and that affect its bag.
 
-The counters count since a node's start; what was counted before the recording is not the run's.
+The counters count from a node's start; counts from before the recording do not belong to the run.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _MOST_STATES = 1000
 
 @dataclass
 class _Counter:
-    """Last value, and how much it grew; a node that starts anew begins at 0."""
+    """Last value, and its growth; a node that restarts begins at 0."""
 
     last: int
     grown: int

@@ -28,5 +28,5 @@ def _frame(contents: Contents, topic: str) -> str:
         walk = Walk(messages.raw[0])
         walk.skip(STAMP_SIZE)
         return walk.read_text()
-    except ValueError:  # damaged; whoever decodes it tells
+    except ValueError:  # damaged; the decoder reports it
         return ""

@@ -27,7 +27,7 @@ class Damage:
         self._detail.setdefault(kind, detail)
 
     def tell(self, contents: Contents, where: str) -> None:
-        """Make faults of it."""
+        """Report the damage as faults."""
         for kind, count in self._count.items():
             detail = f"damaged MCAP: {'first: ' if count > 1 else ''}{self._detail[kind]}"
             contents.tell(kind, where, detail, count if kind in UNITS else None, UNITS.get(kind, ""))

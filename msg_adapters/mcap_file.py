@@ -1,6 +1,6 @@
 """MCAP files read from front to back, without their index, so that a cut-off file reads as well.
 
-What is damaged is left out and told; the rest is read.
+Damaged parts are left out and reported; the rest is read.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ CUT_OFF = "cut off (recorder killed?), read up to its last complete message"
 def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
     """Add all messages of a file to the contents, in the order in which they were written.
 
-    A file without end (its recorder was killed) gives what is complete, and a note.
+    A file without an end (its recorder was killed) gives its complete part and a note.
     Raises ValueError for a file that is not an MCAP.
     """
     with path.open("rb") as file:
@@ -65,9 +65,9 @@ def scan(path: Path, contents: Contents, allowance: Allowance) -> None:
 
 
 class _Scanner:
-    """The channels of one file as they come along, where their messages go, and what is damaged.
+    """The channels of one file while it is read, the destination of their messages, and the damage.
 
-    What the summary repeats of schemas and channels stands in where their record is damaged.
+    Schemas and channels repeated in the summary replace damaged records.
     """
 
     def __init__(self, contents: Contents, summary: Summary, allowance: Allowance) -> None:
@@ -103,7 +103,7 @@ class _Scanner:
         return self.ended
 
     def compare(self, file: str) -> None:
-        """Tell where the file holds other numbers of messages than its statistics say."""
+        """Report topics whose number of messages differs from the statistics of the file."""
         expected: Counter[str] = Counter()
         for key, count in self.summary.counts.items():
             topic, _ = self.summary.declared.channels.get(key) or self.declared.channels.get(key, ("", ""))
@@ -116,13 +116,13 @@ class _Scanner:
             self.contents.tell("missing_messages", file, detail, abs(total - self.read.total()), "messages")
 
     def _next_chunk(self, buffer: Buffer, at: int) -> int | None:
-        """Return where the index says that the next chunk begins, None where it knows of none."""
+        """Return where the next chunk begins by the index, or None."""
         chunks = self.summary.chunks
         later = chunks[bisect_right(chunks, at) :]
         return next((start for start in later if start < len(buffer) and buffer[start] == CHUNK), None)
 
     def _broken_off(self, buffer: Buffer, at: int, opcode: int) -> None:
-        """Use what there is of an uncompressed chunk; report other remains."""
+        """Use the present part of an uncompressed chunk; report other remains."""
         if opcode == CHUNK and not self.ended:
             self._chunk(buffer, at + RECORD.size, len(buffer), complete=False)
         elif self.ended:
@@ -151,7 +151,7 @@ class _Scanner:
             self._small(buffer, opcode, first, stop, 0)
 
     def _metadata(self, buffer: Buffer, first: int, stop: int) -> None:
-        """Take in what this project's writer has to say of the file."""
+        """Read the remarks of this project's writer."""
         try:
             name, at = text(buffer, first, stop)
             if name != REMARKS:
@@ -168,14 +168,14 @@ class _Scanner:
         self.contents.faults.extend(remarks.faults)
 
     def _statistics(self, buffer: Buffer, first: int, stop: int) -> None:
-        """Take in the statistics of a file whose footer does not lead to them."""
+        """Read the statistics of a file whose footer does not lead to them."""
         try:
             take_statistics(buffer, first, stop, self.summary)
         except ValueError as error:
             self.damage.add("damaged_records", f"at byte {first}: {error}", stop - first)
 
     def _small(self, buffer: Buffer, opcode: int, first: int, stop: int, base: int) -> None:
-        """Take a record that may lie in a chunk too, whose records begin at byte `base` of the file."""
+        """Process a record that may also lie in a chunk, whose records begin at byte `base` of the file."""
         if opcode == MESSAGE:
             self._message(buffer, first, stop, base)
         elif opcode in (SCHEMA, CHANNEL):
@@ -206,7 +206,7 @@ class _Scanner:
             sink.raw.append(buffer[first + MESSAGE_HEAD.size : stop])
 
     def _check_data(self, buffer: Buffer, opcode: int, first: int, stop: int) -> None:
-        """Compare the checksum of all that lies before DATA_END; some writers leave the magic out of it."""
+        """Compare the checksum of everything before DATA_END; some writers leave the magic out of it."""
         checksum = number(buffer, first, 4, stop) if opcode == DATA_END and stop - first >= 4 else 0
         if not checksum:
             return
@@ -235,7 +235,7 @@ class _Scanner:
             self.damage.add("damaged_chunks", f"{where} breaks off after {at} of {len(records)} bytes")
 
     def _unpacked(self, buffer: Buffer, first: int, stop: int, complete: bool) -> bytes:
-        """Return the records of a chunk. Raises ValueError where they are not what the chunk says."""
+        """Return the records of a chunk. Raises ValueError where they contradict its header."""
         if first + CHUNK_HEAD.size > stop:
             raise ValueError(f"it has {stop - first} bytes")
         _, _, declared, checksum = CHUNK_HEAD.unpack_from(buffer, first)

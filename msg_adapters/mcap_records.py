@@ -45,11 +45,11 @@ class Declarations:
         self.channels: dict[int, tuple[str, str]] = {}
 
     def schema(self, buffer: Buffer, first: int, stop: int) -> None:
-        """Take in a SCHEMA record."""
+        """Read a SCHEMA record."""
         self.types[number(buffer, first, 2, stop)] = text(buffer, first + 2, stop)[0]
 
     def channel(self, buffer: Buffer, first: int, stop: int) -> int:
-        """Take in a CHANNEL record; return its number."""
+        """Read a CHANNEL record; return its number."""
         key = number(buffer, first, 2, stop)
         topic, at = text(buffer, first + 4, stop)
         encoding, _ = text(buffer, at, stop)

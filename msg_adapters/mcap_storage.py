@@ -120,11 +120,11 @@ class McapStorage:
         self.abort()
 
     def sync(self) -> None:
-        """Wait until what was flushed is on the disk."""
+        """Wait until flushed data are on the disk."""
         os.fsync(self._file)
 
     def abort(self) -> None:
-        """Let go of the file; what was flushed stays."""
+        """Close the file; flushed data stay."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

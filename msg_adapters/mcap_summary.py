@@ -1,4 +1,4 @@
-"""What an MCAP file says of itself at its end: how many messages it holds, and where its chunks begin."""
+"""The summary at the end of an MCAP file: numbers of messages, and places of the chunks."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _records(buffer: Buffer, at: int, stop: int, summary: Summary) -> None:
 
 
 def take_statistics(buffer: Buffer, first: int, stop: int, summary: Summary) -> None:
-    """Take in a STATISTICS record. Raises ValueError for a damaged one."""
+    """Read a STATISTICS record. Raises ValueError for a damaged one."""
     if first + STATISTICS_HEAD.size > stop:
         raise ValueError("the statistics end too early")
     summary.total = STATISTICS_HEAD.unpack_from(buffer, first)[0]

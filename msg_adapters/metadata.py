@@ -33,7 +33,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Known:
-    """What the metadata of a bag say: its files, how many messages each topic has, and remarks."""
+    """The metadata of a bag: its files, the number of messages of each topic, and remarks."""
 
     files: list[Path] = field(default_factory=list)
     counts: Mapping[str, int] = field(default_factory=dict)
@@ -41,11 +41,11 @@ class Known:
 
 
 def known(bag: Path, contents: Contents) -> Known:
-    """Return what the metadata of a bag say; nothing where there are none (recorder killed).
+    """Return the metadata of a bag; empty without the file (recorder killed).
 
-    Topics and types are taken from the files themselves; the metadata add the order, notes, and how many
-    messages of each topic there should be.
-    Raises BagError for metadata that name a file that is not there, and for what no recorder writes:
+    Topics and types come from the files themselves; the metadata add the order, notes, and the number of
+    messages expected in each topic.
+    Raises BagError for metadata that name a missing file, and for content that no recorder writes:
     more than 1 MB, aliases, deep nesting.
     """
     path = bag / NAME
@@ -77,7 +77,7 @@ def remarks_in(path: Path, data: bytes) -> Remarks:
 
 
 def _known(bag: Path, document: Any) -> Known:
-    """Raises NotUnderstood, TypeError, ValueError or KeyError for what rosbag2 does not write."""
+    """Raise NotUnderstood, TypeError, ValueError or KeyError for content that rosbag2 does not write."""
     root = document[ROOT] if isinstance(document, dict) else None
     if not isinstance(root, dict):
         raise NotUnderstood(f"no mapping {ROOT}")

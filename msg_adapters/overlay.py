@@ -14,7 +14,7 @@ from rsea_ros.signals import Record
 def write_overlay(records: Mapping[str, Record], path: str | Path) -> None:
     """Write records by namespace as one bag file. Raises BagError where it cannot be written.
 
-    Stamps of a clock that stood before 1970, which no bag can hold as log times, begin at 1970.
+    Stamps before 1970, which no bag can hold as log times, are shifted to begin at 1970.
     """
     first = min(record.epoch_ns + round(1e9 * record.start) for record in records.values())
     moved = [(replace(r, epoch_ns=r.epoch_ns - min(first, 0)), name) for name, r in records.items()]

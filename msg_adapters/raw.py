@@ -1,7 +1,7 @@
 """Numbers out of and into one serialised message, without making the message.
 
 rclpy makes a Python object for every part of a message: 250 us for a wrench in a process that has slept for
-3 ms. The layout is walked once (cdr.py); while the bytes that make it stay, numbers are where they were.
+3 ms. The layout is determined once (cdr.py); while the bytes that define it stay, numbers keep their places.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ class RawReader:
     """Reads the stamp and some numbers of the messages of a topic.
 
     fields: name and index of each number; one that a message does not have is nan.
-    joint: name that the joint of a message with names must have; empty: any. most: names that it may have.
+    joint: name that the joint of a message with names must have; empty: any. Of a message with several
+    joints its numbers are read. most: names that a message may have beside that.
     """
 
     def __init__(
@@ -55,15 +56,24 @@ class RawReader:
             layout = layout_of(raw, self._msgtype)
         except ValueError as error:
             raise ParameterError(f"no {self._msgtype}: {error}") from None
-        if len(layout.names) > self._most:
-            names, most = brief(", ".join(layout.names[:5])), "one" if self._most == 1 else self._most
-            raise ParameterError(f"{len(layout.names)} joints ({names}), expected {most}")
-        if self._joint and layout.names and layout.names[0] != self._joint:
-            raise ParameterError(f"joint {layout.names[0]!r}, expected {self._joint!r} (parameter joint)")
-        self._at = [_position(layout, name, index) for name, index in self._fields]
+        place = self._place(layout.names)
+        self._at = [_position(layout, name, place + index) for name, index in self._fields]
         self._fixed = [(a, b, raw[a:b]) for a, b in _joined(layout.structure)]
         self._stamp, self._double = (struct.Struct(layout.order + kind) for kind in ("iI", "d"))
         self._length = len(raw)
+
+
+    def _place(self, joints: Sequence[str]) -> int:
+        """Return the place of the joint in a message. Raises ParameterError where it is not, or twice."""
+        if len(joints) > self._most:
+            if joints.count(self._joint) == 1:
+                return joints.index(self._joint)
+            names, most = brief(", ".join(joints[:5])), "one" if self._most == 1 else self._most
+            expected = f"{self._joint!r} once (parameter joint)" if self._joint else most
+            raise ParameterError(f"{len(joints)} joints ({names}), expected {expected}")
+        if self._joint and joints and joints[0] != self._joint:
+            raise ParameterError(f"joint {joints[0]!r}, expected {self._joint!r} (parameter joint)")
+        return 0
 
 
 class RawWriter:

@@ -18,7 +18,7 @@ from msg_adapters.topics import FIELDS, ROLES, TYPES, TopicMap, sign_and_index
 from rsea_ros.errors import BagError
 from rsea_ros.signals import Channel, FloatArray, IntArray, Record
 from rsea_ros.stamps import far_apart, in_order, repair_stamps, stray_fault
-from rsea_ros.wording import brief
+from rsea_ros.wording import brief, did_you_mean
 
 _MOST_NAMED = 20
 """Topics or joints that a message lists."""
@@ -35,17 +35,23 @@ def read_record(
 ) -> Record:
     """Read one bag, or several files of one run, as a record; other topics are ignored.
 
-    Stamps are those of the message headers; where one is zero, the log time stands in and a note says so.
-    Samples that lie out of order are sorted by their stamps. Damaged messages are left out. Whatever was
-    damaged stands in the record's faults, and what the bag's /diagnostics tell of the run.
-    strict: refuse what no model can be fitted to (missing command or measurement, NaN), and put the stamps
-    right (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN come as they are.
+    Stamps are those of the message headers; a zero one is replaced by the log time, with a note.
+    Samples out of order are sorted by their stamps. Damaged messages are left out. The record's faults list
+    all damage, and the faults in the bag's /diagnostics.
+    strict: refuse records to which no model can be fitted (missing command or measurement, NaN), and correct
+    the stamps (rsea_ros/stamps.py). Otherwise gaps, jumps of the clock, repeats and NaN are returned
+    unchanged.
     Raises BagError with file, topic, field, value and expectation.
     """
     topics = topics or TopicMap()
     source = str(paths) if isinstance(paths, BagPath) else ", ".join(map(str, paths))
-    contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
-    return record_from(contents, source, topics, strict=strict)
+    try:
+        contents = read_contents(paths, {DIAGNOSTICS, *(topics.topic(role) for role in ROLES)})
+        return record_from(contents, source, topics, strict=strict)
+    except MemoryError:
+        raise BagError(
+            f"{source}: needs more memory than this process may have: split it, or record fewer topics"
+        ) from None
 
 
 def record_from(contents: Contents, source: str, topics: TopicMap, *, strict: bool = True) -> Record:
@@ -99,18 +105,27 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             raise BagError(
                 f"{source}: {topics.topic(role)} is {brief(found.msgtype)}, expected {TYPES[role]}"
             )
+        if role in topics.required and topics.topic(role) not in contents.topics:
+            near = did_you_mean(topics.topic(role), contents.topics)
+            raise BagError(
+                f"{source}: no topic {brief(topics.topic(role))} for {role}{near}; the bag holds "
+                f"{_held(contents)}"
+            )
         if found.raw:
             filled.add(role)
     for roles, others in _NEEDED if strict else [(ROLES, ())]:
         if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)
-            topics_held = sorted(contents.topics.items())[:_MOST_NAMED]
-            have = ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics_held)
-            have = have or "no topic at all"
             raise BagError(
-                f"{source}: no message on {wanted}; the bag holds {have}{contents.told()}; "
+                f"{source}: no message on {wanted}; the bag holds {_held(contents)}{contents.told()}; "
                 "record one, or name its topic with --topic or --namespace"
             )
+
+
+def _held(contents: Contents) -> str:
+    """Return the topics of a bag with their types, for a message."""
+    topics = sorted(contents.topics.items())[:_MOST_NAMED]
+    return ", ".join(f"{brief(name)} ({brief(m.msgtype)})" for name, m in topics) or "no topic at all"
 
 
 def _require_values(source: str, series: Mapping[str, Series], strict: bool, told: Contents) -> None:
@@ -154,7 +169,7 @@ def _series(
 
 
 def _one_joint(where: str, found: Sequence[Block], joint: str | None) -> None:
-    """Refuse several joints where none is named, and a name that is not there."""
+    """Refuse several joints where none is named, and a missing name."""
     layouts = [block.layout for block in found if "wrench" not in block.layout.fields]
     names = tuple(dict.fromkeys(name for layout in layouts for name in layout.names))
     count = max([len(names), *(n for layout in layouts for _, n in layout.fields.values())])

@@ -37,7 +37,7 @@ def write_records(
     """Write several records into one bag, each under the topics of its own map; all or nothing.
 
     Log times are the stamps, or the highest stamp so far where a stamp goes back, so that a reader finds
-    the samples in the order in which they stand in the record.
+    the samples in the order of the record.
     Raises BagError where the bag cannot be written, for two roles on one topic, and for stamps before 1970
     or after 2038.
     """

@@ -1,4 +1,4 @@
-"""What a writer has to say of a bag beside its messages: notes, and what an import left out.
+"""Remarks of a writer in a bag: notes, and data that an import left out.
 
 A directory keeps it in metadata.yaml, a single MCAP file in a metadata record named `rsea`.
 """
@@ -36,7 +36,7 @@ class Remarks:
 
 
 def remarks_of(texts: Mapping[Any, object]) -> Remarks:
-    """Return the remarks that are among texts by name; what is none of this project's is passed by."""
+    """Return this project's remarks among texts by name."""
     notes, faults = (text if isinstance(text, str) else "" for text in map(texts.get, (NOTES, FAULTS)))
     lines = [brief(line, _LONGEST) for line in notes.splitlines()[:_MOST] if "\0" not in line]
     return Remarks(lines, _faults(faults))

@@ -14,6 +14,7 @@ import yaml
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -23,7 +24,10 @@ from std_srvs.srv import Trigger
 from msg_adapters.topics import AXES, sign_and_index
 from rsea_ros.errors import ParameterError
 
-__all__ = ["Bool", "Clock", "DiagnosticArray", "JointState", "Time", "Trigger", "WrenchStamped"]
+__all__ = [
+    "Bool", "ChangeState", "Clock", "DiagnosticArray", "GetAvailableTransitions", "GetState", "JointState",
+    "Time", "Trigger", "WrenchStamped",
+]  # fmt: skip
 
 OK, WARN, ERROR, STALE = (b"\x00", b"\x01", b"\x02", b"\x03")
 SECOND = 1_000_000_000
@@ -61,6 +65,12 @@ def joint_state_message(
     message.header.stamp = time_of(stamp_ns)
     message.header.frame_id = frame
     return message
+
+
+def joint_states_message(joints: Sequence[str]) -> JointState:
+    """Return a state of several joints, all at zero, without a stamp."""
+    zeros = [0.0] * len(joints)
+    return JointState(name=list(joints), position=zeros, velocity=zeros, effort=zeros)
 
 
 def deflection_message(stamp_ns: int, angle: float, joint: str = "joint", frame: str = "") -> JointState:
@@ -102,7 +112,7 @@ def clock_message(stamp_ns: int) -> Clock:
 def diagnostics_message(
     stamp_ns: int, name: str, level: bytes, summary: str, values: Mapping[str, object], hardware: str = ""
 ) -> DiagnosticArray:
-    """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: what it is about."""
+    """Return the health of one node; level is OK, WARN, ERROR or STALE. hardware: its subject."""
     return statuses_message(stamp_ns, [(name, level, summary, values)], hardware)
 
 
@@ -124,7 +134,7 @@ def statuses_message(
 def parameter_descriptor(
     description: str, constraints: str = "", bounds: tuple[float, float] | tuple[int, int] | None = None
 ) -> ParameterDescriptor:
-    """Return what a node says of a parameter that is fixed once it runs; bounds are inclusive."""
+    """Return the descriptor of a parameter that is fixed once the node runs; bounds are inclusive."""
     descriptor = ParameterDescriptor(
         description=description, additional_constraints=constraints, read_only=True
     )
@@ -186,7 +196,7 @@ def _plain(value: Any) -> Any:
 
 
 def _index(message: JointState, joint: str | None) -> int:
-    """Return where a joint stands. Raises ParameterError for one that is not there, or not the only one."""
+    """Return the index of a joint. Raises ParameterError for a missing one, or one among several."""
     names = list(message.name)
     if joint is not None and names:
         if joint not in names:

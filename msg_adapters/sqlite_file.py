@@ -34,8 +34,8 @@ _ROW = 4
 def scan(path: Path, contents: Contents) -> None:
     """Add all messages of a file to the contents, in the order in which they were written.
 
-    A file that breaks off gives what is readable, and a note.
-    Raises ValueError for a file that is no rosbag2 database.
+    A file that breaks off gives its readable part and a note.
+    Raises ValueError for a file that is not a rosbag2 database.
     """
     with path.open("rb") as file:
         header = file.read(100)
@@ -60,7 +60,7 @@ def scan(path: Path, contents: Contents) -> None:
 
 
 def _look_for_journals(path: Path, contents: Contents) -> None:
-    """Tell of a journal with what was not yet written into the file, or must be taken out of it again."""
+    """Report a journal with changes that are not in the file yet, or must be undone."""
     for suffix in JOURNALS:
         journal = path.with_name(path.name + suffix)
         if journal.exists() and journal.stat().st_size:
@@ -69,7 +69,7 @@ def _look_for_journals(path: Path, contents: Contents) -> None:
 
 
 def _connect(path: Path, cut_off: bool) -> sqlite3.Connection:
-    """Open a database as it stands: nothing is recovered, locked or written.
+    """Open a database unchanged: nothing is recovered, locked or written.
 
     cut_off: shorter than its header says, which the last pragma is for.
     """
@@ -81,7 +81,7 @@ def _connect(path: Path, cut_off: bool) -> sqlite3.Connection:
 
 
 def _allowance(size: int) -> Callable[[], bool]:
-    """Return what stops a query that works longer than the file is large."""
+    """Return a handler that stops a query that takes too long for the size of the file."""
     left = max(_STEPS_AT_LEAST, _STEPS_PER_BYTE * size)
 
     def over() -> bool:
@@ -119,7 +119,7 @@ def _topics(database: sqlite3.Connection, path: Path, contents: Contents) -> dic
 def _messages(
     database: sqlite3.Connection, sinks: dict[int, Messages], contents: Contents, path: Path, size: int
 ) -> None:
-    """Take the messages; rows that are none (a damaged page gives NULL) are counted."""
+    """Read the messages; damaged rows (a damaged page gives NULL) are counted."""
     known = {key for (key,) in database.execute("SELECT id FROM topics")}
     damaged = rows = total = 0
     try:

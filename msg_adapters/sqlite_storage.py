@@ -77,7 +77,7 @@ class SqliteStorage:
         self._database.close()
 
     def abort(self) -> None:
-        """Let go of the file; what was flushed stays."""
+        """Close the file; flushed data stay."""
         self._database.close()
 
 

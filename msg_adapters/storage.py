@@ -1,4 +1,4 @@
-"""What the two file formats have in common for a writer."""
+"""The common interface of both file formats for a writer."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ class Storage(Protocol):
         """Append a serialised message."""
 
     def flush(self) -> None:
-        """Hand what was written to the system: from here on it survives the end of this process."""
+        """Pass written data to the system, where they survive the end of this process."""
 
     def sync(self) -> None:
-        """Wait until what was flushed is on the disk: from here on it survives a power cut too."""
+        """Wait until flushed data are on the disk, where they survive a power cut too."""
 
     def remark(self, texts: Mapping[str, str], metadata: str) -> None:
-        """Keep texts by name in the file; metadata: the same in what rosbag2 calls metadata.yaml."""
+        """Keep texts by name in the file; metadata: the same in metadata.yaml of rosbag2."""
 
     def close(self) -> None:
         """Write the rest and the index."""
 
     def abort(self) -> None:
-        """Let go of the file; what was flushed stays."""
+        """Close the file; flushed data stay."""

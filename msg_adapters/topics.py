@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from rsea_ros.errors import BagError, ParameterError
 from rsea_ros.wording import shown
@@ -48,15 +48,16 @@ def check_topic(topic: str) -> None:
 class TopicMap:
     """Names of the topics of one bench; the defaults are the contract's.
 
-    A name that starts with a slash stands as it is, any other lies in the namespace.
+    A name that starts with a slash is absolute, any other lies in the namespace.
     desired_position is a JointState whose position is the reference of the controller that ran during
-    the record. It is named like its sibling `desired_torque`, after what it asks for: `reference` says
-    neither of what nor in which unit, and in ROS names a reference frame as often as a set point.
+    the record. It is named like its sibling `desired_torque`, after the requested quantity: `reference` names
+    neither quantity nor unit, and in ROS often means a reference frame.
 
     deflection is a JointState whose position is the angle of the spring by its own encoder.
 
     joint: which joint, where the messages hold several.
     axis: actuator axis of the wrench, one of AXES, with a leading minus where the sensor faces back.
+    required: roles whose topics a bag must hold, since a user named them.
     Raises ParameterError for another axis, and for a name that cannot be printed.
     """
 
@@ -68,12 +69,13 @@ class TopicMap:
     desired_position: str = "desired_position"
     joint: str | None = None
     axis: str = "torque.z"
+    required: frozenset[str] = field(default=frozenset(), init=False)
 
     def __post_init__(self) -> None:
-        for field in ("namespace", *ROLES, "joint"):
-            name = getattr(self, field) or ""
+        for what in ("namespace", *ROLES, "joint"):
+            name = getattr(self, what) or ""
             if not name.isprintable():
-                raise ParameterError(f"{field} {name!r}: cannot be printed, expected a name of ROS")
+                raise ParameterError(f"{what} {name!r}: cannot be printed, expected a name of ROS")
         if self.axis.removeprefix("-") not in AXES:
             raise ParameterError(
                 f"axis {self.axis!r}: expected one of {', '.join(AXES)}, with or without a minus"
@@ -85,7 +87,10 @@ class TopicMap:
         return name if name.startswith("/") else f"/{self.namespace.strip('/')}/{name}".replace("//", "/")
 
     def renamed(self, assignments: Sequence[str]) -> TopicMap:
-        """Return the map with `role=topic` assignments applied, as the command line gives them."""
+        """Return the map with `role=topic` assignments applied, as the command line gives them.
+
+        Those topics are required of a bag. Raises ParameterError for an unknown role.
+        """
         names: dict[str, str] = {}
         for assignment in assignments:
             role, equals, topic = assignment.partition("=")
@@ -93,4 +98,6 @@ class TopicMap:
                 expected = f"ROLE=TOPIC with ROLE one of {', '.join(ROLES)}"
                 raise ParameterError(f"topic {assignment!r}: expected {expected}")
             names[role] = topic
-        return replace(self, **names)
+        renamed = replace(self, **names)  # type: ignore[arg-type]  # names of str fields
+        object.__setattr__(renamed, "required", self.required | names.keys())
+        return renamed

@@ -38,10 +38,10 @@ class BagWriter:
 
     path: a directory to be made, or a file where the name ends in .mcap or .db3.
     storage: 'mcap' or 'sqlite3', for a directory.
-    recording: what has been written is worth keeping. Then Ctrl-C completes the bag, and a failure
-    leaves NAME.partial, a bag that can be read. Otherwise either removes what was written.
-    force: a bag that has the name may be replaced.
-    interval: s, after which what was recorded is put on the disk.
+    recording: written data are worth keeping. Then Ctrl-C completes the bag, and a failure
+    leaves NAME.partial, a readable bag. Otherwise either removes the data.
+    force: an existing bag may be replaced.
+    interval: s, after which recorded data are put on the disk.
     Raises BagError for a path that is taken and for a disk that is full.
     """
 
@@ -113,7 +113,7 @@ class BagWriter:
                 self._sync()
 
     def flush(self) -> None:
-        """Make what was written safe against the end of this process."""
+        """Make written data safe against the end of this process."""
         try:
             self._storage.flush()
         except OSError as error:
@@ -121,7 +121,7 @@ class BagWriter:
         self._flushed = time.monotonic()
 
     def _sync(self) -> None:
-        """Have what was flushed put on the disk, unless the disk is still busy with what was before."""
+        """Put flushed data on the disk, unless the previous sync is still running."""
         if self._syncing is not None and not self._syncing.done():
             return
         try:
@@ -203,7 +203,7 @@ class BagWriter:
             self._clear()
 
     def _clear(self) -> None:
-        """Remove what was made, the folders above it only where they are empty."""
+        """Remove the new files, and the folders above them where they are empty."""
         for path in self._made[:1]:
             files.remove(path)
         for path in self._made[1:]:
@@ -212,7 +212,7 @@ class BagWriter:
         self._release()
 
     def _release(self) -> None:
-        """Let go of the lock of the stage."""
+        """Release the lock of the stage."""
         if self._stage is not None:
             self._stage.release()
             self._stage = None

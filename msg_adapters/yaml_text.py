@@ -1,4 +1,4 @@
-"""YAML of unknown origin: every scalar stays a text, nothing is expanded."""
+"""YAML of unknown origin: every scalar stays text, nothing is expanded."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _Loader = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 
 
 class NotUnderstood(ValueError):
-    """A document that is not what it should be, in words for people."""
+    """A document of another form than expected, in words for people."""
 
 
 def load(path: Path) -> Any:
@@ -27,9 +27,9 @@ def load(path: Path) -> Any:
 
 
 def document(path: Path, data: bytes) -> Any:
-    """Return what a file holds as YAML, as mappings, lists and texts.
+    """Return the YAML content of a file as mappings, lists and texts.
 
-    Raises BagError for more than 1 MB, aliases, and deep nesting; NotUnderstood for what is no YAML.
+    Raises BagError for more than 1 MB, aliases, and deep nesting; NotUnderstood for other text.
     """
     if len(data) > LARGEST:
         raise BagError(f"{path}: more than {LARGEST} bytes, expected the metadata of a bag")

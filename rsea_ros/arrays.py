@@ -84,9 +84,9 @@ def _channel(name: str, source: str) -> str:
 
 
 def _vector(name: str, values: npt.ArrayLike, source: str) -> FloatArray:
-    """Return the values of a channel, or of `t`, as doubles in memory of their own, NaN where masked.
+    """Return the values of a channel, or of `t`, as a copy in doubles, NaN where masked.
 
-    Raises ChannelError for what is not of real numbers, or not of shape (n,) with n >= 2.
+    Raises ChannelError for values that are not real numbers, or not of shape (n,) with n >= 2.
     """
     try:
         given: Any = np.ma.asarray(values)

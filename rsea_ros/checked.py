@@ -32,14 +32,14 @@ def switch(body: Mapping[str, Any], name: str) -> bool:
 
 
 def text(value: Any, name: str) -> str:
-    """Return a text. Raises FieldError when it is none."""
+    """Return a text. Raises FieldError for a value of another type."""
     if not isinstance(value, str):
         raise FieldError(f"{name} = {shown(value)}, expected text", name)
     return value
 
 
 def mapping(value: Any, name: str, expected: str = "a mapping") -> Mapping[str, Any]:
-    """Return a mapping. Raises FieldError when it is none."""
+    """Return a mapping. Raises FieldError for a value of another type."""
     if not isinstance(value, Mapping):
         raise FieldError(f"{name} = {shown(value)}, expected {expected}", name)
     return value

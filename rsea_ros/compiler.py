@@ -1,7 +1,7 @@
-"""numba's compiler, keeping what it makes in this package's cache (compiler_cache.py).
+"""numba's compiler with this package's cache (compiler_cache.py).
 
 The folder is named only while a function of this package is decorated: neither the environment nor numba's
-settings for the functions of others change. Where nothing can be kept, every process compiles what it runs.
+settings for other packages change. Without a writable cache every process compiles its functions again.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numba
 from numba.core import caching as numba_caching
 from numba.core import ccallback, sigutils
 from numba.core import config as numba_config
+from numba.core import runtime as numba_runtime
 
 from rsea_ros.compiler_cache import cache_folder
 
@@ -23,10 +24,11 @@ _log = logging.getLogger(__name__)
 _caching: Any = numba_caching
 _cfunc: Any = ccallback.CFunc
 _normalized: Any = sigutils.normalize_signature
+_run_time: Any = numba_runtime.rtsys  # type: ignore[attr-defined]
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's decorator for a compiled function, with its options. cache: keep what is compiled."""
+    """Return numba's decorator for a compiled function, with its options. cache: store the compiled code."""
 
     def decorate(function: Callable[..., Any]) -> Any:
         made = numba.njit(**options)(function)
@@ -51,11 +53,17 @@ def cfunc(signature: Any, *, cache: bool = False, **options: Any) -> Callable[[C
 
 
 class _Kept(_caching.FunctionCache):  # type: ignore[misc]
-    """The compiled code of one function on the disk; what cannot be read or written costs only time."""
+    """The compiled code of one function on the disk; an unreadable or unwritable file costs only time.
+
+    Loading starts only numba's run time. The rest, which a compilation needs, takes 0.35 s to import; numba
+    imports it when it compiles.
+    """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            _run_time.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except Exception:  # a file that broke off may raise anything
             with suppress(OSError):
                 self.flush()
@@ -80,7 +88,7 @@ def _cache_of(function: Callable[..., Any]) -> Any:
 
 @cache
 def warn_once(reason: str) -> None:
-    """Say that nothing is kept, once for each reason."""
+    """Warn that compiled code is not stored, once for each reason."""
     _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
 
 

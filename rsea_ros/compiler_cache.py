@@ -1,9 +1,9 @@
-"""Where compiled code is kept: a folder of the user's cache, another one for other shared functions.
+"""The folder of compiled code in the user's cache: a new one for every change of shared functions.
 
-Numba keeps machine code beside the source and makes it anew when the file of the function changes. It does
+Numba stores machine code beside the source and recompiles it when the file of the function changes. It does
 not see that a function of another file was compiled into it, and it cannot write into an installed package.
 
-What lies in the folder is run. So it is used only where nobody but this user (or root) can have put it there.
+Code in the folder is executed, so it is used only where nobody but this user (or root) can have written it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def trusted_cache(name: str) -> Path:
     home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     if home.is_absolute() and private(home / "rsea_ros") and private(home / "rsea_ros" / name, 0o077):
         return home / "rsea_ros" / name
-    import atexit  # with the others 9 ms that hardly anyone needs
+    import atexit  # imported here: 9 ms that are rarely needed
     import shutil
     import tempfile
 

@@ -10,7 +10,7 @@ class RseaError(Exception):
 
 
 class BagError(RseaError, ValueError):
-    """A bag that cannot be read or written as asked."""
+    """A bag that cannot be read or written as requested."""
 
 
 class ChannelError(RseaError, KeyError):
@@ -21,9 +21,9 @@ class ChannelError(RseaError, KeyError):
 
 
 class FieldError(RseaError, ValueError):
-    """A value of a document that is not what was expected.
+    """A value of a document that differs from the expected one.
 
-    field: where it stands, such as `effects[0].name`; empty where no single field is to blame.
+    field: its place, such as `effects[0].name`; empty where no single field is wrong.
     """
 
     def __init__(self, message: str, field: str = "") -> None:
@@ -44,11 +44,11 @@ class ImportMapError(FieldError):
 
 
 class IdentificationError(RseaError, ValueError):
-    """Data from which the parameters asked for cannot be had."""
+    """Data that cannot give the requested parameters."""
 
 
 class OutputError(RseaError, OSError):
-    """A file that cannot be written as asked: its name is taken, or it is an input."""
+    """A file that cannot be written: its name is taken, or it is an input."""
 
 
 class DeviceError(RseaError, OSError):

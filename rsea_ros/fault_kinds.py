@@ -1,4 +1,4 @@
-"""The kinds of faults of the data: what each means, once for the code and the docs."""
+"""The kinds of faults of the data with their meanings, used by the code and the docs."""
 
 from __future__ import annotations
 

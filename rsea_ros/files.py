@@ -1,7 +1,7 @@
 """Files on the disk: written new, synchronised, and named together or not at all.
 
 A file gets its name by a hard link, which fails where the name is taken: two runs at once cannot take the
-same name, no file is replaced unless that is asked for, and no symbolic link is followed.
+same name, no file is replaced unless requested, and no symbolic link is followed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Undo = list[Callable[[], object]]
 
 
 def make_folder(folder: Path) -> list[Path]:
-    """Make a folder with its parents, as far as they are missing; return what was made, the deepest first."""
+    """Make a folder and its missing parents; return the folders made, the deepest first."""
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     for path in reversed(made):
         path.mkdir(exist_ok=True)
@@ -34,7 +34,10 @@ def make_folder(folder: Path) -> list[Path]:
 
 
 def create(path: Path) -> int:
-    """Return the descriptor of a new file; whatever has the name, a symbolic link included, is an error."""
+    """Return the descriptor of a new file.
+
+    Raises FileExistsError where anything has the name, also a symbolic link.
+    """
     return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
 
 
@@ -73,7 +76,7 @@ def sync(path: Path) -> None:
 def give_names(pairs: Sequence[tuple[Path, Path]], *, force: bool = False) -> None:
     """Give complete files, or folders of files, their names (source, target): all or, on an error, none.
 
-    Both of a pair are on one file system. force: what has a name is replaced, a file by a file, a folder by a
+    Both of a pair are on one file system. force: existing names are replaced, a file by a file, a folder by a
     folder. Raises OutputError for a name that is taken, OSError where the system refuses.
     """
     for source, _ in pairs:
@@ -103,7 +106,7 @@ def taken(path: Path) -> OutputError:
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuse what nobody may replace: a device, a pipe, a symbolic link. Raises OutputError."""
+    """Raise OutputError for anything that must not be replaced: a device, a pipe, a symbolic link."""
     if path.is_symlink() or not (path.is_file() or path.is_dir()):
         raise OutputError(f"{path}: is not a regular file, expected a new name")
 
@@ -117,7 +120,10 @@ def remove(path: Path) -> None:
 
 
 def _take(source: Path, target: Path, replaced: Replaced | None, undo: Undo) -> None:
-    """Give one file or folder its name. replaced: where what has the name goes, None where it may not."""
+    """Give one file or folder its name.
+
+    replaced: where the present holder of the name is put; None: it stays.
+    """
     if replaced is not None and os.path.lexists(target):
         check_replaceable(target)
         if source.is_dir() != target.is_dir():

@@ -15,7 +15,10 @@ AGAIN = 0.1
 
 
 class Stopped(KeyboardInterrupt):
-    """A signal asks this process to stop; whatever handles Ctrl-C handles it. status: 128 and the number."""
+    """A signal asks this process to stop; code that handles Ctrl-C handles it.
+
+    status: 128 plus the number.
+    """
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)
@@ -65,7 +68,7 @@ class Stops:
 def undisturbed() -> Iterator[None]:
     """Hold signals back until the block is over; the first of them counts then."""
     if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread hears signals
+        yield  # only the main thread receives signals
         return
     held: list[int] = []
     before = {n: handler for n in STOPPING if (handler := signal.getsignal(n)) is not None}

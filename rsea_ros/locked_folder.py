@@ -1,6 +1,6 @@
 """Folders of a random name that last only while something is written, each with a lock on itself.
 
-The system lets go of a lock when its process ends, however it ends: whoever comes next sees what was left.
+The system releases a lock when its process ends, in any way, so the next process recognises leftover folders.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LockedFolder:
     lock: int
 
     def release(self) -> None:
-        """Let go of the lock."""
+        """Release the lock."""
         os.close(self.lock)
 
 
@@ -50,7 +50,7 @@ class Left:
 
 
 def name_of(kind: str) -> str:
-    """Return how the names of this machine's folders of a kind begin."""
+    """Return the prefix of the names of this machine's folders of a kind."""
     return f"{PREFIX}{kind}-{_HOST}-"
 
 
@@ -64,7 +64,7 @@ def make_locked(parent: Path, kind: str, mode: int = 0o700) -> LockedFolder:
     path = new_name(parent, kind)
     path.mkdir(mode)
     lock = os.open(path, _FOLDER)
-    with suppress(OSError):  # a file system without locks: none of its folders ever counts as left
+    with suppress(OSError):  # a file system without locks: its folders never count as left
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     return LockedFolder(path, lock)
 
@@ -72,7 +72,8 @@ def make_locked(parent: Path, kind: str, mode: int = 0o700) -> LockedFolder:
 def left(parent: Path, kind: str) -> Iterator[Left]:
     """Yield folders of a kind and of this user in a folder whose process is gone; each is locked meanwhile.
 
-    Safe for two at once, and beside writers at work: who looks holds the lock of what it looks at.
+    Safe for two processes at once, and beside running writers: the lock of a folder is held while it is
+    examined.
     """
     entries: list[str] = []
     with suppress(OSError):

@@ -1,7 +1,7 @@
-"""Results: files of one folder that appear together, complete, and not over what is there.
+"""Results: files of one folder that appear together and complete, and replace nothing unasked.
 
 They are written into a folder of a random name beside their destination (see staging), and get their names
-when all are complete and on the disk. An error or a signal before leaves all as it was.
+when all are complete and on the disk. An earlier error or signal changes nothing.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Place:
 class NewFiles:
     """Files of one folder that get their names together at the end of the block; on an error none does.
 
-    folder: where they will be; of a fresh place it is known from the beginning of the block on.
+    folder: their final folder; that of a fresh place is known from the beginning of the block.
     Raises OutputError for a name that is taken, OSError where the system refuses; both name the final file.
     """
 
@@ -95,7 +95,7 @@ class NewFiles:
                 self._clear(complete)
 
     def _make_folder(self) -> Path:
-        """Make the folder, as far as it is missing, and return it."""
+        """Make the folder and its missing parents, and return it."""
         first, fresh = self._place.folder, self._place.fresh
         if first.exists() and not first.is_dir() and not fresh:
             raise OutputError(f"{first}: is a file, expected a directory or a new name")
@@ -108,7 +108,7 @@ class NewFiles:
         return first
 
     def _clear(self, complete: bool) -> None:
-        """Remove what was only for the writing, and where nothing was written the folders as well."""
+        """Remove the stage, and the new folders if nothing was written."""
         with undisturbed():
             if self._stage is not None:
                 self._stage.remove()
@@ -146,8 +146,8 @@ def check_free(
 ) -> None:
     """Refuse, before any work, a name that is taken (unless `force`) and one of the inputs (always).
 
-    What a killed writer put aside gets its name back first.
-    force: --force of a verb; None where nothing offers it. Raises OutputError.
+    Files that a killed writer put aside get their names back first.
+    force: --force of a verb; None where there is no such option. Raises OutputError.
     """
     paths = list(paths)
     for folder in {path.parent for path in paths}:
@@ -163,7 +163,7 @@ def check_free(
 
 
 def _touches(path: Path, one: Path) -> bool:
-    """Return whether a path is an input, by whatever name, or lies directly in it."""
+    """Return whether a path is an input, by any name, or lies directly in it."""
     whole = one.resolve()
     return whole in (path.resolve(), path.resolve().parent) or (path.exists() and path.samefile(one))
 

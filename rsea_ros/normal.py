@@ -1,4 +1,4 @@
-"""A number of the normal distribution that every 95 % interval is made of."""
+"""The half-width of a 95 % interval in standard deviations of a normal distribution."""
 
 Z95 = 1.959964
 """Standard deviations from the middle of a 95 % interval to its end."""

@@ -10,6 +10,6 @@ VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def one_thread_for_blas() -> None:
-    """Ask for one thread, unless the user asks for another number. Must run before numpy is imported."""
+    """Request one thread, unless the user has set another number. Must run before numpy is imported."""
     for name in VARIABLES:
         os.environ.setdefault(name, "1")

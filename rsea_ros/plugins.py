@@ -22,7 +22,7 @@ def plugin_files(paths: str) -> Iterator[Path]:
 
 
 def plugin_constant(variable: str, path: str, name: str, kind: type[T]) -> T:
-    """Run a file and return a constant of it. Raises ParameterError for a file that has none, or breaks.
+    """Run a file and return one of its constants. Raises ParameterError for a file that lacks it or fails.
 
     variable: the environment variable that named the file. kind: type of the constant.
     """

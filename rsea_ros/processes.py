@@ -1,4 +1,4 @@
-"""Programs in processes of their own: they end when they are asked to, and never outlive who started them."""
+"""Child processes: they end on request, and never outlive the process that started them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def start(command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
 
 
 def stop(processes: Sequence[subprocess.Popen[bytes]]) -> None:
-    """Ask programs to end (SIGTERM) and wait for it; kill what does not."""
+    """Ask programs to end (SIGTERM) and wait; kill those that do not."""
     for process in processes:
         if process.poll() is None:
             process.terminate()

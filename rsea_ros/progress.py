@@ -1,4 +1,4 @@
-"""Progress: how long work says what it is at."""
+"""Progress: the callback by which long work reports its present stage."""
 
 from __future__ import annotations
 

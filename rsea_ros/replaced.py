@@ -1,6 +1,6 @@
-"""What --force replaces: put aside until the whole set has its names, put back where that was not reached.
+"""Files that --force replaces: put aside until the whole set has its names, put back if that fails.
 
-It lies under its name in a locked folder beside its destination. A writer that is killed leaves it there; the
+A file lies under its name in a locked folder beside its destination. A killed writer leaves it there; the
 next run on the same place puts it back.
 """
 
@@ -18,7 +18,7 @@ KIND, REMOVABLE = "old", "stage"
 
 
 class Replaced:
-    """The folders, one for each folder of destinations, in which one writer puts aside what it replaces."""
+    """The folders, one for each destination, in which one writer puts aside the files that it replaces."""
 
     def __init__(self) -> None:
         self._folders: dict[Path, LockedFolder] = {}
@@ -30,7 +30,7 @@ class Replaced:
         return self._folders[target.parent].path / target.name
 
     def give_up(self) -> list[Path]:
-        """Let nothing be put back any more; return the folders, for removal."""
+        """Make the replacement final; return the folders, for removal."""
         given_up = []
         for parent, folder in self._folders.items():
             given_up.append(new_name(parent, REMOVABLE))
@@ -38,7 +38,7 @@ class Replaced:
         return given_up
 
     def close(self) -> None:
-        """Remove the folders as far as they are empty, and let go of their locks."""
+        """Remove the empty folders, and release the locks."""
         for folder in self._folders.values():
             with suppress(OSError):
                 folder.path.rmdir()
@@ -56,13 +56,13 @@ def putting_aside() -> Iterator[Replaced]:
 
 
 def put_back(parent: Path) -> None:
-    """Give back their names to what killed writers of this user put aside in a folder.
+    """Restore the files that killed writers of this user put aside in a folder.
 
     A file that has taken the name since is replaced only where it is the killed writer's; else the old one
     gets the first free of NAME.old, NAME.old-2, …
     """
     for folder in left(parent, KIND):
-        with suppress(OSError):  # what cannot be put back stays, and stops nobody
+        with suppress(OSError):  # a file that cannot be put back stays, and stops nothing
             names = os.listdir(folder.path)
             for name in names:
                 _put_back(folder.path / name, parent / name, folder)

@@ -1,4 +1,4 @@
-"""Folders that last only while something is written into them, and what a killed writer has left of them."""
+"""Temporary folders for files that are being written, and the removal of those of killed writers."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Stage(LockedFolder):
 
 
 def make_stage(parent: Path, mode: int = 0o700) -> Stage:
-    """Make a stage in a folder, and clear up what killed writers left there. Raises OSError."""
+    """Make a stage in a folder, and remove stages of killed writers in it. Raises OSError."""
     put_back(parent)
     remove_left(parent)
     made = make_locked(parent, KIND, mode)

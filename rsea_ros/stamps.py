@@ -1,8 +1,8 @@
-"""Stamps of a run put right: samples in order, clock jumps removed, gaps and repeats reported.
+"""Corrected stamps of a run: samples in order, clock jumps removed, gaps and repeats reported.
 
 Samples that only arrived out of order are sorted. A clock that jumped shifts all the samples after the jump:
-sorted, they would mix with those before it, so the jump is taken out first. The two are told apart by
-density: of samples that are merely late there are never more to a stretch of time than the clock ticks.
+sorted, they would mix with those before it, so the jump is removed first. The two are distinguished by
+density: late samples are never denser in time than the ticks of the clock.
 """
 
 from __future__ import annotations
@@ -76,9 +76,9 @@ def _repeat(t: FloatArray) -> float:
 
 
 def _check_even(channel: Channel, where: str) -> None:
-    """Raises ChannelError for stamps that nearly all lie together, in far fewer places than their span has.
+    """Raise ChannelError for stamps that nearly all lie together, in far fewer places than their span has.
 
-    Whoever lays a grid of their period over their span needs this to be bounded.
+    This bounds the size of a grid of their period over their span.
     """
     if len(channel) < 3:
         return
@@ -91,15 +91,15 @@ def _check_even(channel: Channel, where: str) -> None:
 
 
 def in_order(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Return a channel sorted by its stamps, without those that fit nowhere, and what was wrong.
+    """Return a channel sorted by its stamps, without stamps that fit nowhere, and its faults.
 
-    A channel whose clock jumped back comes as it is: sorting would mix its samples.
+    A channel whose clock jumped back is returned unchanged: sorting would mix its samples.
     """
     return (channel, []) if jumps_back(channel.t).any() else _sorted(channel, name)
 
 
 def _sorted(channel: Channel, name: str) -> tuple[Channel, list[Fault]]:
-    """Return a channel sorted by its stamps, without those that fit nowhere, and what was wrong."""
+    """Return a channel sorted by its stamps, without stamps that fit nowhere, and its faults."""
     if not np.any(np.diff(channel.t) < 0.0):
         return channel, []
     late = _out_of_order(channel.t)

@@ -1,6 +1,6 @@
 """YAML that people write, read strictly: one meaning a value, no key twice, bounded in size and depth.
 
-Numbers are plain decimals (`1e-3` too). What YAML 1.1 takes for a number and people do not (`0x10`, `010`,
+Numbers are plain decimals (`1e-3` too). Text that YAML 1.1 but not a person reads as a number (`0x10`, `010`,
 `1:30`, `1_000`, a date) is refused with its line, as are anchors, aliases and tags.
 """
 
@@ -49,9 +49,9 @@ Way = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Document:
-    """What a file holds: mappings, lists, texts, numbers, switches, None; and the line of each.
+    """The content of a file: mappings, lists, texts, numbers, switches, None; and the line of each.
 
-    lines: by the way to a value, keys and indices as texts.
+    lines: by the path to a value, keys and indices as texts.
     """
 
     content: Any
@@ -68,7 +68,7 @@ class Document:
 
 
 def read(path: Path) -> Document:
-    """Read a file. Raises OSError, and FieldError with line, key, value and what was expected."""
+    """Read a file. Raises OSError, and FieldError with line, key, value and the expected value."""
     if stat.S_ISFIFO(path.stat().st_mode):
         raise FieldError("is a pipe, expected a file")
     with path.open("rb") as file:
@@ -82,7 +82,7 @@ def read(path: Path) -> Document:
 
 
 def parse(text: str) -> Document:
-    """Return the document of a text. Raises FieldError with line, key, value and what was expected."""
+    """Return the document of a text. Raises FieldError with line, key, value and the expected value."""
     lines: dict[Way, int] = {}
     try:
         events = _checked(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
@@ -96,7 +96,7 @@ def parse(text: str) -> Document:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes every text that would not be read as the text that it is."""
+    """Quotes every text that would otherwise be read as another value."""
 
 
 def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
@@ -115,7 +115,7 @@ def dump(document: Mapping[str, Any]) -> str:
 
 
 def _checked(events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
-    """Yield the events that carry content; refuse what the module does not read."""
+    """Yield the events that carry content; refuse the others."""
     depth = 0
     for event in events:
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):

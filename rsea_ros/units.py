@@ -31,7 +31,7 @@ _ALONG_A_LINE = {
 
 
 def in_motion(unit: str, *, linear: bool) -> str:
-    """Return the unit that stands for one of a rotary machine in a machine that moves along a line."""
+    """Return the unit of a linear machine that corresponds to a unit of a rotary one."""
     return _ALONG_A_LINE.get(unit, unit) if linear else unit
 
 

@@ -34,7 +34,7 @@ def printable(text: str, *, colours: bool = False) -> str:
 
 
 def shown(value: object, longest: int = 60) -> str:
-    """Return a value as it stands in a message: quoted, and cut where it is long."""
+    """Return a value for a message: quoted, and shortened if it is long."""
     text = repr(value)
     return text if len(text) <= longest else f"{text[: longest - 1]}…"
 

@@ -1,18 +1,26 @@
-"""What every test shares: its worker, a ROS domain of its own for each, and reproducible examples."""
+"""Shared by all tests: the worker, a ROS domain for each worker, and reproducible examples."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import signal
+import sys
 import tempfile
 from pathlib import Path
 
 import hypothesis
 import pytest
+from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
+from xdist.workermanage import WorkerController
 
 import rsea_ros.cli  # noqa: F401  first of all: it keeps numpy from starting threads of its own
+from rsea_ros.compiler_cache import trusted_cache
+
+BYTECODE = sys.dont_write_bytecode, sys.pycache_prefix
+if sys.dont_write_bytecode:  # then pytest would rewrite 3000 asserts anew in each worker, 10 s each
+    sys.dont_write_bytecode, sys.pycache_prefix = False, str(trusted_cache("bytecode"))
 
 hypothesis.settings.register_profile("rsea", deadline=None, derandomize=True, database=None)
 hypothesis.settings.load_profile("rsea")
@@ -31,6 +39,9 @@ def _take_domain() -> int:
     raise RuntimeError("no free ROS domain between 1 and 101: other test runs hold all of them")
 
 
+if os.environ.get("PYTEST_XDIST_WORKER", "gw0") != "gw0":  # what computes makes way for what must be in time
+    os.nice(5)
+
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(_take_domain())
 
@@ -39,41 +50,62 @@ os.environ["ROS_DOMAIN_ID"] = str(_take_domain())
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-DEAREST = (
-    "test_realdata", "cli/test_demo", "diagnosis/test_hidden_effects", "nodes/test_driver_on_wire",
-    "diagnosis/test_two_causes", "cli/test_bad_", "model/test_pure_torque", "nodes/test_loop",
-    "diagnosis/test_puzzle", "nodes/test_controller_on_wire", "cli/test_nothing_lost", "hardware/test_faults",
-    "test_inputs", "nodes/test_experiment_node", "identification/test_identify", "nodes/test_watch",
-    "paper/test_moving_output", "nodes/test_driver_honest", "cli/test_paper", "test_launcher",
-    "report/", "nodes/test_parameters", "control/test_verb", "nodes/test_several_joints",
-    "laws/test_hidden_laws", "nodes/test_identify_diagnosis", "diagnosis/test_detents", "nodes/test_model",
-    "cli/test_diagnose", "nodes/test_controller", "cli/test_run_launch_topics", "fleet/test_task",
-    "test_package", "test_readme", "library/test_door", "independent/test_bench",
+WAITING = (
+    "cli/test_demo", "nodes/", "hardware/test_faults", "cli/test_run_launch_topics", "test_package",
+    "hardware/test_lost_torque", "hardware/test_protection", "hardware/test_port", "hardware/test_netft",
+    "hardware/test_line", "cli/test_bench", "watch/test_server", "watch/test_page", "msg_adapters/test_ros",
+    "cli/test_ctrl_c",
 )  # fmt: skip
-"""What takes longest, first, so that no worker is left with it at the end; what computes and what waits for
-nodes by turns, so that the cores are busy and the nodes are not late."""
+"""Files that wait for nodes, wires and clocks: the first worker takes them, one after the other."""
+
+COMPUTING = (
+    "diagnosis/test_hidden_effects", "test_realdata", "diagnosis/test_two_causes", "diagnosis/test_puzzle",
+    "cli/test_paper", "report/", "diagnosis/test_detents", "cli/test_diagnose",
+    "test_inputs", "identification/test_identify", "control/test_verb", "model/test_pure_torque",
+    "cli/test_nothing_lost", "cli/test_bad_", "test_launcher", "laws/test_hidden_laws",
+    "diagnosis/test_joint", "fleet/test_task", "test_readme", "test_docs", "independent/test_bench",
+)  # fmt: skip
+"""Files that compute longest, in this order, so that no worker is left with one of them at the end."""
+
+
+def _place(nodeid: str, names: tuple[str, ...]) -> int:
+    """Return where in names a test's file stands, behind all of them if nowhere."""
+    places = (k for k, name in enumerate(names) if nodeid.startswith(f"test/{name}"))
+    return next(places, len(names))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the dearest files first and leave the rest in its order."""
-
-    def place(item: pytest.Item) -> int:
-        found = (k for k, name in enumerate(DEAREST) if item.nodeid.startswith(f"test/{name}"))
-        return next(found, len(DEAREST))
-
-    items.sort(key=place)
+    """Put the slowest files first and leave the others in their order."""
+    places = {item.path: _place(item.nodeid, WAITING + COMPUTING) for item in items}
+    items.sort(key=lambda item: places[item.path])
 
 
 class OneWorker(LoadFileScheduling):
-    """Give a worker whole files, and those that share a diagnosis together."""
+    """Give a worker whole files: the first one those that wait, the others those that compute.
+
+    Two nodes under test at a time, or one beside a computation of its own priority, are late and fail.
+    """
 
     def _split_scope(self, nodeid: str) -> str:
         return "test/report" if nodeid.startswith("test/report/") else super()._split_scope(nodeid)
 
+    def _assign_work_unit(self, node: WorkerController) -> None:
+        """Take the first file of the worker's kind, then the longest computation or the shortest wait."""
+        waits = node is self.nodes[0]
+        mine = (s for s in self.workqueue if (_place(s, WAITING) < len(WAITING)) == waits)
+        others = iter(self.workqueue) if waits else reversed(self.workqueue)
+        self.workqueue.move_to_end(next(mine, next(others)), last=False)
+        super()._assign_work_unit(node)
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> OneWorker | None:
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OneWorker | None:
     """Hand the files out in the order of the collection, not by their number of tests."""
     if config.option.dist != "loadfile":
         return None
     config.option.loadscopereorder = False
     return OneWorker(config, log)
+
+
+def pytest_collection_finish() -> None:
+    """Leave the bytecode of what the tests themselves import to the environment again."""
+    sys.dont_write_bytecode, sys.pycache_prefix = BYTECODE

@@ -1,4 +1,4 @@
-"""Compiled code is kept where the user can write, and never outlives what was compiled into it."""
+"""Compiled code is kept where the user can write, and is recompiled when its sources change."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def evaluated(root: Path, cache: Path) -> float:
     return float(done.stdout)
 
 
-def test_a_changed_helper_is_compiled_anew(tmp_path):
+def test_a_changed_helper_is_recompiled(tmp_path):
     copy = shutil.copytree(PACKAGE, tmp_path / "rsea_ros", ignore=shutil.ignore_patterns("__pycache__"))
     assert evaluated(tmp_path, tmp_path / "cache") == -3.0
     helper = copy / "effects" / "_friction.py"
@@ -67,7 +67,7 @@ def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:
 
 
 def imported_files(tree: ast.Module) -> dict[str, Path]:
-    """Return by local name the file of this package that a name comes from."""
+    """Return the file of this package that each imported name comes from, by local name."""
     files = {}
     for node in tree.body:
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rsea_ros"):
@@ -78,7 +78,7 @@ def imported_files(tree: ast.Module) -> dict[str, Path]:
     return files
 
 
-def test_all_that_is_compiled_into_other_files_is_in_the_key():
+def test_the_key_covers_every_file_compiled_into_others():
     shared = {file for pattern in SHARED for file in PACKAGE.glob(pattern)}
     seen = 0
     for file in PACKAGE.rglob("*.py"):
@@ -114,12 +114,12 @@ def temporary(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("home", ["/proc/nothing", "relative", "/dev/null"])
-def test_a_home_that_cannot_be_written_gives_way(temporary, monkeypatch, home):
+def test_without_a_writable_home_the_temporary_folder_is_used(temporary, monkeypatch, home):
     monkeypatch.setenv("XDG_CACHE_HOME", home)
     assert trusted_cache("key") == temporary / f"rsea_ros-{os.geteuid()}" / "key"
 
 
-def test_the_cache_of_the_home_is_made_for_its_user_alone(temporary, tmp_path, monkeypatch):
+def test_the_cache_in_the_home_is_private_to_its_user(temporary, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
     before = os.umask(0)
     try:
@@ -129,7 +129,7 @@ def test_the_cache_of_the_home_is_made_for_its_user_alone(temporary, tmp_path, m
     assert folder == tmp_path / "new" / "cache" / "rsea_ros" / "key"
     assert [path.stat().st_mode & 0o777 for path in (folder, folder.parent)] == [0o700, 0o700]
     assert trusted_cache("key") == folder
-    folder.chmod(0o755)  # others may have reached what lies in it
+    folder.chmod(0o755)  # others may have changed its content
     assert trusted_cache("key").parent.parent == temporary
 
 
@@ -163,14 +163,14 @@ def test_a_planted_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
 
 
 @pytest.mark.parametrize("how", ["open to all", "another's"])
-def test_a_folder_in_another_ones_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
+def test_a_folder_inside_another_users_folder_is_not_used(temporary, tmp_path, monkeypatch, how):
     plant(tmp_path / "home", how)
     of_others(monkeypatch, {tmp_path / "home"} if how == "another's" else set())
     assert trusted_cache("key").parent.parent == temporary
 
 
 def of_others(monkeypatch, folders: set[Path]) -> None:
-    """Make some folders another user's."""
+    """Give some folders to another user."""
     true = {name: getattr(Path, name) for name in ("stat", "lstat")}
 
     def changed(name):
@@ -185,13 +185,13 @@ def of_others(monkeypatch, folders: set[Path]) -> None:
         monkeypatch.setattr(Path, name, changed(name))
 
 
-def test_a_cache_that_the_user_names_is_his(monkeypatch):
+def test_a_cache_folder_that_the_user_names_is_used(monkeypatch):
     monkeypatch.setattr(config, "CACHE_DIR", "/somewhere")
     with _own_cache():
         assert config.CACHE_DIR == "/somewhere"
 
 
-def test_functions_of_others_are_kept_where_they_were(monkeypatch):
+def test_functions_of_other_packages_keep_their_cache(monkeypatch):
     monkeypatch.setattr(config, "CACHE_DIR", "")
     with _own_cache():
         assert Path(config.CACHE_DIR) == cache_folder()
@@ -199,7 +199,7 @@ def test_functions_of_others_are_kept_where_they_were(monkeypatch):
 
 
 def compiled_anew(limit: int | None = None):
-    """Return what a new compiled function makes of 1.0; limit: bytes that a file may have."""
+    """Return the value of a newly compiled function at 1.0; limit: largest size of a file, bytes."""
 
     @njit(cache=True)
     def doubled(x):
@@ -217,7 +217,7 @@ def compiled_anew(limit: int | None = None):
 
 @pytest.fixture
 def kept_in(tmp_path, monkeypatch):
-    """Return the folder in which code is kept, and forget that a warning was given."""
+    """Return the folder of compiled code, and forget that a warning was given."""
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
     compiler.warn_once.cache_clear()
     yield tmp_path
@@ -233,7 +233,7 @@ def test_a_full_disk_costs_the_cache_and_one_line(kept_in, caplog):
 
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
 @pytest.mark.parametrize("size", [0, 40])
-def test_code_that_broke_off_is_compiled_and_kept_anew(kept_in, caplog, suffix, size):
+def test_a_damaged_cache_file_is_recompiled(kept_in, caplog, suffix, size):
     assert compiled_anew() == 2.0
     (file,) = (p for p in kept_in.rglob("*") if p.suffix == suffix)
     os.truncate(file, size)

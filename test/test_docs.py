@@ -1,4 +1,4 @@
-"""The docs say what the code does: the tutorial runs, the catalogue is the code's, links lead somewhere."""
+"""The docs agree with the code: the tutorial runs, the catalogue is that of the code, links lead to files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_the_tutorial_runs_and_finds_the_play(capsys):
 
 
 def test_the_catalogue_of_the_docs_is_that_of_the_code(site):
-    """`.ci/docs` makes it anew."""
+    """`.ci/docs` regenerates it."""
     assert (DOCS / "effects.md").read_text(encoding="utf-8").strip() == site.effects_page().strip()
 
 
@@ -55,14 +55,14 @@ def test_every_link_leads_to_a_file(path):
     assert missing == []
 
 
-def test_every_page_stands_in_the_contents():
+def test_every_page_is_in_the_contents():
     index = (DOCS / "index.md").read_text(encoding="utf-8")
     pages = {path.stem for path in DOCS.glob("*.md")} - {"index"}
     assert all(re.search(rf"^{page}$", index, flags=re.MULTILINE) for page in pages), pages
 
 
 def test_the_notebook_is_the_tutorial(site):
-    """`.ci/docs` writes it anew."""
+    """`.ci/docs` regenerates it."""
     assert (DOCS / "tutorial.ipynb").read_text(encoding="utf-8") == site.tutorial_notebook()
 
 

@@ -15,7 +15,7 @@ TELLING = {"Fault", "tell", "add"}
 
 
 def _literal_kinds() -> Iterator[str]:
-    """Yield the kinds that stand in calls of Fault, tell and add in the readers and the core."""
+    """Yield the kinds in the calls of Fault, tell and add in the readers and the core."""
     for folder in ("msg_adapters", "rsea_ros/checks", "rsea_ros/diagnosis", "rsea_ros/identification"):
         for path in (ROOT / folder).rglob("*.py"):
             for node in ast.walk(ast.parse(path.read_text())):
@@ -33,7 +33,7 @@ def test_the_table_has_every_kind():
     assert kinds <= set(FAULT_KINDS)
 
 
-def test_the_docs_have_the_table():
+def test_the_docs_have_the_table_of_faults():
     text = (ROOT / "docs" / "bags.md").read_text()
     for kind, meaning in FAULT_KINDS.items():
         assert f"| `{kind}` | {meaning} |" in text

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rsea_ros.cli.main import main, verbs
+from rsea_ros.cli.main import FAULT, main, verbs
 from rsea_ros.diagnosis.initial_guess import RecordView, initial_guesses
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import IdentificationError, RigError
@@ -85,15 +85,15 @@ RESULTS = {
 
 
 @pytest.mark.parametrize("name", RESULTS)
-def test_what_gives_a_result(played, name):
+def test_an_unusual_input_gives_a_result(played, name):
     verb, changes = RESULTS[name]
     status, printed, said = played(verb, "--json", **changes)
     assert status == 0, said
     json.loads(printed, parse_constant=pytest.fail)
 
 
-def test_a_missing_value_leaves_the_start_and_the_angle_as_they_were():
-    """One NaN made a record that begins in motion begin at rest, and the angle had no spline."""
+def test_a_missing_value_does_not_change_the_initial_motion_and_the_angle():
+    """With one NaN a record that begins in motion was taken to begin at rest, and the angle had no spline."""
     rig = load_rig("paper_high_impedance")
     moving = record(channels=("ft", "position", "velocity"), command="slow").between(1.5, 4.0)
     k = len(moving["position"]) // 2
@@ -129,7 +129,7 @@ REFUSALS = {
 
 
 @pytest.mark.parametrize("name", REFUSALS)
-def test_what_is_refused_in_one_line(played, name):
+def test_a_bad_input_is_refused_in_one_line(played, name):
     verb, changes, words = REFUSALS[name]
     status, printed, said = played(verb, **changes)
     assert (status, printed) == (2, "")
@@ -144,7 +144,7 @@ def test_what_is_refused_in_one_line(played, name):
         (["--duration", "0.05", "--low", "5", "--high", "6"], "expected a longer duration or a wider band"),
     ],
 )
-def test_commands_that_cannot_be_made(tmp_path, capsys, arguments, words):
+def test_an_impossible_command_is_refused(tmp_path, capsys, arguments, words):
     assert main(["simulate", "paper_high_impedance", "--out", str(tmp_path / "bag"), *arguments]) == 2
     assert words in capsys.readouterr().err
 
@@ -163,20 +163,20 @@ def test_a_simulation_that_runs_away_is_refused():
         synthesize(rig, Channel(np.arange(100) / 280.0, np.ones(100)))
 
 
-def test_a_limit_is_guessed_without_a_motor_torque():
+def test_a_torque_limit_is_guessed_without_a_measured_motor_torque():
     case = case_from(record(), load_rig("paper_high_impedance"))
     seen = RecordView(case, load_rig("paper_high_impedance"), dict(case.measured))
     limits = [start["limit"] for start in initial_guesses(effect_named("torque_saturation"), seen)]
     assert len(limits) == 4 and min(limits) > 0.0
 
 
-def test_a_channel_without_a_sample_that_counts_is_left_out():
+def test_a_channel_without_a_valid_sample_is_left_out():
     whole = record()
     late = Record({**whole.channels, "velocity": Channel(whole["ft"].t[:5], whole["ft"].y[:5])})
     assert set(case_from(late, load_rig("paper_high_impedance")).measured) == {"ft", "position"}
 
 
-def test_numbers_beyond_any_measurement():
+def test_numbers_beyond_any_measurement_count_as_missing():
     y = np.array([1.0, 1e31, -1e300, 1e-31, -5e-324, 0.0, np.inf])
     channel = bounded(Record({"ft": Channel(np.arange(7.0), y)}))["ft"]
     assert np.array_equal(channel.y, [1.0, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan], equal_nan=True)
@@ -208,18 +208,18 @@ def test_a_still_command_is_refused_without_a_warning():
         (2, "", "rsea identify: \n", "message"),
         (2, "", "", "message"),
         (2, "", "first\nrsea identify: second\n", "message"),
-        (2, "", "rsea identify: KeyError, this is a fault of rsea\n", "last net"),
+        (2, "", f"rsea identify: {FAULT}: KeyError in cdr.py:7: 'a'\n", "last net"),
         (0, "{}", "x.py:1: RuntimeWarning: invalid value\n", "warning"),
         (0, '{"a": NaN}', "", "json"),
         (1, "", "Traceback (most recent call last):\nKeyError: 1\n", "traceback"),
         (130, "", "rsea: interrupted\n", "message"),
     ],
 )
-def test_the_gate_tells_a_kept_promise_from_a_broken_one(status, out, err, kind):
+def test_the_gate_distinguishes_kept_and_broken_promises(status, out, err, kind):
     assert judge(status, out, err, is_json=status in (0, 1)).kind == kind
 
 
-def test_a_gate_that_broke_off_goes_on_without_the_promises_that_were_kept(tmp_path):
+def test_an_interrupted_gate_resumes_without_the_cases_that_passed(tmp_path):
     log = tmp_path / "log.jsonl"
     said = [
         ("b0001 verb=check", "result"),

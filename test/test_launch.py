@@ -1,4 +1,4 @@
-"""The launch files describe one graph. `launch` is not among the wheels: stand-ins record what they get."""
+"""The launch files describe one graph. `launch` is not among the wheels: stand-ins record their arguments."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_the_graph_declares_every_argument_that_it_uses(describe):
     assert configurations(parts) == set(defaults(parts))
 
 
-def test_only_the_first_node_model_and_identify_start_unasked(describe):
+def test_only_the_first_node_model_and_identify_start_by_default(describe):
     parts = describe("graph")
     wanted = {name: node["condition"].arguments[0] for name, node in nodes(parts).items()}
     for name in FIRST.values():
@@ -116,8 +116,8 @@ def test_a_node_gets_a_parameter_file_and_parameters_that_it_declares(describe):
         assert given <= {parameter.name for parameter in table}, name
 
 
-def test_hardware_is_a_real_device_that_is_activated_only_where_that_is_asked(describe):
-    """It started the simulation, whatever was plugged in."""
+def test_hardware_launches_a_real_device_and_activates_it_only_on_request(describe):
+    """It started the simulation whatever was connected."""
     parts = describe("graph")
     own = nodes(parts)["driver"]["parameters"][1]
     given = {name: defaults(parts)[part.arguments[0]] for name, part in own.items()}

@@ -112,8 +112,8 @@ def test_the_environment_is_made_once_and_anew_when_the_lock_changes(clone, quic
     assert run(clone, quick) == (0, "ran\n", "")
 
 
-def test_an_environment_behind_a_link_is_nobodys_to_clear(clone, quick, tmp_path):
-    """A link to the environment of another clone: with another lock that one was cleared."""
+def test_an_environment_behind_a_link_is_never_cleared(clone, quick, tmp_path):
+    """With another lock, the environment of another clone behind a link was cleared."""
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "kept").touch()

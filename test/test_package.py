@@ -71,7 +71,7 @@ def test_every_module_is_installed(workspace, top):
     assert files(installed, "*.py") == files(ROOT / top, "*.py")
 
 
-def test_the_style_of_reports_is_installed(workspace):
+def test_the_style_sheet_of_reports_is_installed(workspace):
     (installed,) = (workspace / "install/rsea_ros/lib").glob("python3*/site-packages/rsea_ros/report/page")
     assert {file.name for file in installed.glob("page.*")} == {"page.css", "page.js"}
     vendored = {file.name for file in (installed / "vendor").iterdir()}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from pathlib import Path
 
@@ -42,6 +43,7 @@ DESIGNS = {
 """Travel between -4 and +4 N m, degrees; whether the current limit stops the motor at 25 N m."""
 
 
+@functools.cache
 def imported(file: str, mapping: str) -> Record:
     """Return a file of measurements as a record."""
     return import_record(REAL / file, load_map(CONFIG / f"imports/{mapping}.yaml"))
@@ -55,9 +57,16 @@ def identified(file: str, mapping: str, rig: str, folder: Path) -> dict:
     return json.loads((out / "identification.json").read_text(encoding="utf-8"))
 
 
-def test_emps_has_the_published_values(tmp_path):
+@pytest.fixture(scope="module")
+def emps(tmp_path_factory):
+    """Identify the drive once; return the folder of its bag and results, and what was identified."""
+    folder = tmp_path_factory.mktemp("emps")
+    return folder, identified("emps/DATA_EMPS.mat", "emps_identification", "emps", folder)
+
+
+def test_emps_has_the_published_values(emps):
     """Janot, Gautier, Brunot 2019: M 95.109 kg, 203.503 N s/m, 20.394 N, offset -3.165 N."""
-    found = identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)["parameters"]
+    found = emps[1]["parameters"]
     published = {
         "rotor.reflected_inertia": (95.109, 0.02),
         "rotor.reflected_damping": (203.503, 0.02),
@@ -72,18 +81,17 @@ def test_emps_has_the_published_values(tmp_path):
         assert high - low < 0.3 * abs(value), name
 
 
-def test_emps_predicts_the_run_with_pulses(tmp_path):
+def test_emps_predicts_the_run_with_pulses(emps, tmp_path):
     """Held out: the force residual is at most 4.7 % of the force."""
-    identified("emps/DATA_EMPS.mat", "emps_identification", "emps", tmp_path)
     pulses = ["import", str(REAL / "emps/DATA_EMPS_PULSES.mat"), "--map", "emps_pulses"]
     assert main([*pulses, "--out", str(tmp_path / "pulses")]) == 0
-    model = load_rig(tmp_path / "emps_identification_results" / "model.yaml")
+    model = load_rig(emps[0] / "emps_identification_results" / "model.yaml")
     force = predict(model, read_record(tmp_path / "pulses"))["motor_torque"]
     rms = float(np.sqrt(np.mean(force.measured[force.counts] ** 2)))
     assert force.rms_error / rms < 0.047
 
 
-def test_pendulum_gravity(tmp_path):
+def test_the_pendulum_has_its_published_gravity(tmp_path):
     file = "pendulum/gravity_compensation.measured.csv.gz"
     result = identified(file, "pendulum", "pendulum", tmp_path)
     gravity = result["parameters"]["spring_end.gravity"]
@@ -94,7 +102,7 @@ def test_pendulum_gravity(tmp_path):
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_cycloidal_statics_of_every_design(design):
+def test_the_statics_of_every_cycloidal_design_are_as_published(design):
     travel, saturates = DESIGNS[design]
     short, long = (ramps(design, which) for which in ("short", "long"))
     assert np.degrees(short.travel) == pytest.approx(travel, abs=0.005)
@@ -112,7 +120,7 @@ def ramps(design: str, which: str) -> Statics:
 
 
 @pytest.mark.parametrize("design", list(DESIGNS)[::5])
-def test_cycloidal_identified(design, tmp_path, capsys):
+def test_a_cycloidal_gear_is_identified(design, tmp_path, capsys):
     file = f"cycloidal/2024-{design}.csv.gz"
     short = identified(file, "cycloidal_short_ramps", "cycloidal", tmp_path)
     stiffness = short["parameters"]["spring.stiffness"]
@@ -135,8 +143,8 @@ def test_cycloidal_saturation_is_seen_and_fitted():
     assert found["spring.stiffness"] == pytest.approx(result.statics.stiffness, rel=0.25)
 
 
-def test_emps_diagnosed():
-    """Coulomb friction first, then its difference between directions; no Stribeck; judged by another run."""
+def test_emps_is_diagnosed_with_coulomb_friction_and_its_asymmetry():
+    """Coulomb friction first, then its difference between directions; no Stribeck; tested on another run."""
     run = imported("emps/DATA_EMPS.mat", "emps_identification")
     pulses = imported("emps/DATA_EMPS_PULSES.mat", "emps_pulses")
     found = diagnose([run], load_rig("emps"), holdout=pulses)
@@ -163,7 +171,7 @@ MECHANICAL = {
 
 
 def test_cycloidal_backlash_is_named_in_run_in_gears():
-    """Its travel is twice that of any preloaded gear; friction and its asymmetry are there as well.
+    """Its travel is twice that of any preloaded gear; it also has friction and an asymmetry of it.
 
     Among the laws of friction, play and springs, in the first ramps: the whole catalogue and record name the
     same in four times the time.

@@ -1,4 +1,4 @@
-"""What --force replaces is back after a kill at any step, or replaced as a whole; nothing is lost."""
+"""After a kill at any step, files that --force replaces are old or new as a whole; nothing is lost."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Killer:
 
 
 def killed(work: Callable[[], object], n: int) -> bool:
-    """Do the work in a child that is killed before its n-th step; return whether it came to that."""
+    """Do the work in a child that is killed before its n-th step; return whether it reached that step."""
     pid = os.fork()
     if pid == 0:
         files.os = replaced.os = Killer(n)
@@ -77,7 +77,7 @@ def old_bag(folder: Path) -> None:
 
 
 def later(folder: Path) -> None:
-    """Let a minute pass for what lies in a folder."""
+    """Make the content of a folder a minute older."""
     for path in (p for p in folder.iterdir() if p.name.startswith(".rsea-")):
         os.utime(path, (time.time() - 2.0 * LEFT_AFTER,) * 2)
 
@@ -89,7 +89,7 @@ def texts(folder: Path) -> dict[str, str]:
 def outcomes(
     give: Callable[[Path], object], old: Callable[[Path], None], tmp_path: Path
 ) -> Iterator[dict[str, str]]:
-    """Yield what a folder holds when the next run has begun, for a kill at each step."""
+    """Yield the content of a folder at the start of the next run, for a kill at each step."""
     for n in range(1, 100):
         folder = tmp_path / str(n)
         folder.mkdir()
@@ -107,7 +107,7 @@ def outcomes(
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_a_set_is_old_or_new_as_a_whole(tmp_path, monkeypatch, links):
+def test_a_set_of_files_is_old_or_new_as_a_whole(tmp_path, monkeypatch, links):
     if not links:
         monkeypatch.setattr(files, "_linked", lambda source, target: False)
     seen = list(outcomes(give_set, old_set, tmp_path))
@@ -124,14 +124,14 @@ def test_a_bag_is_never_lost(tmp_path):
 
 
 def aside(folder: Path, name: str) -> Path:
-    """Return what a killed writer put aside under a name."""
+    """Return the folder in which a killed writer has put a file aside."""
     locked = make_locked(folder, KIND)
     (locked.path / name).write_text("old")
     locked.release()
     return locked.path
 
 
-def test_what_has_taken_the_name_since_is_kept_too(tmp_path):
+def test_a_file_that_has_taken_the_name_since_is_kept_too(tmp_path):
     aside(tmp_path, "a")
     (tmp_path / "a.old").write_text("of somebody")
     (tmp_path / "a").write_text("edited since")
@@ -140,7 +140,7 @@ def test_what_has_taken_the_name_since_is_kept_too(tmp_path):
     assert texts(tmp_path) == {"a": "edited since", "a.old": "of somebody", "a.old-2": "old"}
 
 
-def test_a_writer_at_work_keeps_what_it_has_put_aside(tmp_path):
+def test_files_put_aside_by_a_running_writer_stay(tmp_path):
     locked = make_locked(tmp_path, KIND)
     (locked.path / "a").write_text("old")
     put_back(tmp_path)
@@ -150,7 +150,7 @@ def test_a_writer_at_work_keeps_what_it_has_put_aside(tmp_path):
     assert texts(tmp_path) == {"a": "old"}
 
 
-def test_what_another_user_or_machine_put_aside_stays(tmp_path, monkeypatch):
+def test_files_put_aside_by_another_user_or_machine_stay(tmp_path, monkeypatch):
     path = aside(tmp_path, "a")
     other = path.rename(tmp_path / path.name.replace(name_of(KIND), ".rsea-old-00000000-"))
     put_back(tmp_path)
@@ -161,7 +161,7 @@ def test_what_another_user_or_machine_put_aside_stays(tmp_path, monkeypatch):
     assert (mine / "a").exists()
 
 
-def test_a_name_that_is_back_is_refused_before_any_work(tmp_path):
+def test_a_restored_name_is_refused_before_any_work(tmp_path):
     aside(tmp_path, "a")
     with pytest.raises(files.OutputError, match="exists already"):
         check_free([tmp_path / "a"])
@@ -174,7 +174,7 @@ def test_the_next_results_clear_up_first(tmp_path):
     assert texts(tmp_path) == {"a": "old", "b": "new"}
 
 
-def test_what_cannot_be_put_back_stays_and_stops_nobody(tmp_path, monkeypatch):
+def test_a_file_that_cannot_be_put_back_stays_and_stops_nobody(tmp_path, monkeypatch):
     path = aside(tmp_path, "a")
 
     class Refusing:

@@ -1,4 +1,4 @@
-"""Stages: what a killed writer left goes with the next writer, what one at work or another user has stays."""
+"""Stages: a killed writer's are removed by the next; those of a running writer or another user stay."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_the_next_writer_removes_what_a_killed_one_left(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
-def test_so_does_the_next_bag(tmp_path):
+def test_the_next_bag_removes_what_a_killed_writer_left(tmp_path):
     left(tmp_path)
     with BagWriter(tmp_path / "bag.mcap", recording=False):
         pass
@@ -90,7 +90,7 @@ def stage_of_another_machine(folder: Path) -> Path:
 
 
 def replaced_file(folder: Path) -> Path:
-    """Return what a writer that was killed while it replaced a file has put aside: the only copy."""
+    """Return the only copy of a file, put aside by a writer that was killed while replacing it."""
     path = folder / f"{PREFIX}old-0123abcd"
     path.mkdir()
     return aged(path)
@@ -113,7 +113,7 @@ KEPT = (stage_of_another_machine, replaced_file, link_of_that_name, file_of_that
 
 
 @pytest.mark.parametrize("make", KEPT)
-def test_what_is_no_left_stage_stays(tmp_path, make):
+def test_a_folder_that_is_not_a_leftover_stage_stays(tmp_path, make):
     path = make(tmp_path)
     remove_left(tmp_path)
     assert os.path.lexists(path)
@@ -126,7 +126,7 @@ def test_a_stage_of_another_user_stays(tmp_path, monkeypatch):
     assert path.exists()
 
 
-def test_what_is_put_aside_can_be_removed_only_when_all_have_their_names(tmp_path, monkeypatch):
+def test_files_put_aside_can_be_removed_only_once_all_new_ones_have_their_names(tmp_path, monkeypatch):
     source, target = tmp_path / "source", tmp_path / "target"
     for path in (source, target):
         path.mkdir()
@@ -142,7 +142,7 @@ def test_what_is_put_aside_can_be_removed_only_when_all_have_their_names(tmp_pat
     assert not aside.exists()
 
 
-def test_two_that_remove_at_once_agree(tmp_path):
+def test_two_processes_that_clean_up_at_once_agree(tmp_path):
     paths = [left(tmp_path) for _ in range(20)]
     with ThreadPoolExecutor(2) as both:
         list(both.map(remove_left, [tmp_path] * 2))

@@ -1,4 +1,4 @@
-"""Stamps put right: jitter is no fault, gaps and jumps are found, and a second look finds nothing new."""
+"""Corrected stamps: jitter is no fault, gaps and jumps are found, and a second pass changes nothing."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_lost_samples_are_counted_beside_jitter(share):
 
 
 @pytest.mark.parametrize("periods", [5, 100, 1000])
-def test_a_jump_back_is_told_from_disorder(periods):
+def test_a_jump_back_is_distinguished_from_disorder(periods):
     t = np.arange(COUNT) * PERIOD
     jumped = np.where(np.arange(COUNT) < 1500, t, t - periods * PERIOD)
     assert np.flatnonzero(jumps_back(jumped)).tolist() == [1499]
@@ -76,7 +76,7 @@ def test_a_second_look_finds_nothing_new():
     assert repair_stamps(told)[1] == []
 
 
-def test_few_stamps_far_from_all_others():
+def test_stamps_far_from_all_others_are_found():
     t = np.arange(1000) * 1.0
     t[[0, 500, 501]] += 1e9
     assert np.flatnonzero(far_apart(t, 3600.0)).tolist() == [0, 500, 501]

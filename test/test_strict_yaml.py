@@ -1,4 +1,4 @@
-"""YAML of people: what could be misread is refused with its line, and nothing grows while it is read."""
+"""YAML that people write: ambiguous text is refused with its line, and nothing expands while it is read."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED, ids=lambda text: text[:30])
-def test_what_could_be_misread_is_refused(text):
+def test_ambiguous_yaml_is_refused(text):
     with pytest.raises(FieldError, match=rf"^{REFUSED[text]}") as caught:
         parse(text)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 250
@@ -78,7 +78,7 @@ def test_a_bomb_of_aliases_is_refused_at_once():
         ("1" * 5000, "1" * 5000),
     ],
 )
-def test_what_a_value_is(text, value):
+def test_a_value_is_what_a_person_means(text, value):
     assert parse(f"a: {text}").content == {"a": value}
 
 
@@ -99,11 +99,11 @@ PLAIN = st.recursive(
 
 @settings(max_examples=40, deadline=None)
 @given(st.dictionaries(st.text(max_size=8), PLAIN, max_size=4))
-def test_what_the_project_writes_is_read_back(document):
+def test_files_that_the_project_writes_are_read_back(document):
     assert parse(dump(document)).content == document
 
 
-def test_lines_of_fields():
+def test_a_field_is_located_by_its_line():
     document = parse(
         "name: x\nrotor:\n  inertia:\n    unit: kg\n    value: 3\neffects:\n- name: a\n- name: b\n"
     )
@@ -115,7 +115,7 @@ def test_lines_of_fields():
     assert document.where("") == ""
 
 
-def test_files(tmp_path):
+def test_a_file_must_be_utf_8_text_of_bounded_size(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_bytes(b"\xef\xbb\xbfa: 1\r\n")
     assert read(file).content == {"a": 1}

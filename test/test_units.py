@@ -1,4 +1,4 @@
-"""Units: every common way to write one is that one, and no other."""
+"""Units: every common spelling of a unit is accepted for it and for no other."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize(("unit", "text"), [(u, text) for u, texts in WAYS.items() for text in texts])
-def test_one_unit_in_many_ways(unit, text):
+def test_a_unit_may_be_written_in_many_ways(unit, text):
     assert same_unit(text, unit)
 
 
@@ -38,11 +38,11 @@ def test_one_unit_in_many_ways(unit, text):
      ("rads", "rad/s"), ("", "1"), (None, "1"),
      ("r p m", "rpm"), ("NM", "N m"), (True, "1"), ("N m^2", "N m")],
 )  # fmt: skip
-def test_other_units(text, unit):
+def test_a_different_unit_is_not_accepted(text, unit):
     assert not same_unit(text, unit)
 
 
-def test_no_two_units_of_the_rig_are_the_same():
+def test_no_two_units_of_the_rig_share_a_spelling():
     units = {field.unit for field in FIELDS.values()} | set(UNITS.values())
     assert not [pair for pair in itertools.permutations(units, 2) if same_unit(*pair)]
 

@@ -1,4 +1,4 @@
-"""Only files.py writes: whatever else opened a file for writing could replace one, or leave half of one."""
+"""Only files.py writes: any other code that writes could replace a file or leave a partial one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WRITING = {"write_text", "write_bytes", "rename", "renames", "tofile", "savez", 
 
 
 def offences(source: str) -> list[int]:
-    """Return the lines of a source that write a file by themselves."""
+    """Return the lines of a source that write a file without files.py."""
     calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     return [call.lineno for call in calls if writes(call)]
 
@@ -49,5 +49,5 @@ def test_an_offence_is_found(source):
 
 
 @pytest.mark.parametrize("source", ["write_text(p, s)", 'p.open("xb")', 'text.replace("a", "b")', "open(p)"])
-def test_what_is_allowed_passes(source):
+def test_an_allowed_call_passes(source):
     assert offences(source) == []

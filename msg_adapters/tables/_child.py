@@ -1,6 +1,6 @@
-"""A program of its own: `_child.py READER FILE LIMIT PLACES` runs a reader within its ceilings.
+"""A separate program: `_child.py READER FILE LIMIT PLACES` runs a reader within its limits.
 
-See child.py. It imports nothing of this package: what may be ended at any moment starts with next to nothing.
+See child.py. It imports nothing of this package, so that it starts fast and may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 
 def main(reader: dict[str, Any], path: str, limit: int, places: list[dict[str, Any]]) -> None:
-    """Write sizes and numbers of what is read, or in their place one line on why it is not."""
+    """Write sizes and numbers, or one line with the reason of a failure."""
     memory, seconds = reader["MEMORY"], reader["SECONDS"]
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
@@ -32,12 +32,12 @@ def main(reader: dict[str, Any], path: str, limit: int, places: list[dict[str, A
         answer({"error": f"asks for more than {memory >> 30} GB of memory"})
     except reader["Refused"] as error:
         answer({"error": str(error)})
-    except Exception:  # whatever a damaged file makes of the reader
+    except Exception:  # a damaged file may raise anything in the reader
         answer({"error": reader["DAMAGED"]})
 
 
 def answer(words: dict[str, object]) -> None:
-    """Write a line in the place of whatever was written before."""
+    """Write a line that replaces all earlier output."""
     sys.stdout.buffer.flush()
     os.ftruncate(1, 0)
     os.lseek(1, 0, os.SEEK_SET)

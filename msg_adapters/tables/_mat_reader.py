@@ -1,4 +1,4 @@
-"""Reads vectors of a MAT file, in a process of its own (see child.py).
+"""Reads vectors of a MAT file, in a child process (see child.py).
 
 SciPy's reader can crash on a damaged file, or ask for any amount of memory: that ends only this process. A
 place is a variable, or a field of structs, `log.motor.current` or `runs(2).t`; all of it where it is a
@@ -17,11 +17,14 @@ _PART = re.compile(r"(?P<name>[^()]+)(?:\((?P<number>[0-9]{1,6})\))?")
 
 
 class Refused(ValueError):
-    """What a variable is, and what was expected."""
+    """The kind of a variable, and the expected one."""
 
 
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], list[Any]]:
-    """Return the sizes of the vectors, and the vectors. Raises Refused for what is no vector of numbers."""
+    """Return the sizes of the vectors, and the vectors.
+
+    Raises Refused for anything but vectors of numbers.
+    """
     from scipy.io import loadmat, whosmat
 
     shapes = {name: (shape, kind) for name, shape, kind in whosmat(path)}
@@ -67,7 +70,7 @@ def vector(place: dict[str, Any], variables: dict[str, Any]) -> Any:
 
 
 def _descended(place: dict[str, Any], variables: dict[str, Any]) -> Any:
-    """Return what a path like `log.motor(2).current` leads to."""
+    """Return the value at a path like `log.motor(2).current`."""
     value: Any = None
     way = ""
     for at, part in enumerate(place["base"].split(".")):
@@ -99,7 +102,7 @@ def _single(value: Any, way: str) -> Any:
 
 
 def _check_shape(place: dict[str, Any], shape: Any, kind: object, *, is_number: bool) -> None:
-    """Refuse what is no vector of numbers, or no matrix that has the column or row asked for."""
+    """Refuse anything but a vector of numbers or a matrix with the requested column or row."""
     index = place["index"]
     is_vector = max(shape, default=0) >= 2 and max(shape) == _product(shape)
     if index is None and is_number and is_vector:

@@ -1,6 +1,6 @@
-"""Reads columns of a Parquet file, in a process of its own (see child.py).
+"""Reads columns of a Parquet file, in a child process (see child.py).
 
-What a damaged file makes of the reader ends only this process. One row group of one column is held at a
+A damaged file can end only this process. One row group of one column is held at a
 time. A place is a column, or a field of one, `pose.x`; `name[2]` the third number of its lists.
 """
 
@@ -16,7 +16,7 @@ DAMAGED = "no Parquet file that can be read; a damaged file?"
 
 
 class Refused(ValueError):
-    """What a column is, and what was expected."""
+    """The kind of a column, and the expected one."""
 
 
 def read(path: str, limit: int, places: list[dict[str, Any]]) -> tuple[list[int], Iterator[Any]]:
@@ -105,7 +105,7 @@ def _vectors(file: Any, name: str, way: list[str], place: dict[str, Any]) -> Ite
 
 
 def _doubles(chunk: Any) -> Any:
-    """Return numbers as doubles, stamps and durations in seconds; NaN where there is none."""
+    """Return numbers as doubles, stamps and durations in seconds; NaN where missing."""
     import numpy as np
     import pyarrow as pa
 

@@ -1,4 +1,4 @@
-"""Readers that run in another process: a damaged file, or one that asks for all memory, ends only that.
+"""Readers in a child process: a damaged file, or one that needs all memory, ends only the child.
 
 A reader is a file `_NAME_reader.py` with its ceilings MEMORY and SECONDS, what it raises (Refused), what it
 says of a DAMAGED file, and `read`. `_child.py` runs it with FILE, the largest number of values and the places
@@ -39,7 +39,7 @@ class Reader:
     limit: int
 
     def read(self, path: Path, columns: Sequence[str]) -> Table:
-        """Return the columns asked for. Raises ValueError with column, shape and expectation."""
+        """Return the requested columns. Raises ValueError with column, shape and expectation."""
         places = json.dumps([{"column": column, **asdict(place_of(column))} for column in columns])
         with tempfile.TemporaryFile() as output:
             self._run([str(path.absolute()), str(self.limit), places], output)

@@ -11,11 +11,11 @@ LONG = 1.5
 
 
 def repaired(t: FloatArray) -> tuple[FloatArray, str]:
-    """Spread samples with equal stamps evenly until the clock's next tick; say what was done.
+    """Spread samples with equal stamps evenly until the clock's next tick; return a note.
 
     The first sample after a tick is dated by it to within one sample period, so the error of each stamp
     stays below that, whatever the rate does meanwhile; a line through all samples would be off by as much
-    as the rate wanders. t: s, shape (n,), not decreasing. Returns t as it is where no stamp repeats.
+    as the rate wanders. t: s, shape (n,), not decreasing. Returns t unchanged where no stamp repeats.
     """
     first = np.flatnonzero(np.diff(t, prepend=-np.inf))
     if len(first) == len(t) or len(first) < 2:

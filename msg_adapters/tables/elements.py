@@ -20,7 +20,7 @@ _MATLAB = re.compile(r"(?P<base>.+)\((?:(?P<row>[0-9]{1,4}),:|:,(?P<column>[0-9]
 class Place:
     """Where the values of a column are: in `base`, all of it or number `index`, from 0.
 
-    is_row: of the first axis (the samples lie along the second), else of the second.
+    is_row: of the first axis (the samples are along the second), otherwise of the second.
     """
 
     base: str
@@ -40,9 +40,9 @@ def place_of(column: str) -> Place:
 
 
 def base_and_index(column: str, names: Sequence[str]) -> tuple[str, int | None]:
-    """Return the column of a text file that holds what is asked for, and which number of its cells.
+    """Return the column of a text file with the requested values, and the index within its cells.
 
-    A column that is called `name[1]` itself is taken as it is, and a number as that of a column, from 1.
+    A column whose name is `name[1]` is used as such, and a number counts columns from 1.
     """
     if column in names:
         return column, None
@@ -53,7 +53,7 @@ def base_and_index(column: str, names: Sequence[str]) -> tuple[str, int | None]:
 
 
 def number_in(cell: str, index: int) -> str:
-    """Return a number of a cell that holds a list, as text. Raises ValueError where it has none there."""
+    """Return a number of a cell that holds a list, as text. Raises ValueError where it is missing."""
     text = cell.strip()
     if not (text.startswith("[") and text.endswith("]")):
         raise ValueError("expected a list of numbers in brackets")

@@ -61,7 +61,7 @@ class Expression:
     def values(self, columns: Mapping[str, FloatArray], t: FloatArray) -> FloatArray:
         """Return its value at every sample. columns: by name, shape (n,). t: stamps, s, shape (n,).
 
-        Raises ValueError for what cannot be computed.
+        Raises ValueError for an expression that cannot be computed.
         """
         from asteval import Interpreter
 
@@ -71,7 +71,7 @@ class Expression:
             with np.errstate(all="ignore"):
                 result = evaluator.run(tree, expr=self.text)
                 values = np.broadcast_to(np.asarray(result, np.float64), t.shape).copy()
-        except Exception as error:  # whatever asteval makes of what a function raises
+        except Exception as error:  # asteval may raise anything for an error in a function
             raise ValueError(f"{shown(self.text)} cannot be computed: {_reason(error)}") from None
         if np.isinf(values).any():
             at = int(np.argmax(np.isinf(values)))

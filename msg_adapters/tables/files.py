@@ -32,7 +32,7 @@ READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
 def read_columns(
     path: Path, columns: Sequence[str], delimiter: str | None = None, header: bool | None = None
 ) -> Table:
-    """Return the columns asked for.
+    """Return the requested columns.
 
     Text files name their columns in the first row; without names they are called 1, 2, ….
     Raises ImportMapError with file, line, column, value and expectation.

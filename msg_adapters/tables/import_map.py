@@ -61,7 +61,7 @@ class ImportMap:
         return tuple(dict.fromkeys(terms[0].file for terms in self.channels.values()))
 
     def at(self, index: int | None) -> ImportMap:
-        """Return the map for one number of lists in cells. Raises ImportMapError where none is chosen."""
+        """Return the map for one index into lists in cells. Raises ImportMapError where none is chosen."""
         channels = {
             name: tuple(term.at(index) for term in terms) for name, terms in self.channels.items()
         }
@@ -79,7 +79,7 @@ class ImportMap:
         return replace(self, channels=held)
 
     def columns(self) -> list[str]:
-        """Return every column that is needed, each once."""
+        """Return every needed column, each once."""
         terms = [column for terms in self.channels.values() for term in terms for column in term.columns]
         where = [self.where.column] if self.where is not None else []
         runs = [self.runs] if self.runs is not None else []

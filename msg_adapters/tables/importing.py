@@ -45,7 +45,7 @@ class Imported:
 
 @dataclass(frozen=True)
 class _Part:
-    """What one file holds: stamps of the rows that count, s, values by channel, and what was found."""
+    """The content of one file: stamps of the valid rows, s, values by channel, and faults."""
 
     t: FloatArray
     values: Mapping[str, FloatArray]
@@ -103,7 +103,7 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 
 
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
-    """Read what all joints need of a file."""
+    """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
     return read_columns(path, list(columns), maps[0].delimiter, maps[0].header)
 
@@ -146,7 +146,7 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
 
 
 def summary(record: Record, mapping: ImportMap) -> list[str]:
-    """Return what was imported, for a person to compare with what he knows of the machine."""
+    """Return a summary of the import, for a person to compare with the machine."""
     lines = list(record.notes)
     for name, channel in record.channels.items():
         columns = " + ".join(f"{term.column} [{term.unit}]" for term in mapping.channels[name])
@@ -156,7 +156,7 @@ def summary(record: Record, mapping: ImportMap) -> list[str]:
 
 
 def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[BoolArray, int]:
-    """Return which rows count, and how many are left out for want of a stamp or of what `where` asks."""
+    """Return which rows count, and how many are left out without a stamp or by `where`."""
     keep = np.ones(len(next(iter(table.columns.values()))), np.bool_)
     where = mapping.where
     for column in (*(mapping.time.columns if mapping.time else ()), *([where.column] if where else [])):
@@ -185,7 +185,7 @@ def _spread(table: Table, where: Rows | None) -> str:
 
 
 def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fault]:
-    """Yield what is missing of the whole table."""
+    """Yield the faults of the whole table."""
     name = Path(path).name
     if table.left_out:
         detail = f"{table.left_out} of {table.rows} rows left out: {table.first}"
@@ -196,7 +196,7 @@ def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fau
 
 
 def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> tuple[Channel, list[Fault]]:
-    """Return a channel without its missing values, and what is missing."""
+    """Return a channel without its missing values, and their fault."""
     columns = " + ".join(term.column for term in terms)
     if np.isinf(y).any():
         raise ImportMapError(f"{name}: {columns} is too large for its unit, expected a number below 1e308")
@@ -212,7 +212,7 @@ def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> 
 
 
 def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:
-    """Return the stamp of each row that counts, s, increasing, and what was repaired.
+    """Return the stamp of each valid row, s, increasing, and the repairs.
 
     Stamps that repeat are spread over all dated rows of a run, those that `where` leaves out included.
     """

@@ -28,7 +28,7 @@ _DEEPEST = 4
 
 
 def read_json(path: Path, columns: Sequence[str]) -> Table:
-    """Return the columns asked for. Raises OSError and ValueError with column, sample and expectation."""
+    """Return the requested columns. Raises OSError and ValueError with column, sample and expectation."""
     if path.stat().st_size > LARGEST_FILE:
         raise ValueError(f"{path.stat().st_size} bytes of JSON, expected fewer than {LARGEST_FILE}")
     document = _document(path)
@@ -83,7 +83,7 @@ def _vector(column: str, document: Any) -> FloatArray:
 
 
 def _cells(value: Any, way: str) -> Any:
-    """Return what lies at the end of a way. Raises KeyError where it leads nowhere."""
+    """Return the values at the end of a path. Raises KeyError where it leads nowhere."""
     if not way:
         return value
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""How a table of text is laid out: what parts its cells, and their names."""
+"""The layout of a text table: the separator of its cells, and their names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DELIMITERS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": BLANKS, "tab": "\t"
 
 @dataclass(frozen=True)
 class Layout:
-    """names: of the columns. headed: whether they stand in the first line that counts."""
+    """names: of the columns. headed: whether they are in the first valid line."""
 
     delimiter: str
     names: tuple[str, ...]
@@ -64,8 +64,8 @@ def layout_of(
 ) -> Layout:
     """Return the layout by the first line that counts.
 
-    header: whether that line names the columns; None: where not all of it is numbers. Without a delimiter it
-    is the first of several with which the line has the columns asked for; where none has, the one that makes
+    header: whether that line names the columns; None: if not all of it is numbers. Without a delimiter it
+    is the first of several with which the line has the requested columns; otherwise the one that makes
     most cells.
     """
     usual = "\t" if ".tsv" in path.suffixes else ","

@@ -1,4 +1,4 @@
-"""Lines of text files in blocks, whatever their encoding, gzipped or not."""
+"""Lines of text files in blocks, in any common encoding, gzipped or not."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BO
 
 
 def blocks_of_lines(path: Path) -> Iterator[list[str]]:
-    """Yield the lines of a file without their ends. Raises ValueError for what is not text."""
+    """Yield the lines of a file without their ends. Raises ValueError for a file that is not text."""
     rest = ""
     with _opened(path) as file:
         text = io.TextIOWrapper(cast("IO[bytes]", file), encoding=_encoding(path), errors="replace")

@@ -15,7 +15,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_mat(path: Path, columns: Sequence[str]) -> Table:
-    """Return the variables asked for. Raises OSError and ValueError with variable, shape and expectation."""
+    """Return the requested variables. Raises OSError and ValueError with variable, shape and expectation."""
     _refuse_version_7_3(path)
     return Reader("MAT", CHILD, TIME, LARGEST).read(path, columns)
 

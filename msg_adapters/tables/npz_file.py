@@ -23,7 +23,7 @@ _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Runtim
 
 
 def read_npz(path: Path, columns: Sequence[str]) -> Table:
-    """Return the arrays asked for. Raises OSError and ValueError with array, shape and expectation."""
+    """Return the requested arrays. Raises OSError and ValueError with array, shape and expectation."""
     try:
         with zipfile.ZipFile(path) as archive:
             sizes = {n.removesuffix(".npy"): archive.getinfo(n).file_size for n in archive.namelist()}
@@ -67,7 +67,7 @@ def _root(base: str, names: Any) -> str:
 
 
 def _array(file: IO[bytes], name: str, size: int) -> Any:
-    """Read an array whose header promises what the file holds. size: bytes of it in the file."""
+    """Read an array whose header agrees with the file. size: its bytes in the file."""
     shape, dtype = _header(file, name)
     held = float(np.prod(shape, dtype=float)) * dtype.itemsize
     if dtype.hasobject:

@@ -15,7 +15,7 @@ TIME = 90.0
 
 
 def read_parquet(path: Path, columns: Sequence[str]) -> Table:
-    """Return the columns asked for. Raises OSError and ValueError with column, type and expectation."""
+    """Return the requested columns. Raises OSError and ValueError with column, type and expectation."""
     with path.open("rb") as file:
         if file.read(4) != b"PAR1":
             raise ValueError("no Parquet file (it does not begin with PAR1), expected one")

@@ -1,4 +1,4 @@
-"""Columns of numbers out of a file, with what is missing in them."""
+"""Columns of numbers from a file, and their missing values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Table:
     """Columns by name, shape (n,) each, n > 0; NaN where a cell was empty or `nan`.
 
     rows: of the file, those that were left out included. left_out: how many of them had too few or too
-    many fields. first: where the first of these is, for people.
+    many fields. first: place of the first of these, for people.
     """
 
     columns: Mapping[str, FloatArray]

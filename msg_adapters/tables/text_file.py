@@ -1,4 +1,4 @@
-"""Columns of numbers out of text, block by block: memory grows with the columns asked for, not the file."""
+"""Columns of numbers from text, block by block: memory grows with the requested columns, not the file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 def read_text(
     path: Path, columns: Sequence[str], delimiter: str | None, header: bool | None = None
 ) -> Table:
-    """Return the columns asked for. Raises ValueError with line, column, value and expectation."""
+    """Return the requested columns. Raises ValueError with line, column, value and expectation."""
     numbered = _numbered_blocks(path)
     first = next(((number, line) for block in numbered for number, line in block), None)
     if first is None:
@@ -77,7 +77,7 @@ class _Reader:
             parts.append(np.ascontiguousarray(values[:, at]))
 
     def table(self) -> Table:
-        """Return what was collected. Raises ValueError where that is not a table."""
+        """Return the collected table. Raises ValueError where it is not a table."""
         if not self._rows:
             raise ValueError("no rows, expected numbers below the column names")
         if self._left_out > MOST_LEFT_OUT * self._rows:
@@ -89,7 +89,7 @@ class _Reader:
         return Table(columns, self._rows, self._left_out, self._first)
 
     def _fast(self, lines: list[str]) -> FloatArray | None:
-        """Return the values of a block where all of it is plain numbers, else None."""
+        """Return the values of a block of plain numbers only, otherwise None."""
         layout = self._layout
         if not all(layout.fits(line) for line in lines):
             return None
@@ -102,7 +102,7 @@ class _Reader:
         return table if len(table) == len(lines) and np.isfinite(table).all() else None
 
     def _careful(self, rows: list[tuple[int, str]]) -> FloatArray:
-        """Return the values of a block, NaN for what is missing, without rows that have too few cells."""
+        """Return the values of a block, NaN for missing ones, without rows that have too few cells."""
         kept = []
         for number, line in rows:
             cells = self._layout.cells(line)

@@ -1,1 +1,1 @@
-"""What a record is worth before any physics is fitted to it: check_record in check.py is the door."""
+"""Checks of a record before any physics is fitted to it; the entry is check_record in check.py."""

@@ -1,4 +1,4 @@
-"""A record that carries what the checks found into every result made from it."""
+"""A record that carries the findings of the checks into every result made from it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _AGAIN = ("missing_topic", "frozen_samples", "dropped_samples", "duplicate_stamp
 
 
 def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: bool) -> Record:
-    """Return a record that carries what the checks find wrong with it into the result.
+    """Return the record with the faults that the checks find, for the result.
 
     axis: of the wrench that `ft` was read from. masks: see with_faults.
     Raises IdentificationError where nothing moves.
@@ -29,7 +29,7 @@ def held_against(record: Record, rig: Rig, axis: str = "torque.z", *, masks: boo
 def with_faults(record: Record, found: Findings, *, masks: bool) -> Record:
     """Return a record with the faults that were found; a dead channel is left out.
 
-    masks: what comes next finds and masks faulty samples itself, and tells of them.
+    masks: the next stage finds, masks and reports faulty samples itself.
 
     Raises IdentificationError where no channel is left that measures anything.
     """

@@ -1,4 +1,4 @@
-"""Everything that can be said of a record before physics is fitted to it, in tenths of a second."""
+"""All checks of a record before physics is fitted to it, in tenths of a second."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from rsea_ros.checks.gains import Readings, readings_of
 from rsea_ros.checks.impedance import impedance_findings
 from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
-from rsea_ros.checks.linear_findings import clock_findings, identifiability
+from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.motion import is_commanded
 from rsea_ros.checks.restoring import restoring_findings
+from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
@@ -29,6 +30,7 @@ from rsea_ros.model.inverse import is_inverse
 from rsea_ros.model.position_loop import commanded
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.stamps import repair_stamps
 
 Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
@@ -40,11 +42,15 @@ FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_ri
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
-def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrench | None = None) -> Findings:
-    """Return what a record is worth for a rig: a traffic light for each thing that was looked at.
+def check_record(
+    record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrench | None = None, values: bool = False
+) -> Findings:
+    """Return the findings of a record for a rig, each with a traffic light.
 
-    Nothing is changed or masked by it. axis: of the wrench that `ft` was read from. wrench: the other axes,
-    tried where `ft` has nothing to do with the command. Raises nothing for data that are merely bad.
+    Nothing is changed or masked. axis: of the wrench that `ft` was read from. wrench: the other axes,
+    tried where `ft` has nothing to do with the command. values: fit the rig and add which of its values
+    these data determine, and which are far off, as identify and diagnose do themselves.
+    Raises nothing for data that are merely bad.
     """
     with one_blas_thread(), np.errstate(all="ignore"):
         if rig.loop is not None and "reference" not in record:
@@ -55,7 +61,7 @@ def check_record(record: Record, rig: Rig, axis: str = "torque.z", wrench: Wrenc
         found += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             found += excitation(checked.record, rig)
-            found += _against_rig(checked, rig, axis) if is_commanded(checked.record) else []
+            found += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         found += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in found if f.kind in FAULTY and f.light != "green"))
     findings = tuple(_of_targets(f) for f in found) if rig.loop is not None else tuple(found)
@@ -97,8 +103,8 @@ def _topics(record: Record) -> list[Finding]:
     ]
 
 
-def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
-    """Return what holding the record against the rig's simulation shows."""
+def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:
+    """Return the findings from comparing the record with the rig's simulation."""
     record = checked.record
     if is_full_of_gaps(record):
         return [
@@ -124,13 +130,13 @@ def _against_rig(checked: Checked, rig: Rig, axis: str) -> list[Finding]:
     found += [*noises(record, rig), *matched]
     if readings is None or late or _is_elsewhere(found):
         return found
-    return [*found, *_linearised(checked, rig, readings)]
+    return [*found, *_linearised(checked, rig, readings, values)]
 
 
 def _matched(
     record: Record, compared: Mapping[str, Side], rig: Rig, axis: str
 ) -> tuple[Readings | None, list[Finding]]:
-    """Return the readings of the channels, and what they say of signs, scales and the rig."""
+    """Return the readings of the channels, and findings on signs, scales and the rig."""
     related = quotients(compared)
     readings = readings_of(related, rig)
     silent = set(related) - set(readings.channels if readings else ())
@@ -142,7 +148,7 @@ def _matched(
 
 
 def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Finding]:
-    """Return what makes the machine of a record another one than a rig without a spring."""
+    """Return the findings by which the machine of a record differs from a rig without a spring."""
     if not is_inverse(rig):
         return []
     return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
@@ -153,15 +159,16 @@ def _is_elsewhere(found: list[Finding]) -> bool:
     return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in found)
 
 
-def _linearised(checked: Checked, rig: Rig, readings: Readings) -> list[Finding]:
+def _linearised(checked: Checked, rig: Rig, readings: Readings, values: bool) -> list[Finding]:
     if is_inverse(rig):
         return []
     try:
         linear = linear_of(checked.record, checked.masked, rig, readings.applied)
+        fitted = value_findings(linear, rig) if values else []
     except (RseaError, ValueError, np.linalg.LinAlgError):
         return []
     duration = checked.record.stop - checked.record.start
-    return [*clock_findings(linear, duration), *identifiability(linear, rig)]
+    return [*clock_findings(linear, duration), *fitted]
 
 
 def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) -> list[Finding]:
@@ -197,7 +204,7 @@ def _other_axes(checked: Checked, rig: Rig, axis: str, wrench: Wrench | None) ->
 
 def _beside(checked: Checked, rig: Rig, channel: Channel) -> Quotient | None:
     """Return the quotient of another channel taken for the F/T torque."""
-    record = checked.record.with_channels(ft=channel)
+    record, _ = repair_stamps(checked.record.with_channels(ft=channel))
     side: Side | None = sides(replace(record, faults=()), rig).get("ft")
     return None if side is None else quotient("ft", side.t, side.y, side.p)
 

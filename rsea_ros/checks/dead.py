@@ -15,6 +15,8 @@ from rsea_ros.signals import MEASURED, Channel, Fault, Record
 
 _VISIBLE = 3.0
 """Times the sensor's noise: a smaller signal than that may well be lost in it."""
+_CONFIRMED = 0.5
+"""Correlation of a speed with the rate of the position, far above what noise has by chance, either sign."""
 _SHOWS = 0.3
 """Of the channel's RMS: a predicted signal so large would show in it, whatever else is in the channel."""
 
@@ -26,7 +28,7 @@ def dead_channels(
 
     compared: the record beside the rig's simulation.
     frozen: channels of which a part is held, which says why they have little to do with the command.
-    The rig's simulation says what there was to be measured: where that is lost in the noise, no sensor is
+    Where the signal that the rig's simulation predicts is below the noise, no sensor is
     called dead.
     """
     if not is_commanded(record):
@@ -36,18 +38,29 @@ def dead_channels(
     for n, q in judged.items():
         shows = q.predicted > max(_SHOWS * q.measured, _VISIBLE * _noise(rig, n))
         alone = shows and q.is_unrelated and lag_of(compared[n]) == 0.0
-        if n in found and not found[n] and n not in frozen and alone:
+        if n in found and not found[n] and n not in frozen and alone and not _is_confirmed(record, n):
             found[n] = "noise that has nothing to do with the command"
     return [Fault("dead_channel", n, 1.0, detail) for n, detail in found.items() if detail]
 
 
 def _constant(channel: Channel, name: str, side: Side | None, rig: Rig) -> str:
-    """Return what is wrong with a channel that holds one value although there was something to measure."""
+    """Return the fault of a channel that holds one value although its signal must have changed."""
     if len(channel) < 2 or float(np.ptp(channel.y)) > 0.0:
         return ""
     if side is not None and float(np.std(side.p)) < _VISIBLE * _noise(rig, name):
         return ""
     return f"constant at {channel.y[0]:.4g}"
+
+
+def _is_confirmed(record: Record, name: str) -> bool:
+    """Return whether position and velocity agree: one is the rate of the other, whatever the rig says."""
+    if name not in ("position", "velocity") or not {"position", "velocity"} <= record.channels.keys():
+        return False
+    position, velocity = record["position"], record["velocity"]
+    rate = np.interp(velocity.t, position.t, np.gradient(position.y, position.t))
+    if not (np.std(rate) > 0.0 and np.std(velocity.y) > 0.0):
+        return False
+    return bool(abs(np.corrcoef(rate, velocity.y)[0, 1]) > _CONFIRMED)
 
 
 def _noise(rig: Rig, name: str) -> float:

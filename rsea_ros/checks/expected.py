@@ -1,4 +1,4 @@
-"""What the rig would have measured in a record, beside what was measured."""
+"""The measurements that the rig predicts for a record, beside the actual ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Factors by which a channel may be off SI, each with what it would mean. Tried, never guessed (gains.py)."""
+"""Factors by which a channel may be off SI, each with its meaning. Tried, never guessed (gains.py)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ SAME_NUMBER = {"mN m": "mN m or N mm"}
 
 @dataclass(frozen=True)
 class Factor:
-    """A channel's value over the SI value at the gear output. unit: what it is in; at_motor: on that side."""
+    """A channel's value over the SI value at the gear output.
+
+    unit: its unit; at_motor: on the motor's side.
+    """
 
     value: float
     unit: str

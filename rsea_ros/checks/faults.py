@@ -43,7 +43,7 @@ class Checked:
 
 
 def check(record: Record, rig: Rig) -> Checked:
-    """Find and mask the faults of a record; a channel without a good sample is taken as not there."""
+    """Find and mask the faults of a record; a channel without a good sample counts as missing."""
     record = _without(record, {n for n, c in record.channels.items() if not len(c)})
     faults = [*record.faults, *(Fault("missing_topic", name, 1.0) for name in missing(record, rig))]
     repaired, clock_faults = repair_stamps(record)
@@ -119,7 +119,7 @@ def not_finite(channel: Channel, name: str) -> BoolArray:
 def outliers(channel: Channel, name: str) -> BoolArray:
     """Return which samples stand alone: far from the median of the ten around them, which agree.
 
-    How far those ten lie from it is told by the third largest, so that two outliers may be neighbours; the
+    Their spread is the third largest distance, so that two outliers may be neighbours; the
     first sample after a step of the torque has more neighbours that are like it.
     """
     if name == "command" or len(channel) < 2 * _AROUND or not np.isfinite(channel.y).any():
@@ -170,8 +170,8 @@ def _common(y: FloatArray, extreme: float) -> bool:
 def frozen(channel: Channel, name: str) -> BoolArray:
     """Return which samples repeat the one before more often than a quantum explains.
 
-    With a quantum, neighbouring values may be equal by chance; as many differ by one quantum then, give or
-    take three standard deviations. A sensor that repeats every other sample or more is slower than the log,
+    With a quantum, neighbouring values may be equal by chance; then as many differ by one quantum, plus or
+    minus three standard deviations. A sensor that repeats every other sample or more is slower than the log,
     which is no fault; but a few runs far longer than all others are.
     """
     if name in ("command", "reference"):
@@ -199,7 +199,7 @@ def in_long_runs(repeat: BoolArray, rate: float) -> BoolArray:
 def while_others_moved(record: Record, name: str, suspect: BoolArray, kind: str) -> BoolArray:
     """Return the suspect samples, none if the machine mostly stood still then.
 
-    A sensor that holds a value while nothing moves is well: at rest, at a limit of the torque, stuck. One
+    A sensor that holds a value while nothing moves is sound: at rest, at a limit of the torque, stuck. One
     that freezes does so in fast and in slow motion alike, a coarse one rather in slow motion.
     """
     motion = motion_beside(record, name) if suspect.any() else None

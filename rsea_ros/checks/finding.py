@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import Fault
 
 Light = Literal["green", "amber", "red"]
@@ -14,13 +15,14 @@ LIGHTS: tuple[Light, ...] = ("green", "amber", "red")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """The result of one check.
 
     kind: `topics`, `rate`, `gaps`, `order`, `clock_offset`, `clock_drift`, `noise`, `quantum`, `sign`,
-    `scale`, `wrong_rig`, `excitation`, `rest`, `identifiability`, or the kind of a fault of the data.
-    channel: the channel or rig value that it is about, empty for the whole record.
+    `scale`, `wrong_rig`, `rig_value`, `excitation`, `rest`, `identifiability`, or the kind of a fault of the
+    data.
+    channel: the channel or rig value concerned, empty for the whole record.
     value, low, high: the number with its 95 % interval, in `unit`, where one belongs to it.
-    expected: what would be green. detail: what and where. remedy: what would help, or the option to give.
+    expected: the green range. detail: what and where. remedy: the advice, or the option to give.
     """
 
     light: Light
@@ -37,7 +39,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Findings:
-    """All findings of a record held against a rig, in the order in which they are worth reading.
+    """All findings of a record compared with a rig, the most important first.
 
     faults: those of the data, of which every result made from the record repeats the whole list.
     """
@@ -46,6 +48,7 @@ class Findings:
     rig_name: str
     findings: tuple[Finding, ...]
     faults: tuple[Fault, ...] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
 
     @property
     def light(self) -> Light:

@@ -1,7 +1,7 @@
 """Sign and scale of every channel, tried: the rig is fitted with and without each factor (shape.py).
 
 A factor is reported only where the fit with it is much better than the fit without, and leaves a response
-that has the rig's shape. Gains within ALLOWED are no matter of units: a torque constant, a calibration.
+that has the rig's shape. Gains within ALLOWED do not come from units: a torque constant, a calibration.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _NEAR = 0.7
 
 @dataclass(frozen=True)
 class Reading:
-    """How a channel is to be read. sign: -1 where it is turned. factor: None for SI at the gear output.
+    """The corrections of a channel. sign: -1 where it is reversed. factor: None for SI at the gear output.
 
-    also: other factors that these data cannot tell from it. gain: what is left of the logarithm of its gain
+    also: other factors that these data cannot distinguish. gain: the remaining logarithm of its gain
     then. odd: the gain fits no factor.
     """
 
@@ -90,7 +90,7 @@ def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: 
 
 
 def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: Shape) -> Reading:
-    """Return the reading, as it stands where the channel does not have the rig's shape, or may be limited."""
+    """Return the reading, unchanged where the channel does not have the rig's shape or may be limited."""
     q = quotients.get(reading.channel)
     if q is None:
         q = max(quotients.values(), key=lambda one: one.related)
@@ -144,7 +144,7 @@ def _in_a_unit_of_the_command(
 ) -> dict[str, Reading] | None:
     """Return readings in which a unit of the command makes every gain one of a unit, None where none does.
 
-    Commands in mN m make every sensor look a thousand times too small, whatever unit each has of its own.
+    Commands in mN m make every sensor look a thousand times too small, in addition to its own unit.
     The one that leaves the most channels in SI counts, one sensor at least, then the one that leaves least of
     all gains: a rig whose every channel would be in another unit is another rig.
     """
@@ -160,7 +160,7 @@ def _in_a_unit_of_the_command(
 
 
 def _oddness(readings: Mapping[str, Reading]) -> tuple[int, float]:
-    """Return how many channels are in another unit, and what is left of the gains."""
+    """Return how many channels are in another unit, and the remaining gains."""
     return sum(r.factor is not None for r in readings.values()), sum(abs(r.gain) for r in readings.values())
 
 
@@ -177,7 +177,7 @@ def _named(channel: str, sign: float, gain: float, rig: Rig) -> Reading:
 
 
 def _prior(channel: str, found: Mapping[str, Reading]) -> Prior:
-    """Return what the readings say of a channel's quotient: its factor over the command's."""
+    """Return the prior of a channel's quotient by the readings: its factor over the command's."""
     sign, mean, doubt = 1.0, 0.0, Prior().doubt
     for name, side in ((channel, 1.0), ("command", -1.0)):
         if name in found:

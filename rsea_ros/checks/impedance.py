@@ -1,4 +1,4 @@
-"""What a machine without a spring opposes to its torque, by frequency, beside what its rig has.
+"""The mechanical impedance of a machine without a spring, by frequency, compared with its rig's.
 
     torque / position = Z(f) = K - J w^2 + i w b,    w = 2 pi f
 
@@ -41,7 +41,7 @@ _SHAPED = 0.35
 
 @dataclass(frozen=True)
 class Impedance:
-    """K (N m/rad) and J (kg m^2) with one sigma each, and what the fit leaves of Z: its median over Z."""
+    """K (N m/rad) and J (kg m^2) with one sigma each, and the median residual of the fit over Z."""
 
     stiffness: float
     stiffness_sd: float
@@ -57,7 +57,7 @@ class Impedance:
 
 
 def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
-    """Return what makes the machine another one than the rig: a spring or pendulum, another inertia.
+    """Return the findings by which the machine differs from the rig: a spring or pendulum, another inertia.
 
     side: of the torque.
     """

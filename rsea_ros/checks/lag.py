@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from numpy.fft import irfft, rfft
 
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
+from rsea_ros.fast_length import next_fast_length
 from rsea_ros.signals import Channel, FloatArray, Record
 
 REACH = 2.0
@@ -54,10 +55,10 @@ def lag_of(side: Side) -> float:
 
 
 def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> tuple[FloatArray, FloatArray]:
-    """Return lags (s) within the reach, and the size of the correlation of y with p so much earlier."""
+    """Return lags (s) within the reach, and the size of the correlation of y with p earlier by each."""
     y, p = y - y.mean(), p - p.mean()
     most = int(reach / period)
-    size = next_fast_len(len(y) + most)
+    size = next_fast_length(len(y) + most)
     both = irfft(rfft(y, size) * rfft(p, size).conj(), size)
     alike = np.abs(np.concatenate([both[-most:], both[: most + 1]]))
     scale = float(np.linalg.norm(y) * np.linalg.norm(p))
@@ -66,7 +67,7 @@ def _correlation(y: FloatArray, p: FloatArray, period: float, reach: float) -> t
 
 
 def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
-    """Return a finding for each lag, one for the command where all of so many channels share it."""
+    """Return a finding for each lag, one for the command where all channels share it."""
     all_of_them = shared(found, channels)
     off = {"command": -all_of_them} if all_of_them else found
     against = "all that was measured" if all_of_them else "the command"
@@ -86,9 +87,9 @@ def lag_findings(found: Mapping[str, float], channels: int) -> list[Finding]:
 
 
 def shared(found: Mapping[str, float], channels: int) -> float:
-    """Return the lag that all of so many channels share, s: the command's stamps are off; 0 for none.
+    """Return the lag (s) that all channels share, an error of the command's stamps; 0 for none.
 
-    The motor torque, where it is measured, repeats the command and tells it best.
+    The motor torque, where it is measured, repeats the command and shows the lag best.
     """
     values = list(found.values())
     together = len(values) == channels and len(values) > 0 and max(values) - min(values) <= _TOGETHER
@@ -96,7 +97,7 @@ def shared(found: Mapping[str, float], channels: int) -> float:
 
 
 def in_step(record: Record, found: Mapping[str, float]) -> Record:
-    """Return the record with the stamps of some channels so much (s) earlier, within the commands."""
+    """Return the record with the stamps of some channels earlier by their lags (s), within the commands."""
     moved = {n: Channel(record[n].t - lag, record[n].y) for n, lag in found.items()}
     record = record.with_channels(**moved)
     begin = max(c.t[0] for c in record.channels.values() if len(c))

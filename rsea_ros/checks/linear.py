@@ -1,6 +1,6 @@
-"""The rig linearised about its quick fit: clocks of the sensors, and what these data can determine.
+"""The rig linearised about its quick fit: clocks of the sensors.
 
-Gauss-Newton on output errors: linear_rows.py lays them out, linear_step.py solves.
+Gauss-Newton on output errors: linear_rows.py has the rows, linear_step.py the solution.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.checks.linear_rows import Rows, Setting, State, left_of, on_time, rows_of
-from rsea_ros.checks.linear_step import Brought, brought_by_value, gauss_newton_step
+from rsea_ros.checks.linear_step import gauss_newton_step
 from rsea_ros.checks.shape import Shape
-from rsea_ros.identification.problem import case_from, channels_that_tell
+from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
 from rsea_ros.normal import Z95
@@ -47,17 +47,19 @@ class Number:
 
 @dataclass(frozen=True)
 class Linear:
-    """What the linearised fit says. offset: s at the start of the record, drift: s/s, by channel.
+    """The result of the linearised fit. offset: s at the start of the record, drift: s/s, by channel.
 
-    misfit: RMS of the residual over the noise by channel. values: what these data bring of the rig's values.
-    settled: whether the clocks stood still at last; else their numbers mean nothing.
+    misfit: RMS of the residual over the noise by channel.
+    settled: whether the clocks converged; otherwise their numbers are meaningless. problem, theta: the fit
+    of the values with the clocks set right, and where the rounds ended.
     """
 
     offset: Mapping[str, Number]
     drift: Mapping[str, Number]
     misfit: Mapping[str, float]
-    values: Mapping[str, Brought]
     settled: bool
+    problem: Problem
+    theta: FloatArray
 
 
 def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape) -> Linear:
@@ -74,7 +76,7 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
 def _setting(
     record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape
 ) -> tuple[Setting, State]:
-    """Return what all rounds share, and the state where the quick fit ended."""
+    """Return the constants of all rounds, and the state where the quick fit ended."""
     start = float(record["command"].t[0])
     begin, end = _liveliest(record["command"])
     record = replace(record, channels={n: c for n, c in record.channels.items() if n != "motor_torque"})
@@ -108,7 +110,7 @@ def _descended(setting: Setting, state: State) -> tuple[State, Rows, FloatArray,
 
 
 def _clocks_stand(setting: Setting, step: FloatArray, sd: FloatArray) -> bool:
-    """Tell whether a step leaves every clock where it is, within its doubt."""
+    """Return whether a step leaves every clock unchanged within its doubt."""
     n, m = len(setting.values), len(setting.timed)
     finest = np.repeat([_RESOLUTION, _RESOLUTION / setting.case.duration], m)
     clocks = slice(n, n + 2 * m)
@@ -139,6 +141,7 @@ def _linear(setting: Setting, state: State, rows: Rows, sd: FloatArray, settled:
         offset={c: Number(float(state.offset[k]), float(late[k])) for k, c in enumerate(setting.timed)},
         drift={c: Number(float(state.drift[k]), float(grows[k])) for k, c in enumerate(setting.timed)},
         misfit=dict(zip(setting.timed, rows.left.misfit.tolist(), strict=True)),
-        values=brought_by_value(setting, rows),
         settled=settled,
+        problem=rows.left.problem,
+        theta=state.theta,
     )

@@ -1,4 +1,4 @@
-"""Findings about clocks and about what the data can determine (linear.py)."""
+"""Findings about clocks (linear.py)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.linear import Linear, Number
-from rsea_ros.model.rig import CLOCK_DOUBT, Rig
+from rsea_ros.model.rig import CLOCK_DOUBT
 
 _ALLOWED = 3.0 * CLOCK_DOUBT
 """s. As far as a fit lets a sensor's clock move."""
@@ -16,7 +16,6 @@ _BESIDE = 2.0
 """Residual over noise above which something in the machine may stand behind a clock."""
 _OPEN = 10.0 * _ALLOWED
 """s. One sigma from which a number would say nothing of a clock."""
-_TOLD = 0.5
 JOINT = ("velocity", "position")
 _RELATIVE = "against the model; a delay of the drive looks the same"
 
@@ -98,24 +97,3 @@ def _beside(linear: Linear, name: str) -> str:
         if misfit < _BESIDE
         else f"; beside a misfit of {misfit:.0f} times the noise a cause may stand in for it"
     )
-
-
-def identifiability(linear: Linear, rig: Rig) -> list[Finding]:
-    """Return for each value that a fit may move whether these data determine it."""
-    found = []
-    for name, brought in linear.values.items():
-        percent = 100.0 * brought.relative_sd
-        amber = brought.share < _TOLD
-        found.append(
-            Finding(
-                "amber" if amber else "green",
-                "identifiability",
-                name,
-                percent,
-                "%",
-                expected="below the rig's spread",
-                detail="one sigma that these data leave",
-                remedy="measure it apart, or excite it more" if amber else "",
-            )
-        )
-    return found

@@ -43,7 +43,7 @@ class State(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What stays the same in all rounds. start: of the whole record, s."""
+    """The constants of all rounds. start: of the whole record, s."""
 
     record: Record
     start: float
@@ -63,7 +63,7 @@ def on_time(record: Record, start: float, timed: Sequence[str], state: State) ->
 
 @dataclass(frozen=True)
 class Left:
-    """What a state leaves of the record: residual over noise, shape (m,), with the problem and where it is.
+    """The residual of a state: residual over noise, shape (m,), with its problem and state.
 
     plain: derivatives of each channel's residual by bias and gain, shape (m, 2). of: channel of each row.
     misfit: RMS over noise of each channel without bias and gain.
@@ -78,7 +78,7 @@ class Left:
 
     @property
     def loss(self) -> float:
-        """What rounds lower: the product of the misfits."""
+        """The loss that the rounds minimise: the product of the misfits."""
         return float(np.prod(self.misfit))
 
 
@@ -98,7 +98,7 @@ class Rows:
     """Residual r (m,) and derivatives (m, n) in units of the misfit.
 
     Columns: the rig's values, then for each channel its clock, drift, bias and gain. block: of each row.
-    slope: what the derivatives are made of.
+    slope: from which the derivatives are computed.
     """
 
     left: Left
@@ -109,7 +109,7 @@ class Rows:
 
 
 def left_of(setting: Setting, state: State) -> Left:
-    """Return what a state leaves: one simulation."""
+    """Return the residual of a state, by one simulation."""
     record = on_time(setting.record, setting.start, setting.timed, state)
     case = replace(setting.case, drive=drive_of(record, setting.rig))
     wide = tuple(replace(u, low=-1.0, high=1.0) for u in clocks(setting.timed, setting.rig))
@@ -127,7 +127,7 @@ def _channel_of(case: Case, timed: Sequence[str]) -> IntArray:
 
 
 def _of_rows(case: Case, what: Mapping[str, float | FloatArray], timed: Sequence[str]) -> FloatArray:
-    """Return what belongs to each channel, or to each of its samples, for every row."""
+    """Spread a value of each channel, or of each of its samples, over the rows."""
     return np.concatenate([np.broadcast_to(what[n], case.t[n].shape)[case.mask[n]] for n in timed])
 
 

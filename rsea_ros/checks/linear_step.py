@@ -1,11 +1,9 @@
-"""The Gauss-Newton step on laid-out rows, its doubt, and what the rows bring of each value of the rig.
+"""The Gauss-Newton step on the rows, and its doubt.
 
 The covariance is the sandwich over blocks of one second (identification/confidence.py says why).
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,13 +14,6 @@ from rsea_ros.signals import FloatArray
 _OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
 """One sigma before: s, s/s, 1."""
 _WIDER = 3.0
-
-
-class Brought(NamedTuple):
-    """What data bring of a value: the share of what is known of it then, and its one sigma over its size."""
-
-    share: float
-    relative_sd: float
 
 
 def gauss_newton_step(rows: Rows, setting: Setting, state: State) -> tuple[FloatArray, FloatArray]:
@@ -49,28 +40,6 @@ def _scores(rows: Rows, left: FloatArray) -> FloatArray:
     scores = np.zeros((int(rows.block.max()) + 1, rows.matrix.shape[1]))
     np.add.at(scores, rows.block[first], parts)
     return scores
-
-
-def brought_by_value(setting: Setting, rows: Rows) -> dict[str, Brought]:
-    """Return by value of the rig what the data bring of it.
-
-    Gains and drifts count as known: they are what a check looks for, not what a fit frees.
-    """
-    values, n, m = setting.values, len(setting.values), len(setting.timed)
-    if not n:
-        return {}
-    keep = [*range(n + m), *range(n + 2 * m, n + 3 * m)]
-    columns = rows.matrix[:, keep]
-    clock_doubts = [setting.rig.clock_doubt(c) for c in setting.timed]
-    doubt = np.array([*(_doubt(u) for u in values), *clock_doubts, *[np.inf] * m])
-    part = columns.T @ columns + np.diag(doubt**-2.0)
-    scale = np.sqrt(np.diag(part) + 1e-300)
-    after = np.sqrt(np.diag(np.linalg.pinv(part / np.outer(scale, scale), hermitian=True))) / scale
-    size = [1.0 if u.logarithmic else abs(u.start) or 1.0 for u in values]
-    return {
-        u.name: Brought(float(max(0.0, 1.0 - (sd / before) ** 2)), float(sd / scale))
-        for u, sd, before, scale in zip(values, after, doubt, size, strict=False)
-    }
 
 
 def _doubt(u: Unknown) -> float:

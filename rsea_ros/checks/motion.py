@@ -1,4 +1,4 @@
-"""Where a machine moved: a sensor that holds a value while nothing moves is well."""
+"""Where a machine moved: a sensor that holds a value while nothing moves is sound."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def is_commanded(record: Record) -> bool:
 
 
 def is_still(record: Record) -> bool:
-    """Return whether no sensor shows anything but white noise: what fourth differences show is all of it."""
+    """Return whether every sensor shows only white noise, by its fourth differences."""
     return all(_is_noise(record[n]) for n in ("position", "velocity", "ft", "deflection") if n in record)
 
 

@@ -1,6 +1,6 @@
 """A torque that follows the position of a machine whose rig has nothing to hold it: a spring, a pendulum.
 
-The torque that acted, by least squares along the measured motion, without and with what holds:
+The torque that acted, by least squares along the measured motion, without and with the restoring terms:
 
     T = J q'' + b q' + c sign(q') + T_0 (+ K q + G sin(q - q_0))
 """
@@ -50,7 +50,7 @@ def restoring_findings(record: Record, rig: Rig) -> list[Finding]:
 
 
 def left_of(motion: Motion) -> tuple[float, float]:
-    """Return the share of the torque's RMS that is left without and with what would hold the output."""
+    """Return the share of the torque's RMS that is left without and with the restoring terms."""
     sign = np.tanh(motion.v / max(_SHARP * float(np.std(motion.v)), 1e-300))
     holding = [motion.q, np.sin(motion.q), np.cos(motion.q)]
     moving = [motion.a, motion.v, sign, np.ones_like(motion.v)]

@@ -35,7 +35,7 @@ _DELAYS = np.arange(-0.06, 0.0605, 1e-3)
 
 @dataclass(frozen=True)
 class Prior:
-    """What is believed of a channel's gain before: sign, and mean and one sigma of the logarithm."""
+    """The prior of a channel's gain: sign, and mean and one sigma of the logarithm."""
 
     sign: float = 1.0
     mean: float = 0.0
@@ -46,9 +46,9 @@ class Prior:
 class Shape:
     """A fit of the shape. gain: logarithm, delay: s, both by channel.
 
-    error: median of what is left of ln R, each line by its power, by channel. values: of the rig, by name.
-    reach: how many of the rig's stated spreads each has moved; told: which share of what is known of it the
-    response brings.
+    error: weighted median of the residual of ln R by channel, weights the power. values: of the rig, by name.
+    reach: how many of the rig's stated spreads each has moved; told: the share of its information that the
+    response provides.
     """
 
     values: Mapping[str, float]
@@ -121,7 +121,7 @@ class ShapeFit:
         return theta, here, cost
 
     def _residual(self, theta: FloatArray, sign: FloatArray) -> FloatArray:
-        """Return what is left of ln R over its doubt: of the size of all lines, then of their phase."""
+        """Return the residual of ln R over its doubt: of the size of all lines, then of their phase."""
         shape = self._response(self._rig_at(theta)) / self._nominal
         n, m = len(self._start), len(self.channels)
         gain, delay = theta[n : n + m][self._of], theta[n + m :][self._of]
@@ -151,7 +151,7 @@ class ShapeFit:
     def _delays(self, sign: FloatArray) -> FloatArray:
         """Return for each channel the delay of a coarse grid that turns its phases least, s.
 
-        Phases wrap: a fit that began far off would stop in a minimum of its own.
+        Phases wrap: a fit that began far off would stop in another minimum.
         """
         found = np.zeros(len(self.channels))
         for k in range(len(found)):
@@ -178,14 +178,14 @@ class ShapeFit:
         return response
 
     def _middle(self, left: FloatArray, k: int) -> float:
-        """Return the median of what is left of a channel, each line by its share of the predicted power."""
+        """Return the weighted median of a channel's residual, weights the share of the predicted power."""
         of = self._of == k
         rising = np.argsort(left[of])
         share = np.cumsum(self._share[of][rising])
         return float(left[of][rising][int(np.searchsorted(share, 0.5 * share[-1]))])
 
     def _told(self, theta: FloatArray, here: FloatArray, doubt: FloatArray, sign: FloatArray) -> FloatArray:
-        """Return for each value the share of what is known of it that the lines bring."""
+        """Return for each value the share of its information that the lines provide."""
         slope, weight = self._slope(theta, here, sign), 1.0 / (1.0 + here**2)
         normal = ((slope * weight[:, None]).T @ slope) * np.outer(doubt, doubt) + np.eye(len(doubt))
         told: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))

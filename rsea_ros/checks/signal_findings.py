@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.fft import rfft, rfftfreq
+from numpy.fft import rfft, rfftfreq
 
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.motion import at_rest
@@ -24,7 +24,7 @@ _EXCITE = "excite it: `rsea simulate --help` lists the excitations, the node `ex
 
 
 def excitation(record: Record, rig: Rig) -> list[Finding]:
-    """Return what the command does: its band and size, and the share of the record at rest."""
+    """Return the findings on the command: its band and size, and the share of the record at rest."""
     command = record["command"]
     if float(np.ptp(command.y)) == 0.0:
         return [
@@ -82,7 +82,7 @@ def band(record: Record) -> tuple[float, float]:
     even = np.interp(np.arange(command.t[0], command.t[-1], 1.0 / command.rate), command.t, command.y)
     frequency, power = rfftfreq(len(even), 1.0 / command.rate), np.abs(rfft(even - even.mean())) ** 2
     share = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    low, high = (float(frequency[min(np.searchsorted(share, q), len(share) - 1)]) for q in _BAND)
+    low, high = (float(frequency[min(int(np.searchsorted(share, q)), len(share) - 1)]) for q in _BAND)
     return low, high
 
 
@@ -112,7 +112,7 @@ def noises(record: Record, rig: Rig) -> list[Finding]:
 
 
 def _rough(channel: Channel) -> float:
-    """Return the RMS of white noise that fourth differences show: what smooth motion has little of."""
+    """Return the RMS of white noise by fourth differences, in which smooth motion hardly appears."""
     return float(np.median(np.abs(np.diff(channel.y, 4)))) / 0.6745 / math.sqrt(70.0)
 
 

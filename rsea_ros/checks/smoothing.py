@@ -1,7 +1,7 @@
 """An F/T channel that was smoothed before it was logged: a moving average is tried, never guessed.
 
 Measured over predicted of the F/T torque, over the same of the joint, is the sensor's own response H times a
-gain: what drive, inertia and damping do wrong is in both. An average of the last n samples has
+gain: errors of drive, inertia and damping are in both. An average of the last n samples has
 
     H(f) = sin(pi f n T) / (n sin(pi f T)) exp(-i pi f (n - 1) T)
 """
@@ -69,7 +69,7 @@ def _average(f: FloatArray, response: ComplexArray, sd: FloatArray, period: floa
 
 
 def _left(response: ComplexArray, h: ComplexArray, weight: FloatArray) -> FloatArray:
-    """Return the share of a response's power that each filter leaves, whatever its gain. h: shape (k, n)."""
+    """Return the share of a response's power that each filter leaves at its best gain. h: shape (k, n)."""
     gain = (h.conj() * response).real @ weight / (np.abs(h) ** 2 @ weight)
     left: FloatArray = np.abs(response - gain[:, None] * h) ** 2 @ weight / (np.abs(response) ** 2 @ weight)
     return left

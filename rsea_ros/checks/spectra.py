@@ -13,8 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from numpy.fft import rfft
 
+from rsea_ros.fast_length import next_fast_length
 from rsea_ros.signals import BoolArray, ComplexArray, FloatArray, IntArray
 
 _SEGMENTS = 5
@@ -72,7 +73,7 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     y, p = (np.interp(even, t, v) for v in (y, p))
     if len(even) < 16 * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
         return None
-    length = min(len(even) // _SEGMENTS, next_fast_len(int(_LONGEST / period)))
+    length = min(len(even) // _SEGMENTS, next_fast_length(int(_LONGEST / period)))
     pp = _segments(p, length)
     if _captured(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
         length = len(even) // _SEGMENTS

@@ -1,4 +1,4 @@
-"""What a record must have to be diagnosed at all; everything less is a fault to be reported, not refused."""
+"""The least that a record needs for a diagnosis; other defects are faults to be reported, not refused."""
 
 from __future__ import annotations
 

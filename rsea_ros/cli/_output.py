@@ -18,9 +18,16 @@ def add_force(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="replace existing files (never an input)")
 
 
+def path(text: str) -> Path:
+    """Return a path. Raises ArgumentTypeError for an empty one, which would be the working directory."""
+    if not text:
+        raise argparse.ArgumentTypeError("'', expected a name")
+    return Path(text)
+
+
 def add_results(parser: argparse.ArgumentParser, files: str, default: str) -> None:
     """Declare --out, the directory for the files, and --force. default: where they go without --out."""
-    parser.add_argument("--out", type=Path, help=f"directory for {files} (default {default}, -2, …)")
+    parser.add_argument("--out", type=path, help=f"directory for {files} (default {default}, -2, …)")
     add_force(parser)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,16 +38,26 @@ class Shown:
 def shown() -> Iterator[None]:
     """In this block stdout shows control characters, and stdout and stderr accept every character."""
     codecs.register_error("rsea", _instead)
+    open_closed_streams()
     before = sys.stdout
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="rsea")
-    if before is not None:  # closed by the parent process
-        sys.stdout = Shown(before)
+    sys.stdout = Shown(before)
     try:
         yield
     finally:
         sys.stdout = before
+
+
+def open_closed_streams() -> None:
+    """Put the null device in the place of a standard stream that the parent process closed.
+
+    Otherwise the next file that is opened takes its number, and what is printed ends in that file.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115  open until the process ends
 
 
 def _instead(error: UnicodeError) -> tuple[str, int]:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topics import AXES
+from rsea_ros.cli._lines import columns, say
 from rsea_ros.cli._output import FOUND
-from rsea_ros.cli._runs import add_rig, add_runs
+from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
 from rsea_ros.errors import RseaError
 from rsea_ros.signals import Channel
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 HELP = "check topics, rates, clocks, noise, sign, scale and rig of a record in seconds"
 EXAMPLE = "rsea check run.mcap --rig my_bench.yaml"
-NARROWEST = 140
-"""Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,7 +50,10 @@ def run(args: argparse.Namespace) -> int:
     from rsea_ros.checks.finding import LIGHTS, worst
 
     checks = [
-        check_record(record, rig, topics.axis, partial(other_axes, bag, topics, args))
+        replace(
+            check_record(record, rig, topics.axis, partial(other_axes, bag, topics, args), values=True),
+            rig_choice=rig_choice(args),
+        )
         for bag, record in zip(args.bags, records, strict=True)
     ]
     if args.json:
@@ -81,12 +83,11 @@ def other_axes(bag: str, topics: TopicMap, args: argparse.Namespace) -> Mapping[
 def _print(checks: list[Findings]) -> None:
     from rich.console import Console
 
-    from rsea_ros.report.check.terminal import check_table, summary
+    from rsea_ros.report.check.terminal import check_lines, summary
 
     console = Console()
-    if not console.is_terminal:
-        console = Console(width=NARROWEST)
     for findings in checks:
-        console.print(findings.source, markup=False, highlight=False, soft_wrap=True)
-        console.print(check_table(findings))
-    print(summary(checks))
+        print(findings.source)
+        for line in check_lines(findings, columns()):
+            console.print(line, highlight=False, soft_wrap=True)
+    say(summary(checks))

@@ -17,6 +17,7 @@ from msg_adapters import read_record
 from msg_adapters.bags import read_contents
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._numbers import seed
+from rsea_ros.cli._output import path
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._ros import need_ros
@@ -57,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wire", action="store_true", help="put the plant behind real wires and use the driver"
     )
-    parser.add_argument("--out", type=Path, help="directory of the results (default out/demo-TIME)")
+    parser.add_argument("--out", type=path, help="directory of the results (default out/demo-TIME)")
     parser.add_argument(
         "--seed", type=seed, default=1, help="seed of true values, excitation and noise (default 1)"
     )

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from rsea_ros.cli._output import add_json, add_results, print_file, results_place
+from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
 from rsea_ros.new_files import NewFiles
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--train", choices=TRAINS, help="gear train, if it differs from that of the unit")
     parser.add_argument(
         "--catalogue",
-        type=Path,
+        type=path,
         help="YAML of motor-gear units (default config/design/motor_gear_units.yaml)",
     )
     add_results(parser, f"{DESIGN_JSON} and {REPORT}", "out/design")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
+from rsea_ros.cli._lines import columns
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import add_rig, add_runs
+from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.diagnosis.result import Diagnosis, Verdict
 from rsea_ros.diagnosis.settings import MOST_CAUSES, DiagnosisSettings
@@ -20,6 +23,7 @@ from rsea_ros.signals import Record
 HELP = "find the causes of the simulation error: name, size, gain, extended model"
 EXAMPLE = "rsea diagnose run.mcap --rig my_bench.yaml --out results"
 FAULTS = "faults"
+_FINDINGS = " (faults: of the data; off_rig: a fitted value is far from the rig's)"
 _MUCH = 0.2
 """Share of the residual above the noise; if more stays unexplained, the next step is `rsea law`."""
 
@@ -42,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     most = "largest number of causes (default %(default)s)"
     add("--max-causes", type=int, default=MOST_CAUSES, metavar="N", help=most)
     add_json(parser, DIAGNOSIS_JSON)
-    add_fail_on(parser, (*get_args(Verdict), FAULTS), " (of the data)")
+    add_fail_on(parser, (*get_args(Verdict), FAULTS, OFF_RIG), _FINDINGS)
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -70,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.report.diagnosis.files import write_diagnosis
 
         without = tuple(effect_named(name).name for name in args.without)
-        result = diagnose(records, rig, holdout, tell, DiagnosisSettings(args.max_causes, without))
+        settings = DiagnosisSettings(args.max_causes, without)
+        result = replace(diagnose(records, rig, holdout, tell, settings), rig_choice=rig_choice(args))
         report = write_diagnosis(
             result, raw, place, write_overlay, provenance("diagnose", args.bags, args.rig)
         )
@@ -78,10 +83,7 @@ def run(args: argparse.Namespace) -> int:
         print_file(report.parent / DIAGNOSIS_JSON)
     else:
         _print(result, report)
-        if left_unexplained(result) > _MUCH:
-            model = report.parent / MODEL
-            print(f"law         of the remaining residual: rsea law {' '.join(args.bags)} --rig {model}")
-    findings = {result.verdict, *([FAULTS] if result.faults else [])}
+    findings = {result.verdict, *([FAULTS] if result.faults else []), *off_rig(result.remarks)}
     return FOUND if findings.intersection(args.fail_on) else 0
 
 
@@ -114,8 +116,12 @@ def _print(result: Diagnosis, report: Path) -> None:
     from rich.console import Console
 
     from rsea_ros.report.diagnosis.terminal import terminal_lines
+    from rsea_ros.report.lines import command_row
 
-    console = Console()
-    for line in terminal_lines(result):
+    console, width = Console(), columns()
+    for line in terminal_lines(result, width):
         console.print(line, highlight=False, soft_wrap=True)
-    console.print(f"report      {report}", highlight=False, soft_wrap=True, markup=False)
+    print(f"report      {report}")
+    if left_unexplained(result) > _MUCH:
+        law = shlex.join(["rsea", "law", *result.sources, "--rig", str(report.parent / MODEL)])
+        print(command_row("law", "of the remaining residual:", law, width))

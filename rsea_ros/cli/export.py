@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rsea_ros.cli._numbers import positive
-from rsea_ros.cli._output import FOUND, add_force
+from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.new_files import check_free, write_file
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         about = f"rig, model.yaml or name of a rig: {about}"
         targets.add_argument(f"--{name}", *aliases, dest=name, metavar="RIG", help=about)
     add = parser.add_argument
-    add("--out", type=Path, help="file to be written (default the rig's name)")
+    add("--out", type=path, help="file to be written (default the rig's name)")
     add_force(parser)
     effect = "switch an effect on, SI units"
     add("--effect", action="append", default=[], metavar="NAME:param=value,…", help=effect)

@@ -8,20 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
 from msg_adapters import read_record
+from rsea_ros.cli._lines import say, show
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import add_rig, add_runs
+from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, each_once, topic_map
 from rsea_ros.identification.result import Verdict
-from rsea_ros.report.file_names import IDENTIFICATION, IDENTIFICATION_JSON
+from rsea_ros.report.file_names import IDENTIFICATION, IDENTIFICATION_JSON, MODEL
 
 if TYPE_CHECKING:
     from rsea_ros.identification.result import Identification
 
 HELP = "identify frequency response and parameters with intervals from recorded runs"
 EXAMPLE = "rsea identify run.mcap --rig my_bench.yaml --out results"
-NARROWEST = 100
-"""Width of the table, columns, if stdout is not a terminal."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_rig(parser)
     add_results(parser, ", ".join(IDENTIFICATION), "out/identify-BAG")
     add_json(parser, IDENTIFICATION_JSON)
-    add_fail_on(parser, get_args(Verdict))
+    add_fail_on(parser, (*get_args(Verdict), OFF_RIG), " (a fitted value is far from the rig's)")
     add_topic_options(parser)
     add_window_options(parser)
 
@@ -54,35 +53,41 @@ def run(args: argparse.Namespace) -> int:
         )  # takes 0.7 s, which a refused bag need not wait for
         from rsea_ros.report.identification.files import write_results
 
-        result = replace(identify(records, rig, tell), rig_option=args.rig)
+        result = replace(identify(records, rig, tell), rig_choice=rig_choice(args))
         report = write_results(result, place, provenance("identify", args.bags, args.rig))
     if args.json:
         print_file(report.parent / IDENTIFICATION_JSON)
     else:
         _print(result, report)
-    return FOUND if result.verdict in args.fail_on else 0
+    findings = {result.verdict, *off_rig(result.remarks)}
+    return FOUND if findings.intersection(args.fail_on) else 0
 
 
 def _print(result: Identification, report: Path) -> None:
     """Print the verdict, the table, and a line for each remark."""
-    from rich.console import Console
-
     from rsea_ros.report.fault_words import fault_lines
     from rsea_ros.report.identification.statics import statics_sentences
     from rsea_ros.report.identification.terminal import terminal_table
     from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
     from rsea_ros.report.remark_words import remark_sentences
+    from rsea_ros.report.rig.words import right_rig, split_off_rig
 
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=NARROWEST)
+    say(verdict_sentence(result))
     following = next_command(result)
-    print(f"{verdict_sentence(result)}{f'; next: {following}' if following else ''}")
+    if following:
+        print(f"next: {following}")
     for line in fault_lines(result.faults):
-        print(f"data: {line}")
-    console.print(terminal_table(result, None))
+        say(f"data: {line}", indent=6)
+    show(terminal_table(result, None))
     found = statics_sentences(result.statics) if result.statics else ()
-    remarks = remark_sentences([*result.remarks, *result.clocks])
-    for sentence in (*found, *doubt_sentences(result), *remarks):
-        print(sentence)
+    off, others = split_off_rig(result.remarks)
+    ask = [right_rig(str(report.parent / MODEL))] if off else []
+    for sentence in (
+        *remark_sentences(off),
+        *ask,
+        *found,
+        *doubt_sentences(result),
+        *remark_sentences([*others, *result.clocks]),
+    ):
+        say(sentence, indent=2)
     print(f"report: {report}")

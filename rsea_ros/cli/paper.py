@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rsea_ros.cli._numbers import seed
-from rsea_ros.cli._output import add_json, add_results, print_file, results_place
+from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.errors import ParameterError
 from rsea_ros.new_files import NewFiles, Place, check_free
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--figures",
-        type=Path,
+        type=path,
         metavar="DIR",
         help="only write the figures of docs/derivation.md into this directory",
     )
@@ -96,9 +96,9 @@ def _figures(args: argparse.Namespace) -> int:
     figures = documentation_figures()
     check_free((args.figures / name for name in figures), force=args.force)
     with NewFiles(Place(args.figures, args.force)) as new:
-        paths = [new.write(name, svg) for name, svg in figures.items()]
-    for path in paths:
-        print(path)
+        written = [new.write(name, svg) for name, svg in figures.items()]
+    for file in written:
+        print(file)
     return 0
 
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rsea_ros.cli._output import add_force
+from rsea_ros.cli._output import add_force, path
 from rsea_ros.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="new|check")
     new = actions.add_parser("new", help="write a rig to fill in, with every common key explained")
     new.add_argument("name", help="name of the rig; the file is NAME.yaml unless --out states another")
-    new.add_argument("--out", type=Path, help="file to write")
+    new.add_argument("--out", type=path, help="file to write")
     add_force(new)
     check = actions.add_parser("check", help="read a rig and show its values with units, and the free values")
     check.add_argument("rig", help="a file, or the name of a rig that comes with the package")

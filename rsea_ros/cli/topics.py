@@ -39,8 +39,10 @@ def run(args: argparse.Namespace) -> int:
     """Listen, and print."""
     need_ros()
     from rsea_ros.nodes._listener import Listener
+    from rsea_ros.nodes._visitor import visiting
 
-    with Listener() as listener:
+    with visiting("rsea_topics") as node:
+        listener = Listener(node)
         if args.action == "rate":
             print(listener.rate(args.topic, args.seconds))
         elif args.action == "echo":

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._output import path
 from rsea_ros.cli._ros import need_ros
 from rsea_ros.cli._runs import RIG
 
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="largest torque of a page, N m (default %(default)s); a smaller limit of the driver prevails")
     add("--rate", type=positive, default=280.0,
         help="rate of the commands of a page, Hz, that of the bench (default %(default)s)")
-    add("--out", type=Path, default=Path("runs"), help="folder of the recordings (default %(default)s)")
+    add("--out", type=path, default=Path("runs"), help="folder of the recordings (default %(default)s)")
     add("--namespace", default="rsea", help="namespace of the topics (default %(default)s)")
     add("--joint", default="joint", help="name of the joint (default %(default)s)")
     add("--axis", default="torque.z", help="actuator axis of the wrench on ft (default %(default)s)")

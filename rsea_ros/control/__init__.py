@@ -1,1 +1,1 @@
-"""Torque control: a law designed from the rig, its margins over the loads, what the actuator becomes."""
+"""Torque control: a law designed from the rig, its margins over the loads, the controlled actuator."""

@@ -1,10 +1,10 @@
-"""What an extended model knows of friction, ripple and backlash, as torques to be added ahead of time.
+"""Compensation of an extended model's friction, ripple and backlash by torques added ahead of time.
 
-Each law is that of the effect's file (Effect.compensation), mean over a hold in which the speed goes straight
+Each law is that of the effect's file (Effect.compensation), mean over a hold in which the speed goes linearly
 from w_0 to w_1, or the rotor turns from a_0 to a_1.
 
 Backlash: the motor has to cross the gap where the torque changes sign. Inverse, smoothed over a part of the
-torque that the spring takes for the gap (Tao, Kokotovic, Adaptive Control of Systems with Actuator and
+torque that deflects the spring by the gap (Tao, Kokotovic, Adaptive Control of Systems with Actuator and
 Sensor Nonlinearities, 1996, ch. 3, where it jumps):
 
     way = gap / 2 tanh(T / (0.3 K_s gap))
@@ -30,10 +30,11 @@ _OverHold = Callable[[float, float], float]
 
 @dataclass(frozen=True)
 class Compensation:
-    """What is compensated. gap: rad. gap_torque: N m, over which its crossing is spread.
+    """The compensated effects. gap: rad. gap_torque: N m, over which its crossing is spread.
 
-    frictions: from speeds of the gear output at both ends of a hold, rad/s, to what each takes, N m. ripples:
-    from angles of the rotor, rad, to what each makes, N m. turns: of the rotor for one of the gear output.
+    frictions: from speeds of the gear output at both ends of a hold, rad/s, to the friction torque, N m.
+    ripples: from angles of the rotor, rad, to the ripple torque, N m. turns: of the rotor for one of the gear
+    output.
     """
 
     frictions: tuple[_OverHold, ...] = ()

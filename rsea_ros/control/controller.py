@@ -9,9 +9,9 @@
     u_c    = friction, ripple, backlash, from the model's own motion       compensation.py
     u      = u_ff + u_fb + u_c within the limits
 
-It needs no load: a rig's ends are not looked at. What the limits take away from the model's torque is taken
-from the model too, and integration stops at a limit. So nothing winds up, and the bench comes back to the
-desired torque as fast as the limits let it. A reading that is off its place in the grid of
+It needs no load: a rig's ends are not used. The torque that the limits remove is removed
+from the model too, and integration stops at a limit. So nothing winds up, and the bench returns to the
+desired torque as fast as the limits allow. A reading that is off its place in the grid of
 samples is compared with the model at its own instant.
 """
 
@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.control.acted import Acted
 from rsea_ros.control.compensation import Compensation, compensation
 from rsea_ros.control.law import Gains, Law, State, feedback, hold, law_of
 from rsea_ros.control.learning import Learning
@@ -50,10 +51,11 @@ class Limits:
 
 @dataclass(frozen=True)
 class Reading:
-    """One sample of the bench: N m, rad/s, rad; motor_torque: N m over the sample before, nan if unknown.
+    """One sample of the bench: N m, rad/s, rad; motor_torque: N m, nan if unknown.
 
-    The measured torque shows a command that came late or was cut down by the driver. ft_age: samples by
-    which ft was taken before the rest; a sensor with a clock of its own sends when it likes.
+    The measured torque shows a command that came late or was cut down by the driver; whether it is that of
+    the sample before or the new one already is learned (acted.py). ft_age: samples by which ft was taken
+    before the rest; a sensor with a clock of its own sends when it likes.
     """
 
     ft: float
@@ -66,7 +68,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Share:
-    """What a command is made of, N m; reference: the torque that the model has at this sample."""
+    """The parts of a command, N m; reference: the torque of the model at this sample."""
 
     reference: float = 0.0
     feedforward: float = 0.0
@@ -99,7 +101,7 @@ class TorqueController:
         self.learned = Learning(rig, self._law)
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
-        self._prediction = Prediction(corner, 1.0 / rate)
+        self._prediction, self._acted = Prediction(corner, 1.0 / rate), Acted(1.0 / rate)
         self._link = LinkMotion(self._law, link or LinkShare())
         self._preview, self._learn, self._limits = preview, learn, limits or Limits()
         self.start(Reading(0.0, 0.0, 0.0))
@@ -112,7 +114,8 @@ class TorqueController:
         self._prediction.start(desired)
         self._link.start(reading.link)
         self._state = State(ft=reading.ft, velocity=reading.velocity, newest=torque, applied=torque)
-        self._begin = self._sent = torque
+        self._acted.start(torque)
+        self._begin = self._sent = self._sent_before = torque
         self._known = self._learned = (0.0, 0.0)
         self._age, self._crossed = 0, 0.0
         self.share = Share()
@@ -126,17 +129,19 @@ class TorqueController:
         late: bool = False,
         trust: float = 1.0,
         offset: float = 0.0,
+        desired_offset: float = 0.0,
     ) -> float:
         """Return the torque (N m) that acts from the next sample on.
 
         desired: N m, at this sample's place in the grid, or two samples later with preview. missed: samples
         lost before it. offset: samples by which the reading was taken after its place in the grid.
+        desired_offset: samples by which desired is for later than that place; with preview it does not count.
         late: the torque will act later than the margins allow; then it is feed-forward alone.
         trust: part of the feedback that counts, as lateness.py has it.
         """
-        for wanted in self._prediction.between(desired, missed):
-            self._coast(wanted)
-        ahead, model = self._ahead(desired), self._reference
+        for wanted in self._prediction.between(desired, missed) if missed else ():
+            self._coast(wanted, desired_offset)
+        ahead, model = self._ahead(desired, desired_offset), self._reference
         largest, most = self._largest(), self._limits.slew * self._law.period
         forward = min(max(model.torque(ahead), -largest), largest)
         more, learned = model.more(forward)
@@ -158,26 +163,28 @@ class TorqueController:
         model.advance(forward, float(ahead[0]))
         return torque
 
-    def _ahead(self, desired: float) -> FloatArray:
+    def _ahead(self, desired: float, off: float) -> FloatArray:
         samples = self._reference.samples
-        return np.full(samples, desired) if self._preview else self._prediction.ahead(desired, samples)
+        if self._preview:
+            return np.full(samples, desired)
+        return self._prediction.ahead(desired, samples, off)
 
-    def _coast(self, desired: float) -> None:
-        """Pass over a sample that did not come: the last torque goes on acting."""
-        ahead = self._ahead(desired)
+    def _coast(self, desired: float, off: float) -> None:
+        """Bridge a missing sample: the last torque goes on acting."""
+        ahead = self._ahead(desired, off)
         self._reference.advance(self._reference.torque(ahead), float(ahead[0]))
         self._remember(hold(self._state, self._state.newest), self._sent, self._known[1], self._learned[1])
 
     def _remember(self, state: State, torque: float, known: float, learned: float) -> None:
         self._state = state
-        self._sent, self._known = torque, (self._known[1], known)
+        self._sent_before, self._sent, self._known = self._sent, torque, (self._known[1], known)
         self._learned = self._learned[1], learned
         self._age += 1
 
     def _compare(self, reading: Reading, offset: float) -> tuple[float, float, Reading]:
         """Return how far the model is ahead in torque (N m) and speed (rad/s), and the reading at its place.
 
-        What is compared is of one instant: torque where ft was taken, speed where the rest was.
+        Both are compared at one instant: torque at that of ft, speed at that of the other measurements.
         """
         model = self._reference
         torque, speed = model.at(offset - reading.ft_age)[0], model.at(offset)[1]
@@ -193,12 +200,15 @@ class TorqueController:
         After lost samples, those between are read on a straight line.
         """
         s, turned = self._state, reading.velocity - self._state.velocity
-        for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist():
+        for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
             torque = s.applied + self._learned[0]
             self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
         share = missed / (missed + 1)
-        acted = reading.motor_torque - self._known[0]
+        acted = self._acted.over_sample(
+            reading.motor_torque, self._sent_before, self._sent, sure=sure and not missed
+        )
+        acted -= self._known[0]
         self._state = s._replace(
             error=s.error + share * (error - s.error),
             slowness=s.slowness + share * (slowness - s.slowness),

@@ -7,12 +7,12 @@ over them:
     u = sum g_j (r_j + e fade^j - c A^j x) / sum g_j^2
 
 e is what the model's torque differs from the desired one at the start: after a limit it comes back within a
-few `fade`, not at once, which would take the limit again and again. One sample is the exact inverse, which
+few `fade`, not at once, which would reach the limit again and again. One sample is the exact inverse, which
 needs the bench's sampled zeros inside the unit circle and away from -1, where u would jump up and down.
 `moves` is the least number for which the inverse does not, or at least is stable, and no less than HORIZON
 has: over one sample of 1 kHz an error of 0.1 N m in the desired torque would take 62 N m of the motor, over
-three 7. Since u follows from where the model *is*, the model may be told another torque than u (a limit), and
-there is nothing to wind up.
+three 7. Since u follows from the state of the model, the model may receive another torque than u (a limit),
+and nothing winds up.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""How torque follows small sines and a step: gain, phase, what the motor has to make, rise and settling.
+"""How torque follows small sines and a step: gain, phase, motor torque, rise and settling.
 
-Sines are followed one frequency at a time, so that what is shown is the controller that runs, its prediction
-with its trust included, and not an impulse's: above what is predicted the torque comes two samples late.
+Sines are followed one frequency at a time, so that they show the real controller, its prediction
+with its trust included, unlike an impulse: above the predicted band the torque comes two samples late.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ class Arrivals:
     """When measurements are taken and commands act, of n samples, in periods.
 
     taken: by how much each measurement is taken after its place; nan for one that is lost. acting: by how
-    much the command that it leads to acts after the sample that it is meant for. ft_age: by how much its
+    much the resulting command acts after its sample. ft_age: by how much its
     torque is older than the rest of it. Each of shape (n,); ft_age may be one number.
     """
 

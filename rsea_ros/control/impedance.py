@@ -68,7 +68,7 @@ class Moved:
 
 
 def moved(rig: Rig, rate: float, hz: FloatArray) -> Moved:
-    """Return what moving the distal side of a rig does, its housing clamped. hz: below half the rate."""
+    """Return the responses to a moved distal side of a rig, its housing clamped. hz: below half the rate."""
     s = np.asarray(2j * np.pi * hz, dtype=np.complex128)
     torque, speed = _without_motor(rig, hz, s)
     spring = -(rig["spring.stiffness"] / s + rig["spring.damping"])
@@ -91,7 +91,7 @@ def impedance(rig: Rig, rate: float, gains: Gains, hz: FloatArray) -> Impedance:
 def _without_motor(rig: Rig, hz: FloatArray, s: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return torque at the sensor and speed of the gear over the speed of the distal side, no motor torque.
 
-    Any inertia may be moved there: what moves it cancels.
+    Any inertia may be on the distal side: the torque that moves it cancels.
     """
     free = replace(rig.with_values({"spring_end.inertia": 1.0}), clamped=frozenset({"housing_end"}))
     distal = Output(np.zeros((3, COORDINATES)), np.zeros_like(outputs.position().d))

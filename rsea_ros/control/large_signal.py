@@ -1,4 +1,4 @@
-"""Up to where a torque can be tracked at all: what the motor has to make and how fast it has to turn for it.
+"""The frequency up to which a torque can be tracked, by the torque and speed that the motor needs.
 
 |T_m| = A / |P|,   |w| = A |P_w / P|          P = T_d / T_m, P_w = w / T_m, continuous, at A sin(2 pi f t)
 """
@@ -22,7 +22,10 @@ POINTS = 4000
 
 @dataclass(frozen=True)
 class Reach:
-    """amplitude: N m. torque, speed: Hz, from where on it takes more of it than there is; inf: nowhere."""
+    """amplitude: N m.
+
+    torque, speed: Hz, from which it needs more of either than the motor has; inf: never.
+    """
 
     amplitude: float
     torque: float
@@ -42,9 +45,9 @@ def motor_demand(rig: Rig, hz: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def reach(rig: Rig, amplitude: float, torque: float, speed: float) -> Reach:
-    """Return the lowest frequency from which on an amplitude (N m) takes more than the motor has.
+    """Return the lowest frequency from which an amplitude (N m) needs more than the motor has.
 
-    torque: N m, speed: rad/s at the gear output; inf where not stated. What is above the limit only in a
+    torque: N m, speed: rad/s at the gear output; inf where not stated. A demand above the limit only in a
     narrow band below (a pendulum that swings) counts as well.
     """
     hz = np.geomspace(LOWEST, HIGHEST, POINTS)

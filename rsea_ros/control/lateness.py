@@ -1,8 +1,8 @@
-"""What to make of commands that act later than they should: how much of the feedback still counts.
+"""Late commands: the part of the feedback that still counts.
 
-Feedback is designed for a delay of one sample and stands one more and 2 ms (uncertainty.py). Beyond that it
-is taken back with the lateness, at once, and comes back slowly: feedback that each command in turn switches
-on and off swings the bench up between the limits of the torque. Without feedback the command is feed-forward
+Feedback is designed for a delay of one sample and tolerates one more and 2 ms (uncertainty.py). Beyond that
+it is reduced with the lateness at once, and returns slowly: feedback that each command in turn switches
+on and off makes the bench oscillate between the torque limits. Without feedback the command is feed-forward
 alone, which no lateness makes unstable.
 """
 
@@ -23,7 +23,7 @@ RETURN = 0.3
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Lateness is a fault when a share of the commands of so many s was later than `late` samples."""
+    """Lateness is a fault when a share of the commands within a time (s) was later than `late` samples."""
 
     share: float = 0.5
     time: float = 1.0
@@ -42,14 +42,14 @@ class Lateness:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew, with all feedback."""
+        """Restart with all feedback."""
         self.trust, self.count = 1.0, 0
         self._recent: deque[bool] = deque(maxlen=self._window)
 
     def take(self, late: float, count: int = 1) -> float:
-        """Take in how late a command will act (samples); return the trust.
+        """Record how late a command will act (samples); return the trust.
 
-        count: for how many samples it stands, of which a pause makes many; 0: another one replaces it.
+        count: the samples that it covers, many after a pause; 0: another command replaces it.
         """
         for _ in range(min(count, MOST)):
             self._count(late > self.tolerance.late)
@@ -67,5 +67,5 @@ class Lateness:
 
     @property
     def persists(self) -> bool:
-        """Whether so many commands were late that it is a fault."""
+        """Whether enough commands were late for a fault."""
         return self.count >= self.tolerance.share * self._window

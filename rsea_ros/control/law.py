@@ -4,7 +4,7 @@
     I = (1 + w_i / s) / (1 + s / w_l)
 
 e is the torque error. e' comes from the spring rate: a sensor sees T = K_s phi + b_s phi', so phi' is T
-through s / (K_s + b_s s), and K_s phi' is what is fed back; a differentiator with the pole that the spring
+through s / (K_s + b_s s), and K_s phi' is fed back; a differentiator with the pole that the spring
 itself has. I is a gain below LEAK, and integrates below REST: with a load that turns freely the gear has to
 travel for a torque, and an integral alone would swing with it. w_r - w is how much slower the gear turns than
 the model; H, a high pass at WASH, damps its swing without holding back what the load does slowly, and no mode
@@ -68,7 +68,7 @@ class Law:
 
 
 class State(NamedTuple):
-    """What the law remembers: the last error, spring rate, e / (1 + s / w_l) and its integral, ft, velocity,
+    """The memory of the law: the last error, spring rate, e / (1 + s / w_l) and its integral, ft, velocity,
     w_r - w, H of that, d, Q d; the last two torques."""
 
     error: float = 0.0
@@ -107,7 +107,7 @@ def law_of(rig: Rig, rate: float, gains: Gains) -> Law:
 def feedback(
     law: Law, s: State, error: float, slowness: float, ft: float, velocity: float
 ) -> tuple[float, State]:
-    """Return the torque, N m, that a sample asks for, and the new state; `hold` has to follow.
+    """Return the torque, N m, for a sample, and the new state; `hold` has to follow.
 
     error: N m. slowness: w_r - w, rad/s. ft: N m. velocity: w, rad/s, of the gear output against the housing.
     """
@@ -130,5 +130,5 @@ def feedback(
 
 
 def hold(s: State, torque: float) -> State:
-    """Return the state with the torque from the next sample on, as far as the rig explains what it does."""
+    """Return the state with the torque from the next sample on, for the disturbance observer."""
     return s._replace(newest=torque, applied=s.newest)

@@ -1,10 +1,10 @@
-"""What the bench takes to be moved, learned while it runs: its load, its inertia, its drag, its friction.
+"""Learning of load, inertia, damping and friction while the bench runs.
 
     w            = theta . (stretch of the spring, two parts of what follows the load)      motion.py
     u - T        = J w' + b w + c tanh(w / creep)
 
-Two least squares with forgetting over the same samples, every signal through the same band pass, weighed
-against what the rig says:
+Two least-squares fits with forgetting over the same samples, every signal through the same band pass, weighed
+against the rig's values:
 
     (R + s^2 P) x = r + s^2 P x_0,     s^2 = the larger of the floor and what the fit leaves
 
@@ -76,7 +76,7 @@ class Learning:
         self.start(0.0, 0.0)
 
     def start(self, ft: float, velocity: float) -> None:
-        """Begin at a torque (N m) and a speed (rad/s), with what was learned."""
+        """Begin at a torque (N m) and a speed (rad/s); keep the learned values."""
         self._stretch.start(ft)
         self._yielding.start(ft)
         self._ft, self._velocity = ft, velocity
@@ -85,10 +85,10 @@ class Learning:
         self._followed = self._expected = self._power = 0.0
 
     def hear(self, ft: float, velocity: float, torque: float, *, gap: float = 0.0, sure: bool = True) -> None:
-        """Take a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
+        """Process a sample: N m, rad/s; torque: N m, mean of the command over the hold that it ends.
 
-        gap: rad/s, of that velocity, with which backlash is crossed: it is no load's. sure: whether that is
-        surely the torque that acted; else nothing is learned from it.
+        gap: rad/s, the part of that velocity that crosses backlash and is not the load's. sure: whether that
+        is surely the torque that acted; else nothing is learned from it.
         """
         speed, mean = 0.5 * (velocity + self._velocity), 0.5 * (ft + self._ft)
         parts = self._yielding.advance(mean)

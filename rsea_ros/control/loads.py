@@ -1,4 +1,4 @@
-"""The loads that a controller must stand: the actuator clamped at both ends, free, and what lies between."""
+"""The loads that a controller must tolerate: the actuator clamped at both ends, free, or in between."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def locked(rig: Rig) -> Rig:
 
 
 def with_ends(rig: Rig, other: Rig) -> Rig:
-    """Return the rig between the ends of another one: what is clamped there, and what hangs on it."""
+    """Return the rig with the ends and loads of another one."""
     prefixes = (*(f"{end}." for end in END_NAMES), "housing.", "proximal_spring.")
     ends = {name: q for name, q in other.quantities.items() if name.startswith(prefixes)}
     own = {name: q for name, q in rig.quantities.items() if not name.startswith(prefixes)}

@@ -10,7 +10,7 @@ from rsea_ros.signals import ComplexArray, FloatArray
 
 
 def actions(law: Law, hz: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Return what the law makes of ft (1), of the velocity (N m s/rad) and of the torque applied (1).
+    """Return the law's responses to ft (1), velocity (N m s/rad) and applied torque (1).
 
     C + Q (1 + 1/z)/2,   k_w H + Q (J (1 - 1/z)/T + b (1 + 1/z)/2),   Q / z,   C = k_p + k_d D + k_i I
     """
@@ -44,7 +44,7 @@ def returns(
     """Return the loop's memory N and D = N + the rest of the loop, shape (…, n): L = D / N - 1.
 
     plant: of `responses`, without the path; shape (4, …, n). path, current: from a command to the motor
-    torque and to its measurement, more than the one sample that is always there. N is 1 less the torque
+    torque and to its measurement, beyond the one sample that is always present. N is 1 less the torque
     that is fed back; N / D is the sensitivity to a torque on the gear, 1 / D that to one on the command.
     """
     on_ft, on_velocity, memory = actions(law, hz)

@@ -26,7 +26,7 @@ class Margins:
 def margins(loop: ComplexArray, hz: FloatArray, period: float) -> Margins:
     """Return the margins of a loop from its response, by straight lines between its points."""
     crossings, at = _crossings(np.abs(loop) - 1.0, loop, hz)
-    behind = np.angle(-crossings) % (2.0 * np.pi)  # turned back by so much it meets -1
+    behind = np.angle(-crossings) % (2.0 * np.pi)  # rotated back by this angle it meets -1
     phases = np.degrees(np.abs(np.angle(-crossings)))
     turned, _ = _crossings(loop.imag, loop, hz)
     gains = np.abs(20.0 * np.log10(np.abs(turned[turned.real < 0.0])))
@@ -51,7 +51,7 @@ def least(several: list[Margins]) -> Margins:
 
 
 def encirclements(around: ComplexArray) -> FloatArray:
-    """Return how often each row of 1 + L, shape (…, n), turns about zero beyond what its ends show."""
+    """Return how often each row of 1 + L, shape (…, n), turns about zero, less the turn between its ends."""
     turned = np.unwrap(np.angle(around), axis=-1)
     straight = np.angle(around[..., -1]) - np.angle(around[..., 0])
     return np.abs(np.round((turned[..., -1] - turned[..., 0] - straight) / (2.0 * np.pi)))

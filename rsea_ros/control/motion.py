@@ -1,4 +1,4 @@
-"""The motion that a torque takes with a load that nobody has described, and what is linear in it.
+"""The motion for a torque with an unknown load, in linear parameters.
 
     w = theta_0 s T / (K_s + b_s s) + theta_1 s T / (s + w_1)^2 + theta_2 w_1 s T / (s + w_1)^3
 
@@ -48,7 +48,7 @@ class Stretch:
 
 
 class Yielding:
-    """What follows the load: the parts of theta_1 and theta_2, at the samples."""
+    """The motion with the load: the parts of theta_1 and theta_2, at the samples."""
 
     def __init__(self, period: float) -> None:
         n = 3

@@ -1,4 +1,4 @@
-"""Where a desired torque will be when a command acts: a parabola through it, as far as it can be trusted.
+"""Prediction of the desired torque to the instant when a command acts: a parabola, where it can be trusted.
 
     r'[k|k-1] = A r[k-1],   r[k] = r'[k|k-1] + g (desired[k] - r'[k|k-1])
     ahead = trust (desired + rate j + second j^2 / 2) + (1 - trust) smooth
@@ -8,8 +8,8 @@ r is (torque, T rate, T^2 second rate). With memory m the error one sample ahead
 m/z))^3: none for a torque that moves along a parabola (Morrison, Introduction to Sequential Smoothing and
 Prediction, 1969, ch. 13). Where the torque surprises the parabola by much of what it changes by in a sample
 (RMS of the last few: a step, noise, a sine faster than a fifteenth of the rate) it is taken through a low
-pass, two samples late: to look ahead costs amplification of what is faster, and there it would be all that is
-gained; and a jump taken as it is would cost 50 N m of the motor for each at 280 Hz.
+pass, two samples late: prediction amplifies fast changes, and then would only amplify;
+a jump passed unfiltered would need 50 N m of the motor per N m at 280 Hz.
 """
 
 from __future__ import annotations
@@ -50,21 +50,24 @@ class Prediction:
     def between(self, desired: float, missed: int) -> FloatArray:
         """Return the torques (N m) of samples that were missed before one of `desired`: shape (missed,).
 
-        As they were expected, and what the last one surprises by put in like a cube: it has no kink.
+        The predictions, plus the error of the last one as a cubic in time, without a kink.
         """
         i = np.arange(1.0, missed + 2.0)
         expected = self._state[0] + self.trust * (self._state[1] * i + 0.5 * self._state[2] * i * i)
         path: FloatArray = expected + (desired - expected[-1]) * (i / (missed + 1.0)) ** 3
         return path[:-1]
 
-    def ahead(self, desired: float, samples: int) -> FloatArray:
-        """Take the desired torque of this sample; return it from AHEAD samples on: shape (samples,)."""
+    def ahead(self, desired: float, samples: int, off: float = 0.0) -> FloatArray:
+        """Take the desired torque of this sample; return it from AHEAD samples on: shape (samples,).
+
+        off: samples by which the desired torque is for later than this sample, the same for all of them.
+        """
         expected = ALONG @ self._state
         surprise = desired - expected[0]
         self._state = expected + self._gains * surprise
         self._trust(surprise, desired)
         rate, second = self._state[1:]
-        j = AHEAD + np.arange(samples)
+        j = AHEAD - off + np.arange(samples)
         along: FloatArray = self._smoothed(desired, samples)
         along += self.trust * (desired + j * rate + 0.5 * j * j * second - along)
         return along
@@ -108,7 +111,7 @@ def prediction_response(corner: float, period: float, hz: FloatArray) -> Complex
 
 
 def smoothed_response(period: float, hz: FloatArray) -> ComplexArray:
-    """Return what becomes of a torque that is not trusted, at the end of the hold, at hz."""
+    """Return the response of an untrusted torque at the end of the hold, at hz."""
     back = 1.0 / z_of(period, hz)
     pole = math.exp(-2.0 * math.pi * SMOOTH * period)
     response: ComplexArray = ((1.0 - pole) / (1.0 - pole * back)) ** 2 * back**AHEAD

@@ -1,9 +1,9 @@
-"""The model of the bench that runs one hold ahead of it: what the torque should be, and the command for that.
+"""The model of the bench that runs one hold ahead of it: the nominal torque and its command.
 
-At sample k the model is where the bench will be at k+1, when the command of this sample begins to act. Its
+At sample k the model is in the state of the bench at k+1, when the command of this sample begins to act. Its
 torque is that of the actuator with both ends held, whatever load there is: the closed loop's nominal torque.
-What the load takes more of motion is added by what has been learned of it (learning.py). What limits take
-away from a command is taken from the model too, and from what the load takes in the same part.
+The learned load adds its motion (learning.py). Torque that the limits remove
+from a command is removed from the model too, and from the load's part in the same proportion.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Reference:
         self.start(0.0, 0.0, 0.0)
 
     def start(self, ft: float, velocity: float, desired: float) -> None:
-        """Begin where the bench is, N m and rad/s, on the way to a desired torque, N m."""
+        """Begin at the state of the bench, N m and rad/s, and move to a desired torque, N m."""
         seen = self._plant.c[[FT, VELOCITY]]
         self._x: FloatArray = np.linalg.lstsq(seen, np.array([ft, velocity]), rcond=None)[0]
         self.now = self.next = self._plant.c @ self._x
@@ -63,7 +63,7 @@ class Reference:
         return speeds, (begin, begin + 0.5 * self._law.period * sum(speeds))
 
     def more(self, torque: float) -> tuple[float, float]:
-        """Return what the load takes more than the held rig, and what the learned drive takes more than the
+        """Return the torque that the load needs beyond the held rig, and the learned drive beyond the
         rig's for all of the motion: N m, means over the hold."""
         after = self._plant.c @ (self._plant.a @ self._x + self._plant.b * torque)
         (start, stop), _ = self.motion(torque)
@@ -87,7 +87,7 @@ class Reference:
         self.promised = (self.promised[1], promised)
 
     def at(self, part: float) -> tuple[float, float]:
-        """Return torque (N m) and speed (rad/s) so many samples after this one, by a straight line."""
+        """Return torque (N m) and speed (rad/s) a number of samples after this one, on a straight line."""
         torque = float(self.now[FT] + part * (self.next[FT] - self.now[FT]))
         return torque, self.turning + part * (self._turning - self.turning)
 

@@ -1,7 +1,7 @@
 """The whole set of benches, swept: the worst of every margin, and the case that has it.
 
 No structured singular value: a dense grid of the sampled loop is exact at its points, and counts the delay
-and the mode as they are (python-control's mu needs slycot, which is not here, and a rational delay).
+and the mode exactly (python-control's mu needs slycot, which is not installed, and a rational delay).
 """
 
 from __future__ import annotations

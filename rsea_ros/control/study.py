@@ -1,4 +1,4 @@
-"""Everything that is to be known of a controlled actuator: design at each rate, trials, impedance, limits."""
+"""The study of a controlled actuator: design at each rate, trials, impedance, limits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ AMPLITUDES = (10.0, 20.0, 40.0)
 
 @dataclass(frozen=True)
 class Motor:
-    """What a motor has at the gear output: N m, rad/s (inf: not stated), and where that is said."""
+    """The motor's limits at the gear output: N m, rad/s (inf: not stated), and their source."""
 
     name: str
     torque: float

@@ -1,4 +1,4 @@
-"""What the sense of the rotor's rotation does to a design: the trains that a unit may have, side by side."""
+"""The influence of the rotor's sense of rotation on a design: the possible trains of a unit side by side."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class MotorGear:
 
     @property
     def spin(self) -> float:
-        """What the rotor adds to J_sc between the two ends, kg m^2; negative where it turns backward."""
+        """The rotor's addition to J_sc between the two ends, kg m^2; negative where it turns backward."""
         return spin_inertia(self.train, self["ratio"], self["reflected_inertia"])
 
     @property
@@ -82,7 +82,7 @@ class MotorGear:
 
 
 def catalogue(path: Path | None = None) -> dict[str, MotorGear]:
-    """Return the units by name. Raises ParameterError naming file, field, value and what was expected."""
+    """Return the units by name. Raises ParameterError naming file, field, value and the expected value."""
     path = path or _default_path()
     try:
         document = strict_yaml.read(path)
@@ -130,7 +130,7 @@ def _unit(name: str, item: Any) -> MotorGear:
 
 
 def train_named(name: Any, field: str) -> Train:
-    """Return a train. Raises FieldError for a name that is none."""
+    """Return a train. Raises FieldError for an unknown name."""
     if name not in TRAINS:
         raise FieldError(f"{field} = {shown(name)}, expected one of {', '.join(TRAINS)}", field)
     return TRAINS[TRAINS.index(name)]

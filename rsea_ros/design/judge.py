@@ -20,7 +20,7 @@ DAMPING_RATIO = 0.025
 
 @dataclass(frozen=True)
 class Check:
-    """A demand and what the design has of it. least: the demand is a lower limit, else an upper one."""
+    """A demand and the design's value. least: the demand is a lower limit, otherwise an upper one."""
 
     name: str
     value: float
@@ -38,7 +38,7 @@ class Check:
 class Design:
     """A spring for a requirement.
 
-    stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the torque asked for,
+    stiffness: N m/rad. rate: N/m of each linear spring. deflection: rad, by Eq. (8) at the required torque,
     nan where it cannot carry it. linear: rad, T / K_s. error: share by which Eq. (8) falls short of linear at
     the deflection limit. inner: J_sc + n J_r, kg m^2. resonance: Hz, of the spring on it; nan where it is not
     above zero, so that T_d / T_p only falls. bands: Hz.
@@ -64,7 +64,7 @@ class Design:
 
 
 def judge(requirement: Requirement, unit: MotorGear, stiffness: float) -> Design:
-    """Return what a stiffness (N m/rad) gives. Raises ParameterError for one that is not above 0."""
+    """Return the design of a stiffness (N m/rad). Raises ParameterError unless it is above 0."""
     if not (math.isfinite(stiffness) and stiffness > 0.0):
         raise ParameterError(f"stiffness = {stiffness:g} N m/rad, expected a finite value > 0 N m/rad")
     inner = requirement.inertia + unit.spin
@@ -102,7 +102,7 @@ def _checks(
 
 
 def stiffness_bounds(requirement: Requirement, unit: MotorGear) -> dict[str, float]:
-    """Return the least K_s, N m/rad, that each demand asks for."""
+    """Return the least K_s, N m/rad, for each demand."""
     return {
         "Bandwidth by Eq. (7)": float(undamped_stiffness(requirement.bandwidth, requirement.inertia)),
         "Bandwidth with the rotor's spin": least_for_band(requirement, unit),
@@ -112,7 +112,7 @@ def stiffness_bounds(requirement: Requirement, unit: MotorGear) -> dict[str, flo
 
 
 def least_for_band(requirement: Requirement, unit: MotorGear) -> float:
-    """Return the least K_s, N m/rad, whose exact band reaches the one asked for; bisection in log K_s."""
+    """Return the least K_s, N m/rad, whose exact band reaches the required one; bisection in log K_s."""
 
     def reaches(k_s: float) -> bool:
         function = end_over_end(rig_of(requirement, unit, k_s))

@@ -1,4 +1,4 @@
-"""What a design keeps when every part is within its tolerance: Monte Carlo, percentiles."""
+"""The margins of a design with every part within its tolerance: Monte Carlo, percentiles."""
 
 from __future__ import annotations
 

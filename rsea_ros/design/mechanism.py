@@ -16,7 +16,7 @@ Values = float | FloatArray
 
 
 def largest_torque(k_s: Values) -> FloatArray:
-    """Return K_s / 2, N m: what the mechanism carries at 45 degrees. k_s: N m/rad."""
+    """Return K_s / 2, N m, the torque of the mechanism at 45 degrees. k_s: N m/rad."""
     return np.asarray(0.5 * np.asarray(k_s))
 
 

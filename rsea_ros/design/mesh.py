@@ -1,6 +1,6 @@
 """Which members of a gear train mesh, in whose frame, with how many teeth: the input of a multibody engine.
 
-Seen from the arm two gears turn about fixed centres, so that one pair of teeth is all the train's law:
+Seen from the arm two gears turn about fixed centres, so that one pair of teeth is the law of the train:
 
     z_1 (w_1 - w_arm) = s z_2 (w_2 - w_arm),   s = +1 for internal teeth, -1 for external ones
 

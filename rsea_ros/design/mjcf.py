@@ -73,7 +73,7 @@ def model_element(rig: Rig, play: float = 0.0) -> xml.Element:
 
 
 def _sensors(root: xml.Element) -> None:
-    """Add what the bench measures: angle and speed of the output against the housing, and of the springs."""
+    """Add the sensors: angle and speed of the output against the housing, and of the springs."""
     sensors = xml.SubElement(root, "sensor")
     tendons = {one.get("name", "") for one in root.iter("fixed")}
     for tendon, name in SENSED.items():

@@ -1,4 +1,4 @@
-"""What is asked of an actuator."""
+"""The requirements of an actuator."""
 
 from __future__ import annotations
 

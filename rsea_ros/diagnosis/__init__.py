@@ -1,5 +1,5 @@
-"""What a simulation gets wrong, why, the extended model, and the gain.
+"""Diagnosis: the causes of a simulation's misfit, the extended model, and the gain.
 
 Stepwise selection among the effects of the catalogue: criteria.py is the rule by which a candidate is
-accepted and the verdict is given, settings.py has every number of it, naming/ says what causes may be called.
+accepted and the verdict is given, settings/ has every number, naming/ decides which causes are named.
 """

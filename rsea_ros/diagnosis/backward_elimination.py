@@ -68,7 +68,7 @@ class ReducedModels:
         ]
 
     def is_needed(self, model: Candidate, without: Candidate) -> bool:
-        """Return whether a model is better than one without a cause of it, or with another in its place."""
+        """Return whether a model is better than without one of its causes, or with another in its place."""
         extra, rule = model.parameters - without.parameters, self.settings.acceptance
         return preference(model.validation, without.validation, extra, rule).better
 
@@ -96,7 +96,7 @@ class ReducedModels:
 
 
 def without_redundant(selection: Selection, models: ReducedModels) -> Selection:
-    """Take out every accepted cause without which the others do as well."""
+    """Remove every accepted cause without which the others do as well."""
     last = selection.last
     for name, rest in models.without(last).items() if len(last.causes) > 1 else ():
         if not models.is_needed(last, rest):
@@ -118,7 +118,7 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
         if costs_priors_less(other, last, models.settings):
             trial = trial_of(last, name, without, "no_better_than_likelier", rival)
             swapped = _replaced(selection, other, trial)
-            equal = _ordered(last, [*(c for c in last.causes if c != name), name])
+            equal = _ordered(last, [c for c in last.causes if c != name], name)
             rivals = {**selection.rivals, rival: (equal,)}
             return with_replacements(replace(swapped, rivals=rivals), models)
     return selection
@@ -126,30 +126,34 @@ def with_replacements(selection: Selection, models: ReducedModels) -> Selection:
 
 def nested_sequence(selection: Selection, models: ReducedModels) -> Selection:
     """Return the selection with nested models: from all causes back, the least useful goes first."""
+    if not selection.last.causes:
+        return replace(selection, models=(selection.last,))
     nested = [selection.last]
     while len(nested[-1].causes) > 1:
         largest = nested[-1]
         rests = models.without(largest).values()
         nested.append(min(rests, key=lambda m: float(m.validation.loss(largest.validation).sum())))
-    nominal = [selection.models[0]] if selection.last.causes else []
-    return replace(selection, models=(*nominal, *_in_order(list(reversed(nested)))))
+    return replace(selection, models=(selection.models[0], *_in_order(list(reversed(nested)))))
 
 
 def _in_order(models: list[Candidate]) -> list[Candidate]:
     """Return nested models with the effects of each rig in the order in which they come in."""
-    order: list[str] = []
+    ordered: list[Candidate] = []
+    known: tuple[str, ...] = ()
     for m in models:
-        order += [name for name in m.causes if name not in order]
-    return [_ordered(m, order) for m in models]
+        (newest,) = (name for name in m.causes if name not in known)
+        ordered.append(_ordered(m, known, newest))
+        known = (*known, newest)
+    return ordered
 
 
-def _ordered(model: Candidate, order: Sequence[str]) -> Candidate:
+def _ordered(model: Candidate, earlier: Sequence[str], newest: str) -> Candidate:
     """Return a model with its causes in an order, after the effects that the rig states."""
-    problem = model.problem
+    problem, order = model.problem, (*earlier, newest)
     stated = [name for name in problem.acting if name in problem.stated]
     place = {name: k for k, name in enumerate([*stated, *order])}
     rig = problem.rig.with_effects(*sorted(problem.rig.effects, key=lambda e: place[e.name]))
-    return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig)))
+    return replace(model, solution=replace(model.solution, problem=replace(problem, rig=rig, newest=newest)))
 
 
 def _replaced(selection: Selection, last: Candidate, trial: Trial) -> Selection:

@@ -30,7 +30,7 @@ class Candidate:
 
     @property
     def problem(self) -> Problem:
-        """The rig with its effects and what may move."""
+        """The rig with its effects and unknowns."""
         return self.solution.problem
 
     @property
@@ -40,8 +40,8 @@ class Candidate:
 
     @property
     def newest(self) -> str:
-        """Name of the effect that was added last. Raises IndexError for the nominal model."""
-        return self.causes[-1]
+        """Name of the effect that was added last; empty where it was removed, and for the nominal model."""
+        return self.problem.newest
 
     @property
     def size(self) -> int:
@@ -55,14 +55,14 @@ class Candidate:
 
     @property
     def prior_cost(self) -> float:
-        """What the fit paid for leaving the values that were known beforehand."""
+        """The cost of leaving the known values."""
         return prior_cost(self.problem, self.solution.theta)
 
     @property
     def is_at_bound(self) -> bool:
-        """Whether the newest effect's main parameter has run to its bound: then it is no such effect."""
+        """Whether the main parameter of the newest effect is at its bound, so that it is not that effect."""
         near = self.settings.acceptance.near_bound
-        return bool(self.causes) and is_at_bound(self.solution, self.newest, near)
+        return bool(self.newest) and is_at_bound(self.solution, self.newest, near)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def fit_candidate(
 
 
 def refit(model: Candidate, setup: FitSetup) -> Candidate:
-    """Fit a candidate again with each channel in units of what the candidate leaves of it."""
+    """Fit a candidate again with each channel in units of its residual."""
     setup = replace(setup, cases=model.cases, weights=model.validation)
     return fit_candidate(setup, model.problem, model.solution.theta, near=model.solution)
 
@@ -149,7 +149,7 @@ def effect_size(name: str) -> int:
 
 
 def prior_cost(problem: Problem, theta: FloatArray) -> float:
-    """Return what a model pays for leaving the values that were known beforehand: their sigmas, squared."""
+    """Return the cost of leaving the known values: their sigmas, squared."""
     return float(sum(u.sigmas(float(t)) ** 2 for t, u in zip(theta, problem.unknowns, strict=True)))
 
 

@@ -77,7 +77,7 @@ def command_at(drive: Drive, t: FloatArray) -> FloatArray:
 
 
 def _segments(blocks: IntArray, good: BoolArray) -> list[IntArray]:
-    """Return the samples of every block of which all count, cut to the same length."""
+    """Return the samples of every block without masked ones, cut to the same length."""
     blocks_of_samples = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(blocks)) + 1)
     whole = [p for p in blocks_of_samples if good[p].all()]
     length = int(np.median([len(p) for p in whole])) - 2 if whole else 0

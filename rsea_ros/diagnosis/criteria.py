@@ -24,10 +24,10 @@ from rsea_ros.signals import Fault
 
 
 class Scored(Protocol):
-    """What the criteria ask of a model.
+    """The part of a model that the criteria use.
 
     validation: its score on the validation blocks. parameters: its unknowns. size: numbers that describe its
-    effects. prior_cost: what its fit paid for leaving what is known beforehand. is_at_bound: its newest
+    effects. prior_cost: the cost of leaving the known values. is_at_bound: its newest
     effect has run to a bound.
     """
 
@@ -88,7 +88,7 @@ def is_acceptable(model: Scored, present: Scored, settings: DiagnosisSettings = 
 def refusal(model: Scored, present: Scored, settings: DiagnosisSettings = DEFAULT) -> Reason | None:
     """Return why a model may not take the place of the present one; None where it may.
 
-    An effect that has run to a bound bends to something else. A pair, a replacement, and one more cause
+    An effect at a bound imitates another one. A pair, a replacement, and one more cause
     beside several that leave much are in doubt: they must take away more, and from the worst channel.
     """
     rule = settings.acceptance
@@ -117,8 +117,8 @@ def break_tie(
 ) -> tuple[M | None, tuple[M, ...]]:
     """Return the model to accept and those that do as well with no more parameters.
 
-    The best is the likeliest, what it pays for leaving known values included. Of all that are not surely and
-    materially worse the simplest; of equals, the one that needs the least of what is known beforehand.
+    The best is the likeliest, the cost of leaving known values included. Of all that are not surely and
+    materially worse the simplest; of equals, the one that leaves the known values least.
     """
     if not models:
         return None, ()
@@ -138,7 +138,7 @@ def break_tie(
 def is_nearly_as_good(model: Scored, best: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether a simpler model does nearly as well as the best, which is far from the floor.
 
-    What the best leaves is no noise, and more parameters always bend a model a little nearer to it.
+    The best one's residual is not noise, and more parameters always fit a little of it.
     """
     if not is_far_from_floor(best, settings):
         return False
@@ -152,7 +152,7 @@ def is_equally_good(model: Scored, other: Scored, settings: DiagnosisSettings = 
 
 
 def costs_priors_less(model: Scored, other: Scored, settings: DiagnosisSettings = DEFAULT) -> bool:
-    """Return whether a model that does as well as another needs clearly less of what is known beforehand."""
+    """Return whether a model that does as well as another leaves the known values clearly less."""
     return model.prior_cost + loss_excess(model, other) < other.prior_cost - settings.acceptance.prior_gain
 
 
@@ -186,8 +186,8 @@ def verdict_of(
     scores: on the test blocks, one a model. statuses: of the cause that each model adds to the one before,
     None for one that is not named. faults: of the data. Where a sensor measures nothing, something is wrong
     that no effect explains (docs/decisions/0063-a-sensor-that-measures-nothing.md).
-    `nothing_wrong` and `explained`: the residual is at the noise floor, without causes and with such as are
-    all confirmed. `partly_explained`: causes are named although that is not so. `unexplained`: none is.
+    `nothing_wrong` and `explained`: the residual is at the noise floor, without causes and with causes that
+    are all confirmed. `partly_explained`: causes are named, but not so. `unexplained`: none is named.
     """
     first, last = scores[0], scores[-1]
     if not any(statuses):
@@ -205,7 +205,7 @@ def is_at_floor(test: Score, levels: FloorSettings = DEFAULT.floor) -> bool:
 def takes_most(first: Score, last: Score, settings: DiagnosisSettings = DEFAULT) -> bool:
     """Return whether causes take half of the residual in every channel that misfits, or all of one.
 
-    The latter counts where that one misfits much and no other gets worse by what matters.
+    The latter counts where that one misfits much and no other gets materially worse.
     """
     levels, unchanged = settings.floor, 1.0 + settings.acceptance.matters
     misfitting = [n for n in first.sums if first.ratio(n) > levels.misfit]

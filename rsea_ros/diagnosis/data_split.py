@@ -1,8 +1,8 @@
 """The training, validation and test blocks of a record: stretches of time that no two sets share.
 
-Of four blocks two neighbours train, one validates, one tests, in an order drawn anew for every four: with one
+Of four blocks two neighbours train, one validates, one tests, in a new random order for every four: with one
 order for all, an excitation that repeats after four blocks would show each set the same part of it.
-Where a held-out record is given, all of it tests instead.
+A held-out record, if given, replaces the test blocks.
 
 Effects are screened on a few short pieces of the training blocks, spread over the record: enough to tell
 promising effects from hopeless ones.
@@ -66,7 +66,7 @@ def short_pieces_of(
 ) -> tuple[Case, ...]:
     """Return pieces of a case, each a run-up and a pair of training blocks, about 14 s of data in all.
 
-    Half are spread evenly; half are where a model's `outputs` are worst, for what acts only now and then.
+    Half are spread evenly; half are where a model's `outputs` are worst, for effects that act rarely.
     A case of a measured motion (inverse model) costs little and is returned whole.
     """
     rule, blocks = settings.pieces, settings.blocks
@@ -89,7 +89,8 @@ def short_pieces_of(
 def _as_often_as_commands(case: Case) -> Case:
     """Return a case with every k-th sample of a channel that has k or more to a command.
 
-    What a command does shows at its own rate; the rest tells noise from noise, at several times the cost.
+    A response to a command shows at the command's rate; more samples add only noise at several times the
+    cost.
     """
     drive = case.drive
     if not isinstance(drive, Drive):

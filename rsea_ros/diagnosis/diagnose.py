@@ -1,8 +1,8 @@
-"""Diagnosis: what a rig's simulation gets wrong, by stepwise selection among the effects of the catalogue.
+"""Diagnosis: causes of a simulation's misfit, by stepwise selection among the effects of the catalogue.
 
 The nominal model is fitted; effects are added one after another, each fitted to the training blocks and
-accepted by the validation blocks (criteria.py); redundant ones are taken out again; what stays is weighed on
-the test blocks (naming/weighing.py), and named with gain and probability where it may be (naming/status.py).
+accepted by the validation blocks (criteria.py); redundant ones are removed; the others are weighed on
+the test blocks (naming/weighing.py), and named with gain and probability where allowed (naming/status.py).
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def diagnose(
     progress: Progress | None = None,
     settings: DiagnosisSettings | None = None,
 ) -> Diagnosis:
-    """Find what a rig's simulation gets wrong in records, name the causes, and measure what each gains.
+    """Find the causes of the misfit of a rig's simulation in records, and measure the gain of each.
 
     rig: effects that it states belong to the nominal model; their unknown parameters are fitted with the rig.
-    Effects that it only guesses do not: they are looked for as all others.
+    Effects that it only guesses do not: the search treats them as all others.
     holdout: a record on which the models are tested; without it, the test blocks of the records.
-    settings: what is tried and by which numbers, DiagnosisSettings() by default.
-    Raises IdentificationError when the records are too short or do not hold what the rig needs.
+    settings: the effects to try and the numbers that steer the verdict, DiagnosisSettings() by default.
+    Raises IdentificationError when the records are too short or lack a channel that the rig needs.
     """
     settings = settings or DiagnosisSettings()
     tell = progress or (lambda step, share: None)
@@ -87,7 +87,7 @@ def search(
 ) -> tuple[Selection, list[Evaluated]]:
     """Select causes beside the nominal model and evaluate every model of the selection.
 
-    record: the first one, from which a joint in its loop gets its start.
+    record: the first one, which gives a joint in its loop its start.
     """
     rig = nominal.rig
     effects = searched_effects(nominal, settings.without)
@@ -108,7 +108,7 @@ def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]
 
 
 def _steady(checked: Sequence[Checked], rig: Rig) -> tuple[list[Checked], tuple[Remark, ...]]:
-    """Return records on the even clocks that their values agree with, and what was done."""
+    """Return records on the even clocks that their values agree with, and remarks on the changes."""
     steady = steadied([c.record for c in checked], [c.masked for c in checked], rig)
     records = zip(checked, steady.records, strict=True)
     return [replace(c, record=record) for c, record in records], steady.remarks

@@ -24,7 +24,7 @@ from rsea_ros.signals import Fault, FloatArray, Record
 
 @dataclass(frozen=True)
 class Examined:
-    """What is diagnosed: the records as read and as checked, the held-out one as checked, the rig."""
+    """The input of a diagnosis: the records as read and as checked, the held-out one as checked, the rig."""
 
     records: Sequence[Record]
     checked: Sequence[Checked]
@@ -53,8 +53,7 @@ class Evaluated:
     @property
     def added(self) -> str:
         """Name of the effect that the model adds to the one before; empty for the nominal model."""
-        added = self.solution.problem.added
-        return added[-1] if added else ""
+        return self.solution.problem.newest
 
     @cached_property
     def confidence(self) -> Confidence:
@@ -64,9 +63,9 @@ class Evaluated:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What models are tested on: the test blocks of the cases, or a record that takes their place.
+    """The data that test models: the test blocks of the cases, or a record in their place.
 
-    nominal: the rig without causes, by which the record is made ready. rule: how records are cut into blocks.
+    nominal: the rig without causes, by which the record is prepared. rule: how records are cut into blocks.
     """
 
     cases: tuple[Case, ...]
@@ -98,7 +97,7 @@ class HeldOut:
 
 
 def held_out_of(selection: Selection, record: Checked | None) -> HeldOut:
-    """Return what the models of a selection are tested on. record: takes the place of the test blocks."""
+    """Return the data that test the models of a selection. record: replaces the test blocks."""
     rule = selection.last.settings.blocks
     return HeldOut(selection.cases, selection.models[0].problem.rig, record, rule)
 
@@ -110,7 +109,7 @@ def evaluate(
     pools: Pools,
     settings: DiagnosisSettings,
 ) -> Evaluated:
-    """Re-fit a model to the training and validation blocks, and score it on what was held out."""
+    """Re-fit a model to the training and validation blocks, and score it on the held-out data."""
     cases, blocks = selection.cases, (*TRAIN, *VALIDATION)
     setup = FitSetup(
         cases, settings, pools.run, chosen.validation, blocks=blocks, gain=settings.fits.final_gain

@@ -1,4 +1,4 @@
-"""A forward step: every effect tried beside the present model, at a cost that grows as few remain.
+"""A forward step: every effect tried beside the present model, more thoroughly as fewer remain.
 
 All are screened and the promising fitted on short pieces of the data; the best of those are fitted to all
 training blocks. Where none is acceptable, effects that the pieces overlooked are tried, then effects on the
@@ -37,7 +37,7 @@ NO_STEP = StepResult(None, [], ())
 
 @dataclass(frozen=True)
 class ForwardStep:
-    """What a step starts from: the present model, the effects to try, and how many steps were before."""
+    """The input of a step: the present model, the effects to try, and the number of earlier steps."""
 
     present: Candidate
     effects: Sequence[Effect]
@@ -128,7 +128,7 @@ class ForwardStep:
         return trial_of(model, model.newest, self.present, reason, chosen.newest)
 
     def _say(self, what: str, within: float) -> None:
-        """Report what is being tried; each step is taken to halve what is left of the work."""
+        """Report the present trial; each step counts as half of the remaining work."""
         share = 1.0 - 0.5**self.number * (1.0 - 0.5 * within)
         self.tell(f"step {self.number + 1}: {what}", share)
 

@@ -1,7 +1,7 @@
-"""Where fits of an effect begin: at what its file says of the residual, else at its typical parameters.
+"""Initial guesses of an effect: by its file's functions of the residual, otherwise its typical parameters.
 
 The typical sizes of the catalogue are those of an actuator of some 20 N m; a servo of 1 N m would stick fast.
-A joint in a position loop has sizes of its own: its largest torque says how large an effect in N m may be.
+For a joint in a position loop, the largest torque bounds the size of an effect in N m.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rsea_ros.diagnosis.residual_peaks import (
 )
 from rsea_ros.effects.effect import Effect
 from rsea_ros.effects.guess import Guess
-from rsea_ros.effects.signal_table import ROTOR_ANGLE
+from rsea_ros.effects.signal_table import ROTOR_ANGLE, Port
 from rsea_ros.identification.machine_scale import LARGEST, torque_size
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.unknowns import WELL_KNOWN
@@ -46,7 +46,9 @@ _LIMITS = (1.0, 0.9, 0.7)
 
 
 def initial_guesses(effect: Effect, view: RecordView) -> list[Guess]:
-    """Return the guesses from which fits of an effect begin; none where it has nothing to act on."""
+    """Return the guesses from which fits of an effect begin; empty where it has nothing to act on."""
+    if view.rigid_spring and effect.port is Port.SPRING:
+        return []
     is_torque = effect.main.unit == "N m" and ROTOR_ANGLE not in effect.reads
     if view.is_joint and is_torque:
         return joint_guesses(effect, torque_size(view.case, view.rig))
@@ -68,7 +70,7 @@ def joint_guesses(effect: Effect, largest: float) -> list[Guess]:
 
 @dataclass(frozen=True)
 class RecordView:
-    """What a case, the rig as it is fitted so far, and its simulated channels show (effects/guess.py)."""
+    """A case beside the rig fitted so far and its simulated channels (effects/guess.py)."""
 
     case: Case
     rig: Rig
@@ -159,7 +161,7 @@ class RecordView:
         return sine_at(t, residual_of(self.case, self.outputs, channel), 2.0 * math.pi * frequency)
 
     def repeating_torque(self) -> list[Guess]:
-        """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats with the rotor."""
+        """Return cycles per revolution, amplitude (N m), phase (rad) of the torque that follows the rotor."""
         return ripples(self.case, self.rig, self.outputs)
 
     def repeating_angle(self) -> list[Guess]:

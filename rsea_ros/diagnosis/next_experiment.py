@@ -1,8 +1,8 @@
 """The next experiment: the cheapest run that would separate rivals, by simulating them.
 
 Each possible excitation, as large as rig and driver allow, is applied to the accepted model; the rival, with
-all that it may move, is fitted to that (one linearised step), and what it cannot follow is held against the
-sensors' noise. No run is recommended where none would tell anything.
+all its unknowns, is fitted to that (one linearised step), and its residual is compared with the
+sensors' noise. No run is recommended where none would separate them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ExcitationOption:
 
     @property
     def cost(self) -> float:
-        """What it asks of the bench: amplitude first; a decade of bandwidth counts as a tenth more of it."""
+        """The demand on the bench: amplitude first; a decade of bandwidth counts as a tenth more of it."""
         return self.relative * (1.0 + 0.1 * math.log10(self.high / self.low))
 
 
@@ -59,7 +59,7 @@ def separating(
     """Return the cheapest allowed run that separates an accepted model from its rivals, if there is one."""
     case = accepted.problem.cases[0]
     undecided = Experiment(
-        "other_amplitude", accepted.problem.added[-1], tuple(r.problem.added[-1] for r in rivals)
+        "other_amplitude", accepted.problem.newest, tuple(r.problem.newest for r in rivals)
     )
     if not isinstance(case.drive, Drive):
         return undecided
@@ -78,7 +78,7 @@ def separating(
 
 
 def unit_of_commands(rig: Rig) -> str:
-    """Return the unit of what commands a rig: torques, or target positions."""
+    """Return the unit of a rig's commands: of torques, or of target positions."""
     return UNITS["command" if rig.loop is None else "reference"]
 
 
@@ -110,7 +110,7 @@ def _model(solution: Solution) -> Rig:
 
 
 def _separation(rival: Solution, case: Case) -> float:
-    """Return what a rival cannot follow of the accepted model's motion, over the noise."""
+    """Return the residual of a rival fitted to the accepted model's motion, over the noise."""
     return _left_over(replace(rival.problem, cases=(case,)), rival.theta)
 
 
@@ -134,13 +134,13 @@ def _left_over(problem: Problem, theta: FloatArray) -> float:
 def amplitude_series(
     model: Solution, times_noise: float, rate: float, rule: NextRunSettings = DEFAULT.next_run
 ) -> Experiment | None:
-    """Return the run that says of an unexplained residual whether it grows with the amplitude.
+    """Return the run that shows whether an unexplained residual grows with the amplitude.
 
     times_noise: RMS of that residual over the noise. At half the amplitude it must still be seen; else twice
     the amplitude would show it, within the limits; None where neither would.
     """
     case, rig = model.problem.cases[0], _model(model)
-    if not isinstance(case.drive, Drive):  # it drifts: no simulation says how far another run would carry it
+    if not isinstance(case.drive, Drive):  # it drifts: no simulation predicts how far another run would go
         return Experiment("amplitude_series", amplitude=0.5)
     present = float(np.max(np.abs(case.drive.command)))
     excess = math.sqrt(max(times_noise**2 - 1.0, 0.0))

@@ -20,14 +20,17 @@ def on_blocks(
     problem: Problem, cases: Sequence[Case], blocks: tuple[int, ...], misfit: Mapping[str, float] | None,
     rule: BlockSettings,
 ) -> Problem:  # fmt: skip
-    """Return a problem on some blocks of the cases. misfit: what counts as noise (with_misfit_as_noise)."""
+    """Return a problem on some blocks of the cases.
+
+    misfit: residual that counts as noise (with_misfit_as_noise).
+    """
     return replace(problem, cases=tuple(with_misfit_as_noise(part(c, blocks, rule), misfit) for c in cases))
 
 
 def with_misfit_as_noise(case: Case, misfit: Mapping[str, float] | None) -> Case:
-    """Return a case in which what a model leaves of a channel counts as its noise, where that is more.
+    """Return a case in which a model's residual of a channel counts as its noise, where it is larger.
 
-    misfit: RMS of what it leaves over the noise, by channel.
+    misfit: RMS of the residual over the noise, by channel.
     """
     if misfit is None:
         return case
@@ -36,7 +39,7 @@ def with_misfit_as_noise(case: Case, misfit: Mapping[str, float] | None) -> Case
 
 
 def with_doubled_step(problem: Problem) -> Problem:
-    """Return a problem on steps twice as long: for what is far from the floor, half the cost."""
+    """Return a problem on steps twice as long: half the cost, for models far from the floor."""
     drives = (coarser(c.drive) if isinstance(c.drive, Drive) else c.drive for c in problem.cases)
     return replace(
         problem, cases=tuple(replace(c, drive=d) for c, d in zip(problem.cases, drives, strict=True))
@@ -47,7 +50,9 @@ def without_effect(problem: Problem, theta: FloatArray, name: str) -> tuple[Prob
     """Return a problem without one of its effects, and theta without its parameters."""
     keep = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     rig = problem.rig.with_effects(*(e for e in problem.rig.effects if e.name != name))
-    return replace(problem, rig=rig, unknowns=tuple(problem.unknowns[i] for i in keep)), theta[keep]
+    newest = "" if problem.newest == name else problem.newest
+    unknowns = tuple(problem.unknowns[i] for i in keep)
+    return replace(problem, rig=rig, unknowns=unknowns, newest=newest), theta[keep]
 
 
 def without_clocks(problem: Problem, theta: FloatArray) -> tuple[Problem, FloatArray]:
@@ -67,7 +72,7 @@ def with_clocks(problem: Problem, theta: FloatArray, model: Problem) -> tuple[Pr
 
 
 def with_common_clock_in_delay(solution: Solution) -> FloatArray | None:
-    """Return theta with the clock error that all sensors share turned into delay of the command.
+    """Return theta with the clock error shared by all sensors turned into delay of the command.
 
     Where a delay is a whole number of samples the residual has a kink, and a fit may stop there with the
     rest in the clocks. None for a model without a delay.

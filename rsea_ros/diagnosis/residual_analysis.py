@@ -64,7 +64,7 @@ def spectrum(
 
 
 class _Respect(NamedTuple):
-    """What a residual is laid out against: a value at each sample. is_even: in bins of equal width."""
+    """A variable over which a residual is shown: a value at each sample. is_even: in bins of equal width."""
 
     what: str
     unit: str

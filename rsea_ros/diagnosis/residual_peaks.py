@@ -4,8 +4,8 @@ The missing torque is the torque that a model lacks for the measured motion:
 
     J_m a + b_m v + T,   of the residuals: measured less simulated motion and load
 
-What the model has right, the command with its lags included, is in both. A simulated rotor angle of a 502:1
-gear loses its phase; the measured one does not.
+The parts that the model has right, the command with its lags included, cancel. A simulated rotor angle of a
+502:1 gear loses its phase; the measured one does not.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from rsea_ros.identification.problem import Case
 from rsea_ros.model.drive import Drive
 from rsea_ros.model.equations import train_ratio
+from rsea_ros.model.inverse import Motion
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -36,7 +37,7 @@ _MOST_PEAKS = 2
 
 
 def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
-    """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats most."""
+    """Return cycles per revolution, amplitude (N m) and phase (rad) of the strongest repetitions."""
     missing = missing_torque(case, rig, outputs)
     if missing is None:
         return []
@@ -45,7 +46,7 @@ def ripples(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dic
 
 
 def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> list[dict[str, float]]:
-    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of what repeats most.
+    """Return cycles per revolution of the rotor, amplitude (rad) and phase (rad) of the strongest ones.
 
     Of the measured angle less the simulated one.
     """
@@ -57,7 +58,7 @@ def angle_errors(case: Case, rig: Rig, outputs: Mapping[str, FloatArray]) -> lis
 
 
 def _repeating(angle: FloatArray, values: FloatArray) -> list[dict[str, float]]:
-    """Return cycles per revolution, amplitude and phase of what repeats most with an angle (rad)."""
+    """Return cycles per revolution, amplitude and phase of the strongest repetitions over an angle (rad)."""
     values = values - np.mean(values)
     cycles, power = _periodogram(angle, values)
     seen = (cycles >= _FEWEST) & (cycles * np.ptp(angle) > 2.0 * math.pi * _FEWEST_PERIODS)
@@ -80,31 +81,52 @@ def missing_torque(
 
     outputs: simulated channels of the case. None without a position, or for a free housing.
     """
-    if (
-        not isinstance(case.drive, Drive)
-        or "position" not in case.measured
-        or "housing_end" not in rig.clamped
-    ):
+    if isinstance(case.drive, Motion):
+        return _along(case.drive, case, outputs)
+    if "position" not in case.measured or "housing_end" not in rig.clamped:
         return None
     t, q = case.t["position"], residual_of(case, outputs, "position")
-    v, load = (
-        np.interp(t, case.t[n], residual_of(case, outputs, n)) if n in case.measured else otherwise
-        for n, otherwise in (("velocity", np.gradient(q, t)), ("ft", rig["spring.stiffness"] * q))
-    )
-    acceleration = (v[2:] - v[:-2]) / (t[2:] - t[:-2])
+    v = _residual_at(t, case, outputs, "velocity", np.gradient(q, t))
+    a = np.pad((v[2:] - v[:-2]) / (t[2:] - t[:-2]), 1)
+    load = _residual_at(t, case, outputs, "ft", _load(rig, q, v, a))
     inertia = rig["rotor.reflected_inertia"] + rig["chassis.inertia"]
-    torque = inertia * acceleration + rig["rotor.reflected_damping"] * v[1:-1] + load[1:-1]
+    torque = (inertia * a + rig["rotor.reflected_damping"] * v + load)[1:-1]
     keep = case.mask["position"][1:-1]
     return case.measured["position"][1:-1][keep], torque[keep]
 
 
+def _along(
+    motion: Motion, case: Case, outputs: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the angles of a measured motion (rad), and the torque that its motor did not need there, N m."""
+    keep = case.mask["motor_torque"]
+    return motion.q[keep], (outputs["motor_torque"] - case.measured["motor_torque"])[keep]
+
+
+def _residual_at(
+    t: FloatArray, case: Case, outputs: Mapping[str, FloatArray], channel: str, otherwise: FloatArray
+) -> FloatArray:
+    """Return the residual of a channel at the stamps t, s; `otherwise`, shape of t, without that channel."""
+    if channel not in case.measured:
+        return otherwise
+    return np.interp(t, case.t[channel], residual_of(case, outputs, channel))
+
+
+def _load(rig: Rig, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+    """Return the torque, N m, that carries a motion beyond the gear: of the spring, or of the load itself."""
+    if not rig.rigid_spring:
+        return rig["spring.stiffness"] * q
+    inertia, damping, stiffness = (rig[f"spring_end.{n}"] for n in ("inertia", "damping", "stiffness"))
+    return inertia * a + damping * v + stiffness * q
+
+
 def residual_of(case: Case, outputs: Mapping[str, FloatArray], channel: str) -> FloatArray:
-    """Return what is measured less what is simulated, zero where that is masked."""
+    """Return measured less simulated, zero where masked."""
     return np.where(case.mask[channel], case.measured[channel] - outputs[channel], 0.0)
 
 
 def peaks(level: FloatArray, apart: int) -> list[int]:
-    """Return the places of the largest values that are more than so many bins apart."""
+    """Return the places of the largest values that are more than a number of bins apart."""
     level, largest = level.copy(), []
     for _ in range(_MOST_PEAKS):
         k = int(np.argmax(level))

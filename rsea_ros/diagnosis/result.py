@@ -1,4 +1,4 @@
-"""What a diagnosis says, as values. Reports and files are made from these."""
+"""The result of a diagnosis as values, for reports and files."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import Overlay, ParameterEstimate
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import Fault, FloatArray
 
 Verdict = Literal["nothing_wrong", "explained", "partly_explained", "unexplained"]
@@ -94,7 +95,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Alternative:
-    """What may be right in a cause's place, with its size; gain_…: held out, of `channel`."""
+    """An effect that may be right in a cause's place, with its size; gain_…: held out, of `channel`."""
 
     name: str
     instead_of: str
@@ -132,10 +133,10 @@ at a multiple of the amplitude it shows whether what is left is linear.
 
 @dataclass(frozen=True)
 class Experiment:
-    """The run that would decide what these data cannot; `excitation` is empty where none can be said.
+    """The run that would decide between a cause and its rivals; `excitation` is empty without one.
 
-    cause, rivals: which these data do not distinguish. separation: what the rivals cannot follow, over the
-    noise; where nothing separates them, at most. amplitude: of the run, relative to the present one.
+    cause, rivals: not distinguished by these data. separation: residual of the rivals over the
+    noise; an upper bound where nothing separates them. amplitude: of the run, relative to the present one.
     """
 
     reason: ExperimentReason
@@ -159,12 +160,13 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict and all that it rests on. Dicts are by channel, in the channel's unit.
+    """The verdict and its basis. Dicts are by channel, in the channel's unit.
 
-    channel: the main one, of which verdict, misfits and the gains of rejected effects speak.
+    channel: the main one, of verdict, misfits and the gains of rejected effects.
     residual_rms: of the re-fitted nominal model; extended_residual_rms: of the extended one; both held out.
-    remarks: what the data cannot determine, and what a reader must know beside the numbers.
-    before, after, masked: of the first record; masked: which samples are faulty, by channel, shape (n,).
+    remarks: on values that the data cannot determine, and others for the reader.
+    before, after, masked: of the first record; masked: which samples of `before` do not count, by channel,
+    shape (n,): the faulty ones, and those before the bench has settled.
     """
 
     verdict: Verdict
@@ -195,3 +197,4 @@ class Diagnosis:
     remarks: tuple[Remark, ...] = ()
     masked: Mapping[str, npt.NDArray[np.bool_]] = field(default_factory=dict)
     settings: DiagnosisSettings = DEFAULT
+    rig_choice: RigChoice = field(default_factory=RigChoice)

@@ -1,9 +1,9 @@
-"""The score of a model: its squared residuals over the noise, by channel and block, and what it gains.
+"""The score of a model: its squared residuals over the noise, by channel and block, and gains from them.
 
 The data count by their deviance D = sum_b d_b over blocks. That of a right model against a wrong one has the
-scatter S^2 = n var(d_b) = 4 D where the residual is white noise. Far from the noise floor it is none:
-neighbouring samples err alike, and what one block gains another loses. There w D counts, with w = 4 D / S^2,
-at most 1, whose scatter is what its size claims (magnitude adjustment: Pauli, Racugno, Ventura, Statistica
+scatter S^2 = n var(d_b) = 4 D where the residual is white noise. Far from the noise floor it is not:
+neighbouring samples err alike, and blocks differ in sign. There w D counts, with w = 4 D / S^2,
+at most 1, whose scatter agrees with its size (magnitude adjustment: Pauli, Racugno, Ventura, Statistica
 Sinica 21, 2011). Counted in full, samples by the thousand would outweigh every prior.
 """
 
@@ -41,8 +41,8 @@ class Score:
     def loss(self, against: Score) -> FloatArray:
         """Return the loss of each block in the units of another score, shape (blocks,).
 
-        Every channel counts in units of what the other model leaves of it, or of its noise where that is more
-        (maximum likelihood with unknown noise): the finest sensor does not drown the others.
+        Every channel counts in units of its residual in the other model, or of its noise where that is larger
+        (maximum likelihood with unknown noise): the finest sensor does not dominate the others.
         """
         scaled = [s / max(1.0, against.ratio(n)) ** 2 for n, s in self.sums.items()]
         return np.asarray(np.sum(scaled, axis=0))
@@ -137,7 +137,7 @@ def _draws(blocks: int, resamples: int) -> IntArray:
 
 
 class Weighable(Protocol):
-    """A model with its score on the validation blocks and what its fit paid for leaving known values."""
+    """A model with its score on the validation blocks and the cost of leaving known values."""
 
     @property
     def validation(self) -> Score: ...
@@ -155,9 +155,9 @@ def likelier_by(model: Weighable, other: Weighable, far: float) -> float:
 
 
 def tempered_deviance(model: Score, other: Score, far: float) -> float:
-    """Return how much smaller twice the negative log likelihood of a model is than that of another.
+    """Return the decrease of twice the negative log likelihood of a model against another.
 
-    In the units of what the worse of the two leaves of each channel.
+    In units of each channel's residual in the worse of the two.
     """
     worse = max(model, other, key=lambda s: float(s.loss(model).sum()))
     return float((tempered_loss(other, worse, far) - tempered_loss(model, worse, far)).sum())

@@ -28,7 +28,7 @@ _DAMPING = 1e-6
 
 @dataclass(frozen=True)
 class ScreenedEffect:
-    """An effect beside the present model, with where a full fit would begin and the cost already reached."""
+    """An effect beside the present model, with the start of a full fit and the cost already reached."""
 
     effect: Effect
     problem: Problem
@@ -139,13 +139,13 @@ class _Step:
         self._normal = normal + np.diag(_DAMPING * np.diag(normal) + 1e-12)
 
     def cost(self, theta: FloatArray, residual: FloatArray) -> float:
-        """Return the squared residual and what leaving the priors costs."""
+        """Return the squared residual plus the cost of leaving the priors."""
         return power(residual) + float(np.sum((self._prior * (theta - self._centre)) ** 2))
 
     def taken(
         self, start: ScreenedEffect, residual: FloatArray, shares: Sequence[float]
     ) -> tuple[ScreenedEffect, FloatArray] | None:
-        """Return where a step, or a share of it, leads and the residual there; None where none helps."""
+        """Return the end of a step, or of a share of it, and its residual; None where none helps."""
         slope = self._matrix.T @ residual + self._prior**2 * (start.theta - self._centre)
         aim = bounded_step(self._problem, start.theta, self._normal, slope)
         for share in shares:

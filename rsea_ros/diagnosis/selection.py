@@ -13,7 +13,7 @@ from rsea_ros.signals import FloatArray
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect tried beside a model. problem, theta: with it, as far as its fit went.
+    """An effect tried beside a model. problem, theta: with it, at the end of its fit.
 
     is_full: fitted to all training blocks, not only to short pieces. rival: the effect that was preferred.
     """
@@ -34,7 +34,7 @@ def trial_of(model: Candidate, name: str, beside: Candidate, reason: Reason, riv
 
 @dataclass(frozen=True)
 class Selection:
-    """The accepted models, from the nominal one on, and what else was tried.
+    """The accepted models, from the nominal one on, and other trials.
 
     rivals: by accepted cause, the models that do as well with another effect in its place.
     """
@@ -45,7 +45,7 @@ class Selection:
 
     @property
     def cases(self) -> tuple[Case, ...]:
-        """Every sample of the records, with the noise that the last model shows."""
+        """Every sample of the records, with the noise by the last model."""
         return self.last.cases
 
     @property

@@ -41,7 +41,7 @@ from rsea_ros.signals import FloatArray
 class StepFits:
     """Fits effects beside the present model, as cheaply as each stage of a forward step allows.
 
-    say: hears what is fitted, and which share of the step is done.
+    say: called with the present fit and the share of the step that is done.
     """
 
     present: Candidate
@@ -68,7 +68,7 @@ class StepFits:
 
     @cached_property
     def guesses(self) -> dict[str, list[Guess]]:
-        """Where fits of every effect that does not act yet begin."""
+        """The initial guesses of every effect that is not in the model."""
         solution = self.present.solution
         rig, _ = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
         view = RecordView(self.present.cases[0], rig, self.present.outputs[0])
@@ -77,7 +77,7 @@ class StepFits:
         return {e.name: g for e, g in zip(effects, guesses, strict=True)}
 
     def screened(self, solution: Solution) -> list[ScreenedEffect]:
-        """Return what two cheap steps of every other effect reach beside a solution, best first."""
+        """Return every other effect after two cheap steps beside a solution, best first."""
         effects = [e for e in self.effects if e.name not in solution.problem.acting]
         guesses = self.guesses
 
@@ -112,9 +112,9 @@ class StepFits:
     def on_measured_angle(self) -> list[Candidate]:
         """Return models with an effect of the rotor's angle, simulated on the measured angle.
 
-        A free simulation, a gear ratio away from the output, may settle in other detents. But the measured
-        angle knows what every other cause has done to the motion, so such a model counts only where it leaves
-        little: otherwise it bends to whatever else is missing.
+        A free simulation of a high gear ratio may settle in other detents. But the measured
+        angle contains the motion by every other cause, so such a model counts only where it leaves
+        little: otherwise it imitates another missing effect.
         """
         base, most = self.on_pieces, self.settings.forward.hope_on_angle
         on_angle = replace(base, problem=replace(base.problem, ride=True))
@@ -155,7 +155,7 @@ class StepFits:
         return refit(first, replace(setup, iterations=None, is_quick=is_quick))
 
     def _surely_helps(self, screened: ScreenedEffect) -> bool:
-        """Return whether an effect as it was fitted to the pieces does better on the validation blocks."""
+        """Return whether an effect with its fit to the pieces does better on the validation blocks."""
         problem, theta = self.complete(screened)
         outputs = [problem.outputs(start) for start in self._starts(problem, theta)]
         cases, blocks = self.present.cases, self.settings.blocks
@@ -164,9 +164,9 @@ class StepFits:
         return any(preference(s, self.present.validation, extra, rule).sure for s in scores)
 
     def _starts(self, problem: Problem, theta: FloatArray) -> list[FloatArray]:
-        """Return where a fit to everything may begin: as on the pieces, or as the present model beside that.
+        """Return the starts of a full fit: from the pieces, or from the present model beside the effect.
 
-        The pieces were fitted without clocks: what these do, other values have taken over on the pieces.
+        The pieces were fitted without clocks, whose part other values have taken on the pieces.
         """
         names = [u.name for u in self.present.problem.unknowns]
         present = dict(zip(names, self.present.solution.theta, strict=True))

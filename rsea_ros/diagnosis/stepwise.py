@@ -3,8 +3,8 @@ effect helps.
 
 Models are fitted to the training blocks and chosen on the validation blocks; the test blocks are not touched.
 
-Where no effect helps any more, a cause's place is offered to the more detailed effects that it is said to be
-confused with. What was named first was chosen while the other causes still hid in the residual: a hardening
+Where no effect helps any more, a cause's place is offered to the more detailed effects that it may be
+confused with. The first causes were chosen while the others still hid in the residual: a hardening
 spring stands in for a stop, Coulomb friction for Stribeck's. Beside the causes that came later the right one
 does better.
 """

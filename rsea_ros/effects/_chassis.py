@@ -41,7 +41,7 @@ def path(d_0, w_0, d_1, w_1, h, t):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def release(side, half, d_0, w_0, d_1, w_1, h, k, b, j):  # type: ignore[no-untyped-def]
-    """Return when in the step the flank stops pushing: 0 when it does not touch, h when it goes on."""
+    """Return when in the step the flank stops pushing: 0 without contact, h when it pushes throughout."""
     if side == 0.0:
         return 0.0
     inertia = j * (w_1 - w_0) / h

@@ -1,4 +1,4 @@
-"""What the drifts share: how far one has come, 0 at the start of a record and 1 at its end."""
+"""Shared by the drifts: their progress, 0 at the start of a record and 1 at its end."""
 
 import math
 

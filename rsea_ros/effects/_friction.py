@@ -1,4 +1,4 @@
-"""What the friction effects share: the mean over a step of a friction torque, without limits on the step.
+"""Shared by the friction effects: the mean over a step of a friction torque, for steps of any length.
 
 The law is F tanh(w / w_c), which is F sign(w) but for a creep below w_c (presliding). Over a step in
 which w goes straight from w_0 to w_1 its mean is, exactly,
@@ -6,7 +6,7 @@ which w goes straight from w_0 to w_1 its mean is, exactly,
     F w_c (ln cosh(w_1 / w_c) - ln cosh(w_0 / w_c)) / (w_1 - w_0)
 
 and w_1 depends on it: w_1 = w_free - mobility * mean. Newton's method, kept in a bracket, solves that, so
-sticking is no stiff problem.
+sticking does not make the problem stiff.
 """
 
 import math
@@ -25,7 +25,7 @@ PRESLIDING = Parameter(
 """Below it a gear with friction creeps instead of standing still; every friction effect has it."""
 
 _SLIDES = 12.0  # in creep velocities: 1 - tanh(12) = 8e-11
-_TURNS = 3.0  # in creep velocities: below it the motion may turn, and its speed does not go straight there
+_TURNS = 3.0  # in creep velocities: below it the motion may reverse, and its speed is not linear in time
 _STRAIGHT = 0.3  # friction's own change of speed times the whole: below it the speed goes nearly straight
 _PARTS = 4  # of a step in which it does not
 
@@ -90,7 +90,7 @@ def mean_tanh(a, b, fade):  # type: ignore[no-untyped-def]
 
 
 def against(level: Any, creep: int) -> AgainstMotion:
-    """Return what compensates friction of a law. level: its compiled `f(p, w)`; creep: place of w_c in p.
+    """Return the compensation of a friction law. level: its compiled `f(p, w)`; creep: place of w_c in p.
 
     The mean over a hold in which the speed goes straight from start to end, as the step has it.
     """

@@ -1,4 +1,4 @@
-"""An effect as its reader sees it: what it is, its equation, its parameters and its source."""
+"""An effect for its reader: meaning, equation, parameters and source."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class EffectPage:
 
     @property
     def about(self) -> str:
-        """What it is, in a few words."""
+        """The meaning in a few words."""
         return self.effect.about
 
     @property

@@ -2,10 +2,10 @@
 
     T = -offset - ½ viscous_difference · |ω|
 
-ω is the speed of the gear output against the housing. offset (N m) is the one-sided part: what the drive
-takes more forward than backward. viscous_difference (N m s/rad) is how much the viscous coefficient forward
-exceeds the one backward; their mean is b_m, and it counts up to 2 b_m, where one of them is zero. Source:
-Janot, Gautier, Brunot, Data set and reference models of EMPS, 2019 (offset).
+ω is the speed of the gear output against the housing. offset (N m) is the one-sided part: the torque that the
+drive needs more forward than backward. viscous_difference (N m s/rad) is how much the viscous coefficient
+forward exceeds the one backward; their mean is b_m, and it counts up to 2 b_m, where one of them is zero.
+Source: Janot, Gautier, Brunot, Data set and reference models of EMPS, 2019 (offset).
 """
 
 from rsea_ros.effects.effect import Claims, Effect, Parameter, compiled

@@ -5,7 +5,7 @@
 y is the chassis, which has its own inertia, d the gear output, both against the distal side. The flanks
 only push: C >= 0 at the forward one. The impact is inelastic, see _chassis.py. With e = y - d the gear
 feels J_sc e'' + b_s e' + K_s e beside the torque of the nominal spring, the F/T sensor all but the first.
-What a step gave is made good in the next one, so an impact just at its end, not foreseen, loses no momentum.
+The error of a step is corrected in the next one, so an unforeseen impact at its end loses no momentum.
 With the housing free, 4 mrad, 30 N m of noise or chirp at 280 Hz, the torque is within 0.1 to 0.7 % RMS of
 an event-driven model in 28 of 30 records (1 mrad: 0.2 %). Where flanks barely graze, exact solvers part too.
 Source: Nordin, Gutman, Automatica 38, 2002, section 2 (exact model of a shaft with play), with inertia.
@@ -40,7 +40,7 @@ FASTEST = 0.1
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the mean torque of the step, or, when it is done, what the sensor sees at its end."""
+    """Add the mean torque of the step or, when it is done, the torque at the sensor at its end."""
     half, h, k, b = 0.5 * p[0], s[STEP], s[K_S], s[B_S]
     if half == 0.0 or k == 0.0:
         return
@@ -75,9 +75,9 @@ _OF_JOINTS = (1e-3, 3e-3, 0.01, 0.03)
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Begin also at shares of the travel; a spring that is nearly unknown is as much stiffer then.
+    """Begin also at shares of the travel; a nearly unknown spring then starts correspondingly stiffer.
 
-    A joint travels far beside its play, whose size no travel shows.
+    A joint travels much farther than its play, so its travel does not show the size of the play.
     """
     if view.is_joint:
         return [{**defaults[0], "gap": gap} for gap in _OF_JOINTS]

@@ -1,4 +1,4 @@
-"""Base that gives: the clamped end of the spring is a mass on a stiff spring.
+"""Compliant base: the clamped end of the spring is a mass on a stiff spring.
 
     inertia · q̈ + 2 · damping_ratio · √(stiffness · inertia) · q̇ + stiffness · q = T_s,
     T_ft = T_s - above_sensor · inertia · q̈
@@ -44,7 +44,7 @@ _STIFFER = (4.0, 9.0, 20.0)
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
     """Begin with the base's mode at the highest peak of each channel.
 
-    The rig's spring is stiffer then: both in series are what the fit without the effect knows.
+    The rig's spring is stiffer then: the fit without the effect sees both in series.
     """
     if view.rigid_spring:
         return list(defaults)

@@ -22,7 +22,7 @@ STARTED = 1 + LENGTH
 def apply(s, p, x):  # type: ignore[no-untyped-def]
     """Put the command into the ring x[1:] and take out the delayed one; x[0] is where the next one goes.
 
-    Before the first target a loop had that target, before the first torque there was none.
+    Before the first target a loop had the same target; before the first torque command there was no torque.
     """
     if p[0] == 0.0:
         return

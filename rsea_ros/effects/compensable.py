@@ -1,6 +1,6 @@
-"""What a torque controller may know of an effect: the torque against it, by the law that the step runs.
+"""The compensation of an effect by a torque controller, by the law that the step runs.
 
-Each law takes the effect's parameters in order. The controller calls it in Python: a controller that compiles
+Each law has the effect's parameters in order. The controller calls it in Python: a controller that compiles
 in its first cycles is late.
 """
 
@@ -16,7 +16,7 @@ Parameters = Sequence[float]
 class AgainstMotion:
     """A torque against the motion. mean: speeds of the gear output at both ends of a hold, rad/s, to N m.
 
-    Positive against a positive speed: what the motor has to make more.
+    Positive against a positive speed: torque that the motor has to add.
     """
 
     mean: Callable[[Parameters, float, float], float]
@@ -26,7 +26,7 @@ class AgainstMotion:
 class OfRotorAngle:
     """A torque of the rotor's angle. mean: angles of the rotor at both ends of a hold, rad, to N m.
 
-    Positive where it drives forward: what the motor has to make less.
+    Positive where it drives forward: torque that the motor has to subtract.
     """
 
     mean: Callable[[Parameters, float, float], float]

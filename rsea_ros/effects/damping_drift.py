@@ -14,7 +14,7 @@ from rsea_ros.effects.signal_table import B_M, DURATION, GEAR_TORQUE, GEAR_VELOC
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Subtract what the damping has changed by so far, times the speed."""
+    """Subtract the change of the damping so far, times the speed."""
     s[GEAR_TORQUE] -= s[B_M] * p[0] * (s[TIME] / s[DURATION]) * s[GEAR_VELOCITY]
 
 

@@ -40,7 +40,7 @@ Response = Callable[[Sequence[float], Any], Any]
 
 
 class RigLike(Protocol):
-    """What a structural effect needs of a rig (the model's Rig has it; effects do not import the model)."""
+    """The part of a rig that a structural effect uses (effects do not import the model)."""
 
     def __getitem__(self, name: str) -> float: ...
     def with_values(self, values: Mapping[str, float]) -> Any: ...
@@ -68,13 +68,13 @@ class Effect:
 
     function: compiled `f(s, p, x)` with the signal table s, the parameters p in order, its own states x.
     structure: instead of a function, a change to the rig: `f(rig, parameters) -> rig`.
-    main: the parameter that says how large the effect is.
-    is_searched: a diagnosis tries it unasked; one that is not acts only where a rig states it.
+    main: the parameter that gives the size of the effect.
+    is_searched: a diagnosis tries it; otherwise it acts only where a rig states it.
     reads: the signals among FIRST_READ … LAST_READ that the function looks at.
-    guesses: where fits begin by what a residual shows; without it, at `default_guesses`.
-    tags: of which kind it is. compensation: what a torque controller may add against it, by the same law.
-    response: how it acts on its signal (at a sensor, on ft) where it is linear: for a controller's margins.
-    part: of the bench, where it sits in another than its port says.
+    guesses: initial guesses from a residual; without it, `default_guesses`.
+    tags: its kinds. compensation: the torque that a controller may add against it, by the same law.
+    response: its linear frequency response on its signal (at a sensor, on ft), for a controller's margins.
+    part: of the bench, if not the one of its port.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Effect:
 
     @property
     def main(self) -> Parameter:
-        """Return the first parameter, the one that says how large the effect is."""
+        """Return the first parameter, which gives the size of the effect."""
         return self.parameters[0]
 
     @property

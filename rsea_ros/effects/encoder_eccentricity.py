@@ -25,7 +25,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Begin at what of the measured angle's error repeats with the rotor."""
+    """Begin at the part of the angle's error that repeats with the rotor."""
     return [{**defaults[0], **repeating} for repeating in view.repeating_angle()]
 
 

@@ -12,7 +12,7 @@ from rsea_ros.effects.signal_table import FT, Port
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the bias to what the sensor sees."""
+    """Add the bias to the sensor's torque."""
     s[FT] += p[0]
 
 

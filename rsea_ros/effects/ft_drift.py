@@ -13,7 +13,7 @@ from rsea_ros.effects.signal_table import DURATION, FT, TIME, Port
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the drift so far to what the sensor sees."""
+    """Add the drift so far to the sensor's torque."""
     s[FT] += p[0] * progress(s[TIME], s[DURATION], p[1])
 
 

@@ -2,9 +2,9 @@
 
     T = -torque · sin(q)
 
-q is the absolute angle of the end that moves, torque what m g l exceeds the rig's by. Its inertia is the
-fit's affair. Only where an end is free: on a bench with both ends clamped nothing turns far enough, and it
-would pass for a motor constant. Source: Craig, Introduction to Robotics, 2005, section 6.
+q is the absolute angle of the end that moves, torque the excess of m g l over the rig's. Its inertia is left
+to the fit. Only where an end is free: on a bench with both ends clamped nothing turns far enough, and it
+would imitate a motor constant. Source: Craig, Introduction to Robotics, 2005, section 6.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from rsea_ros.errors import ParameterError
 
 
 def change(rig: Any, parameters: Mapping[str, float]) -> Any:
-    """Return the rig with that much more gravity on its free end. Raises ParameterError when there is none.
+    """Return the rig with the additional gravity on its free end. Raises ParameterError without a free end.
 
     The spring's end, where both are free.
     """

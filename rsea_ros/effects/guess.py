@@ -1,7 +1,7 @@
-"""Initial guesses: from which parameters a fit of an effect begins, by what the residual shows.
+"""Initial guesses: the parameters from which a fit of an effect begins, estimated from the residual.
 
 An effect's file states its guesses. What several effects share is here: lines of a spectrum, limits of the
-torque, and parts that give between rotor and spring.
+torque, and compliant parts between rotor and spring.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Guess = dict[str, float]
 
 
 class ResidualView(Protocol):
-    """What a record and the model fitted so far show (diagnosis/initial_guess.py makes it), SI."""
+    """A record beside the model fitted so far (made by diagnosis/initial_guess.py), SI."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -67,7 +67,7 @@ class ResidualView(Protocol):
         """Return amplitude and phase (rad) of the sine of a frequency (Hz) in a residual."""
 
     def repeating_torque(self) -> list[Guess]:
-        """Return cycles per revolution, amplitude (N m) and phase (rad) of what repeats with the rotor."""
+        """Return cycles per revolution, amplitude (N m), phase (rad) of the torque that follows the rotor."""
 
     def repeating_angle(self) -> list[Guess]:
         """Return the same of the measured angle's error, amplitude in rad."""
@@ -96,7 +96,7 @@ _LIMITS = (0.95, 0.85, 0.7, 0.5)
 
 
 def at_limits(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Return guesses at the largest torque measured, and at shares of what is commanded."""
+    """Return guesses at the largest measured torque, and at shares of the commanded one."""
     commanded = view.largest_command()
     if commanded is None:
         return list(defaults)
@@ -108,9 +108,9 @@ def at_limits(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
 
 
 def beside_softer_rotor(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Return guesses with less inertia and damping, for what gives between rotor and spring.
+    """Return guesses with less inertia and damping, for a compliance between rotor and spring.
 
-    The rotor moves 1 + K_s / stiffness as far as the spring: the fit without it takes that for more of both.
+    The rotor moves 1 + K_s / stiffness as far as the spring: a fit without the compliance overestimates both.
     """
     guesses = []
     for guess in defaults:

@@ -4,7 +4,7 @@
     g = coulomb_torque + stribeck_torque · exp(-(ω / stribeck_velocity)²)
 
 ω is the speed of the gear output against the housing. With ω of the middle of a step z is an exponential of
-the way, exactly, and what acts is its mean over the step. Source: Canudas de Wit, Olsson, Astrom, Lischinsky,
+the travel, exactly, and its mean over the step acts. Source: Canudas de Wit, Olsson, Astrom, Lischinsky,
 IEEE Trans. Autom. Control 40, 1995, eqs. (1) to (4).
 """
 

@@ -15,7 +15,7 @@ from rsea_ros.effects.signal_table import FT, TIME, Port
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the hum to what the sensor sees."""
+    """Add the hum to the sensor's torque."""
     s[FT] += p[0] * math.sin(2.0 * math.pi * p[1] * s[TIME] + p[2])
 
 

@@ -15,7 +15,7 @@ from rsea_ros.effects.signal_table import DEFLECTION, K_S, SPRING_TORQUE, Port
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add what the spring has beside its linear torque."""
+    """Add the spring's torque beyond the linear one."""
     d, top = s[DEFLECTION], s[DEFLECTION]
     if p[0] < 0.0:
         turn = math.sqrt(-1.0 / (3.0 * p[0]))

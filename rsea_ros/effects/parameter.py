@@ -1,4 +1,4 @@
-"""One parameter of an effect: what it may be, and why."""
+"""One parameter of an effect: its range, and the reason."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ class Parameter:
     null: the value at which the effect vanishes. low, high: bounds of a fit. typical: a size that a bench
     may well have. starts: where fits begin besides `typical`, for problems with several minima.
     reason: why these bounds, with the source where one is known.
-    is_fixed: the same on every machine, although its unit goes with a machine's size.
+    is_fixed: the same on every machine, although its unit scales with a machine's size.
     optional: may be left out; then it is `null`.
     shapes: counts in the size of the law although it may be left out: it makes another law of it.
-    per_record: another in every record, such as the phase that the mains had when it began.
+    per_record: differs from record to record, such as the phase of the mains at its start.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Parameter:
 
     @property
     def possible(self) -> tuple[float, float]:
-        """Return what a person may state: the bounds of a fit on the smallest and the largest machine."""
+        """Return the range that a person may state: the bounds on the smallest and the largest machine."""
         width = 1.0 if self.is_fixed else widest(self.unit)
         return self.low * width if self.low < 0.0 else self.low / width, self.high * width
 

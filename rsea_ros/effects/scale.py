@@ -63,7 +63,7 @@ _WIDEST = {"rad": 64.0, "1/rad": 64.0, "s": 64.0, "Hz": 64.0}
 def scale_to(torque: float, stiffness: float, inertia: float, speed: float, period: float) -> Scale:
     """Return the scale of a machine: largest torque, N m, stiffness, N m/rad, inertia, kg m^2, and so on.
 
-    What is not known, zero or not finite, counts as the catalogue's.
+    An unknown number, zero or not finite, counts as the catalogue's.
     """
     sizes = (torque, stiffness, inertia, speed, period)
     beside = (TORQUE, STIFFNESS, INERTIA, SPEED, PERIOD)

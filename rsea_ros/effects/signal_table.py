@@ -1,7 +1,7 @@
 """The named signals that an effect may read and change inside the compiled step.
 
 An effect's function gets the table as `s` and indexes it by these constants: `s[GEAR_TORQUE] -= …`.
-The step fills what can be read, calls the effects that are on, and uses what they changed.
+The step fills the signals to be read, calls the effects that are on, and uses the changed signals.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from enum import IntEnum
 class Port(IntEnum):
     """Where in the chain an effect acts; the step calls the ports in this order.
 
-    COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], what the measured
+    COMMAND: once a step, changes s[COMMAND], the mean over the step, and s[CURRENT], which the measured
         current shows at the end of the step.
-    MOTOR: once a step, changes s[COMMAND] after that: what the measured current does not show.
+    MOTOR: once a step, changes s[COMMAND] after that, which the measured current does not show.
     GEAR: at every evaluation of the torques, with the signals at the middle of the step; adds to
         s[GEAR_TORQUE], s[JOINT_TORQUE], s[HOUSING_TORQUE] or s[DISTAL_TORQUE].
     SPRING: likewise, adds to s[SPRING_TORQUE]; and once more at the end of the step with s[COMMIT] = 1:
-        then it may change its own states x, and what it adds is what the F/T sensor sees.
+        then it may change its own states x, and the torque that it adds is that at the F/T sensor.
     SENSOR: once a step, at its end; changes s[FT], s[POSITION], s[VELOCITY], s[SPRING_ANGLE] or
         s[CURRENT].
     STRUCTURE: not called; the effect changes the rig itself.
@@ -46,7 +46,7 @@ B_M = 9  # N m s/rad
 ROTOR_ANGLE = 10  # rad, rotor relative to the housing
 GEAR_ANGLE = 11  # rad, gear output before its own compliance, relative to the housing
 GEAR_VELOCITY = 12  # rad/s
-OUTPUT_ANGLE = 13  # rad, gear output relative to the housing: what the encoder sees
+OUTPUT_ANGLE = 13  # rad, gear output relative to the housing, as the encoder reads it
 OUTPUT_VELOCITY = 14  # rad/s
 DEFLECTION = 15  # rad, chassis against distal side
 DEFLECTION_RATE = 16  # rad/s
@@ -81,6 +81,6 @@ SENSED = 38  # 1, share of the spring's torque that the F/T sensor sees at once
 
 PLAY = 39  # rad, what the spring turns more than DEFLECTION: where in the play its chassis is
 SPRING_ANGLE = 40  # rad, deflection of the spring as its own encoder sees it
-TARGETED = 41  # 1 where positions command the bench: then REFERENCE is what its commands say
+TARGETED = 41  # 1 where positions command the bench: then REFERENCE is its command
 
 SIZE = 42

@@ -26,7 +26,7 @@ _LARGEST = 20.0
 
 @njit(inline="always")
 def reached(a, u):  # type: ignore[no-untyped-def]
-    """Return (1 - exp(-a u)) / a, what z gains from 0 over a way u, and its integral over the way."""
+    """Return (1 - exp(-a u)) / a, the gain of z from 0 over a path u, and its integral over the path."""
     x = a * u
     if abs(x) < _SMALL:
         series = 1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0))

@@ -12,7 +12,7 @@ from rsea_ros.effects.signal_table import DEFLECTION, DURATION, K_S, SPRING_TORQ
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Add what the stiffness has changed by so far, times the deflection."""
+    """Add the change of the stiffness so far, times the deflection."""
     s[SPRING_TORQUE] += s[K_S] * p[0] * (s[TIME] / s[DURATION]) * s[DEFLECTION]
 
 

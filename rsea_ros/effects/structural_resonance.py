@@ -18,7 +18,7 @@ Y, RATE, LAST, STARTED = range(4)
 
 @compiled
 def apply(s, p, x):  # type: ignore[no-untyped-def]
-    """Subtract the mode's inertia torque from what the sensor sees."""
+    """Subtract the mode's inertia torque from the sensor's torque."""
     w, h, torque = 2.0 * math.pi * p[0], s[STEP], s[FT]
     if x[STARTED] == 0.0:
         x[Y], x[LAST], x[STARTED] = torque / (w * w), torque, 1.0

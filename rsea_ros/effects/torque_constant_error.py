@@ -1,4 +1,4 @@
-"""Torque constant other than believed: the motor makes more or less torque than its current says.
+"""Wrong torque constant: the motor makes more or less torque than its current indicates.
 
     T_motor = gain · T_command
 
@@ -26,9 +26,9 @@ _LOW, _HIGH = 0.2, 3.0
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Begin at the torque constant, relative to the believed one, that the F/T torque shows.
+    """Begin at the torque constant, relative to the stated one, that the F/T torque shows.
 
-    The motion is the same when all that the motor works against is as much larger.
+    The motion is the same when every torque against the motor is larger by the same factor.
     """
     gain = view.gain("ft")
     if gain is None:

@@ -38,7 +38,7 @@ def apply(s, p, x):  # type: ignore[no-untyped-def]
 
 
 def guesses(defaults: Sequence[Guess], view: ResidualView) -> list[Guess]:
-    """Begin at what of the missing torque repeats with the rotor; without that there is no ripple."""
+    """Begin at the part of the missing torque that repeats with the rotor; without it there is no ripple."""
     return [{**defaults[0], **repeating} for repeating in view.repeating_torque()]
 
 

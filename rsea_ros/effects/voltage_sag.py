@@ -1,8 +1,8 @@
-"""Torque limit that falls with speed: what the supply's voltage leaves after the motor's own.
+"""Torque limit that falls with speed: the back-EMF of the motor uses up the supply's voltage.
 
     -limit · (1 + ω / no_load_speed) ≤ T_motor ≤ limit · (1 - ω / no_load_speed)
 
-limit is the torque at rest, ω the speed of the gear output against the housing. A supply that gives way under
+limit is the torque at rest, ω the speed of the gear output against the housing. A supply that sags under
 current, V = V_0 - R_b i, only makes the limit at rest smaller: the line stays straight. Source: Hughes,
 Drury, Electric Motors and Drives, 2013, section 3.4 (torque-speed line at constant voltage).
 """

@@ -1,4 +1,4 @@
-"""The answer offline: the run to play, or the proof that none helps and what to measure instead."""
+"""The offline answer: the run to play, or the proof that none helps and the measurements to make instead."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LONGEST_OF_ALL = 60.0
 
 @dataclass(frozen=True)
 class Proof:
-    """A pair that no run separates: the bound in the direction that is larger, and what to measure apart."""
+    """A pair that no run separates: the larger bound of both directions, and separate measurements."""
 
     bound: Bound
     apart: tuple[Apart, ...]
@@ -30,7 +30,7 @@ class Proof:
 class Advice:
     """proposal: the run, None where no run decides anything. proofs: of the pairs that none separates.
 
-    excluded: causes that the records so far speak against, with their probability.
+    excluded: causes that the records contradict, with their probability.
     """
 
     hypotheses: tuple[Hypothesis, ...]

@@ -40,7 +40,7 @@ class Apart:
 
 
 def measurements_apart(proved: Bound, true: Hypothesis, rival: Hypothesis) -> list[Apart]:
-    """Return what to measure apart: the sensors that show the causes themselves, then at most MOST values.
+    """Return separate measurements: the sensors that show the causes, then at most MOST values of the rig.
 
     A value of the rig separates by how far the rival must have it from the true one to do what that does,
     over ACCURACY; of those that separate, the easiest to measure come first.

@@ -3,8 +3,8 @@
 A run is a mixture in time of sines of the band, at several amplitudes and biases within the limits. If one
 set of the rival's values leaves, of every sine, at most a power p over the noise, no mixture of length T
 separates by more than S = p T, whatever its spectrum: the refit can only do better than these values. The
-values are sought to make the largest p smallest (Lawson's weights: each sine weighted by what was left of
-it). For linear rigs every spectrum is such a mixture; for others the bound speaks of the sines tried.
+values are chosen to make the largest p smallest (Lawson's weights: each sine weighted by its residual
+so far). For linear rigs every spectrum is such a mixture; for others the bound covers the sines tried.
 (Duality of the optimal design: Fedorov, Theory of Optimal Experiments, 1972.)
 """
 
@@ -35,10 +35,11 @@ HOPELESS = 6.0
 
 @dataclass(frozen=True)
 class Bound:
-    """What no run exceeds. true, rival: names. most: S of a run of `duration` s, of any spectrum in the band.
+    """A bound for every run.
 
+    true, rival: names. most: S of a run of `duration` s, of any spectrum in the band.
     frequency: Hz, rate: S a second at the worst level, shape (k,). values: the rival's, by name, SI, with
-    which it does what the true one does.
+    which it imitates the true one best.
     """
 
     true: str
@@ -124,7 +125,7 @@ def _powers(problem: Problem, theta: FloatArray) -> FloatArray:
 
 
 def _power(problem: Problem, case: Case, outputs: Mapping[str, FloatArray]) -> float:
-    """Return what is left of a case over the noise, squared and summed, a second."""
+    """Return the squared residual of a case over the noise, summed, per second."""
     parts: Sequence[float] = [
         float(np.sum(((outputs[n] - case.measured[n]) / case.noise[n]) ** 2)) for n in problem.present(case)
     ]

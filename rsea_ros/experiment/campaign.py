@@ -1,7 +1,7 @@
-"""The loop: weigh, propose, play, weigh what all runs say together, until it is known or cannot be.
+"""The loop: weigh, propose, play, weigh all runs together, until the cause is known or no run can show it.
 
-Nothing here knows how a run is played: `play` gets a proposal and returns its record, None where a person
-said no. It raises DeviceError for a run that broke; nothing is learnt from such a run and the loop ends.
+The loop does not know how a run is played: `play` gets a proposal and returns its record, None where a person
+refuses. It raises DeviceError for a run that broke off, which is discarded, and the loop ends.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ Play = Callable[[Proposal], Record | None]
 
 @dataclass(frozen=True)
 class Budget:
-    """What the loop may spend. seconds: of excitation. energy: N^2 m^2 s, the integral of the squared torque,
-    which the heat in the winding follows. runs: at most.
+    """The budget of the loop. seconds: of excitation. energy: N^2 m^2 s, the integral of the squared torque,
+    proportional to the heat in the winding. runs: at most.
     """
 
     seconds: float = 60.0
@@ -53,7 +53,7 @@ class Rules:
     """When the loop ends. confirmed: probability of a cause. possible: probability from which it is still one
     that a run is designed for. floor: RMS over the noise above which the best cause leaves something else.
     by_data: S by which the data alone must prefer the best to every other of no more parameters, so that no
-    name rests on what is usual. worth: share that the next run must be expected to decide. most: causes for
+    name rests on its prior. worth: share that the next run must be expected to decide. most: causes for
     which a run is designed. larger: than all runs before, by which a run that decides nothing by itself is
     worth playing, while it uses less than held_back of the limits at the likeliest values.
     """
@@ -70,7 +70,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Round:
-    """What was known before a run, and the run. proposal: None in the last one."""
+    """The knowledge before a run, and the run. proposal: None in the last round."""
 
     weighing: Weighing
     proposal: Proposal | None
@@ -79,7 +79,7 @@ class Round:
 @dataclass(frozen=True)
 class Outcome:
     """How the loop ended. proofs: of pairs that no run separates. records: those that count, the first ones
-    included. why: what broke, in words.
+    included. why: the failure, in words.
     """
 
     end: End
@@ -90,7 +90,7 @@ class Outcome:
 
     @property
     def weighing(self) -> Weighing:
-        """What all runs say together."""
+        """The weighing by all runs together."""
         return self.rounds[-1].weighing
 
     @property
@@ -106,7 +106,7 @@ class Outcome:
 
 @dataclass
 class _Session:
-    """What there is so far."""
+    """The state of a campaign."""
 
     records: list[Record]
     weighing: Weighing
@@ -119,7 +119,7 @@ class _Session:
 
 @dataclass
 class Campaign:
-    """A bench, the causes it may have, what runs may do. hear: is given each round as it begins."""
+    """A bench, its possible causes, the limits of runs. hear: called with each round at its start."""
 
     rig: Rig
     causes: Sequence[str]
@@ -134,7 +134,7 @@ class Campaign:
     """How the next run is chosen; a bench puts other policies here."""
 
     def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
-        """Go round from some records until the loop ends. first: what they say, where it is known.
+        """Run the loop from some records to its end. first: their weighing, if known.
 
         Raises IdentificationError where nothing can be fitted to them.
         """
@@ -155,7 +155,7 @@ class Campaign:
         return [h for h in every if h.probability >= self.rules.possible or h.name in near][: self.rules.most]
 
     def _round(self, session: _Session) -> Outcome | None:
-        """Design a run and have it played; return how the loop ended, None where it goes on."""
+        """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
         if end := self._known(weighing) or self._spent(session.rounds):
             return session.ended(end)
@@ -179,7 +179,7 @@ class Campaign:
         return None
 
     def _known(self, weighing: Weighing) -> End | None:
-        """Return how the loop ends by what is known, None where it goes on."""
+        """Return the outcome by present knowledge, None where the loop continues."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None
         if weighing.near_by_data(self.rules.by_data):

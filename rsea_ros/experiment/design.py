@@ -1,8 +1,8 @@
-"""Design of a run: the shape and length that decide most for each second, within limits that hold in doubt.
+"""Design of a run: the shape and length that decide most per second, within limits for every possible bench.
 
 Shapes of every kind are tried, the best is refined by Nelder and Mead's method (scipy), which needs no smooth
-objective: gear friction and stops make none. Judged by simulation with the compiled step: separation.py says
-by what. The final amplitude is the largest at which margins.py holds all limits.
+objective: gear friction and stops give none. Shapes are rated by simulation with the compiled step;
+separation.py has the measure. The final amplitude is the largest at which margins.py keeps all limits.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _hopeless(judge: Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray
 
 
 def _per_second(judge: Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
-    """Return what a shape decides a second, and the length, for several lengths of the run."""
+    """Return the share that a shape decides per second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
@@ -139,10 +139,10 @@ def _final(judge: Judge, shape: Shape, length: float, apart: BoolArray, tried: i
 
 
 def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[FloatArray, Peaks]:
-    """Return a command as large as the limits allow for all that the bench may be, and its peaks.
+    """Return a command as large as the limits allow for every possible bench, and its peaks.
 
-    By bisection, for what a bench may do at its worst is no straight line of the command. Raises
-    ParameterError where not even a SMALLEST share of it keeps the limits.
+    By bisection, because the worst response is not linear in the command. Raises
+    ParameterError where even a SMALLEST share of it breaks the limits.
     """
     low, high, best = math.log(_SMALLEST), 0.0, None
     scale = high

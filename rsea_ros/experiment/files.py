@@ -36,7 +36,7 @@ def model_of(rig: Rig) -> Model:
 
 
 def hypotheses_from(models: Sequence[Model]) -> list[Hypothesis]:
-    """Return models as hypotheses; those without a probability share what the others leave, equally.
+    """Return models as hypotheses; those without a probability share the rest equally.
 
     Raises ParameterError for two models of one name and for less than one.
     """

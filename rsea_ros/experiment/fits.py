@@ -1,4 +1,4 @@
-"""Fits of a cause to records, from several starts: many have minima that are none."""
+"""Fits of a cause to records, from several starts, because many have local minima."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _smaller(name: str, guesses: Sequence[Guess]) -> list[Guess]:
 def fitted_again(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
     """Return the fits, those that left a little more than the best once more from the rig's values there.
 
-    A fit that began far from where the rig's own values end may stop in a place that is none.
+    A fit that began far from the final values of the rig may stop in a local minimum.
     """
     best = min(fits.values(), key=lambda s: s.cost)
     rig = {u.name: float(v) for u, v in zip(best.problem.unknowns, best.theta, strict=True)}
@@ -65,7 +65,7 @@ def fitted_again(fits: Mapping[str, Solution], run: Map) -> dict[str, Solution]:
 
 
 def _best(problem: Problem, thetas: Sequence[FloatArray], run: Map) -> FloatArray:
-    """Return the start of the least cost; fits that begin far off may end in a place that is none."""
+    """Return the start of the least cost; fits that begin far off may end in a local minimum."""
     if len(thetas) == 1:
         return thetas[0]
     costs = run(lambda k: np.array([_cost(problem, thetas[k])]), range(len(thetas)))

@@ -1,4 +1,4 @@
-"""A hypothesis: the rig with one cause, and what is known of its numbers; and its response to a command."""
+"""A hypothesis: the rig with one cause, the knowledge of its numbers, and its response to a command."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ class Hypothesis:
         return result
 
     def draws(self, count: int, rng: np.random.Generator) -> list[Rig]:
-        """Return rigs whose values are drawn from what is known of them."""
+        """Return rigs whose values are drawn from their posterior."""
         factor = np.linalg.cholesky(np.linalg.inv(self.information))
         moved = self.theta + rng.standard_normal((count, len(self.theta))) @ factor.T
         return [self.rig_at(theta) for theta in moved]
 
     def if_there(self) -> FloatArray:
-        """Return the values to be expected if the cause is there, shape (n,).
+        """Return the values to be expected if the cause is present, shape (n,).
 
-        The most likely ones; where its size may as well be none, a standard deviation away from that, and the
-        others as they go with it: a run has to be judged by what it would show of the cause.
+        The most likely ones; where its size may as well be zero, one standard deviation from zero, and the
+        others as they correlate with it: a run is rated by what it would show of the cause.
         """
         if not self.own:
             return self.theta
@@ -89,7 +89,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Response:
-    """What a hypothesis predicts of a run, over the sensors' noise.
+    """The prediction of a hypothesis for a run, over the sensors' noise.
 
     if_there: with the values to be expected if it is true, shape (m,). predicted, slope: at its most likely
     values, (m,), with derivatives, (m, n), from which it is fitted where another is true.
@@ -123,7 +123,7 @@ def run_case(command: FloatArray, rate: float, noise: Mapping[str, float], *, is
 
 
 def response(hypothesis: Hypothesis, case: Case, run: Map = serial) -> Response:
-    """Return what a hypothesis predicts of a case."""
+    """Return the prediction of a hypothesis for a case."""
     problem = replace(hypothesis.problem, cases=(case,))
     predicted = problem.residual(hypothesis.theta)
     slope = jacobian(problem, hypothesis.theta, predicted, run)

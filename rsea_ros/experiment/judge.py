@@ -1,4 +1,4 @@
-"""Judges shapes: scales them to the limits and simulates what each hypothesis predicts of them."""
+"""Rates shapes: scales them to the limits and simulates the prediction of each hypothesis."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Judge:
         return used(found, self.asked.limits)
 
     def responses(self, command: FloatArray, *, is_quick: bool = True) -> list[Response]:
-        """Return what each hypothesis predicts of a command."""
+        """Return the prediction of each hypothesis for a command."""
         case = self.case(command, is_quick=is_quick)
         return [response(h, case, self.run) for h in self.hypotheses]
 

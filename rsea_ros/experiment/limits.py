@@ -1,4 +1,4 @@
-"""What a run may ask of a bench, and by how much a command or its response comes near to that."""
+"""Limits of a run, and the peaks of a command and its response against them."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Limits:
 
 
 def limits_from(text: str) -> Limits:
-    """Return the limits of `torque=20,velocity=0.5`. Raises ParameterError for what is not of that form."""
+    """Return the limits of `torque=20,velocity=0.5`. Raises ParameterError for text of another form."""
     values: dict[str, float] = {}
     for item in filter(None, text.split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
@@ -79,7 +79,7 @@ def limits_from(text: str) -> Limits:
 
 
 def of_command(command: FloatArray, rate: float) -> dict[str, float]:
-    """Return what a command asks by itself: its size, its slew, its RMS while it is not at rest. rate: Hz."""
+    """Return the peaks of a command itself: its size, its slew, its RMS while it is not at rest. rate: Hz."""
     around = np.concatenate([[0.0], command, [0.0]])
     return {
         "torque": float(np.max(np.abs(command))),

@@ -1,9 +1,9 @@
-"""Limits held although the bench is not known: a chance constraint over its values.
+"""Limits that hold for an uncertain bench: a chance constraint over its values.
 
 For each cause that may be true, the largest of every limited quantity is simulated at the most likely values
-and at both ends of every principal axis of what is known of them, z standard deviations away, and half-way
-there. The increases add up as squares: for a peak that goes straight with the values that is the quantile of
-z, for one that bends the simulated ends count. z is such that all causes together, each by its probability,
+and at both ends of every principal axis of their posterior, z standard deviations away, and half-way
+to them. The increases add up as squares: for a peak linear in the values that is the quantile of
+z, for another one the simulated ends count. z is such that all causes together, each by its probability,
 break a limit with less than 1 - LEVEL. (First-order reliability: Hasofer, Lind, J. Eng. Mech. 100, 1974.)
 """
 

@@ -19,6 +19,6 @@ SHORTEST = 4.2
 def diagnosed(
     records: Sequence[Record], rig: Rig, causes: Sequence[str], tell: Progress | None = None
 ) -> Diagnosis:
-    """Return what the diagnosis says of all records together: it weighs by held-out data."""
+    """Return the diagnosis of all records together, which weighs causes by held-out data."""
     others = tuple(name for name in catalogue() if name not in causes)
     return diagnose(list(records), rig, None, tell, DiagnosisSettings(without=others))

@@ -1,4 +1,4 @@
-"""What is known of a cause before any data: that it may be nothing, and how large such causes are."""
+"""The prior of a cause: it may be zero, and its usual size."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SPAN = 0.25
 
 
 def problem_of(name: str, rig: Rig, cases: Sequence[Case]) -> Problem:
-    """Return the fit of a rig with one cause (or nothing) beside what it states."""
+    """Return the problem of a rig with one more cause, or none."""
     nominal = unknowns_of(rig, cases)
     stated = frozenset(e.name for e in rig.effects)
     if name == NOTHING:

@@ -1,4 +1,4 @@
-"""What a design may do, and the run that comes of it."""
+"""The request for a design, and the resulting run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rsea_ros.signals import FloatArray
 
 @dataclass(frozen=True)
 class Asked:
-    """What a design may do. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
+    """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
 
     limits: Limits
     rate: float = 280.0
@@ -34,9 +34,9 @@ class Asked:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A run to be played, and what is expected of it.
+    """A run to be played, and its expected results.
 
-    duration: s, of what is excited; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
+    duration: s, of the excitation; command: N m, at `rate` Hz, shape (n,), with rest around it. names,
     table: S_ij with i true and j its rival. hopeless: pairs that no shape tried separates. decided: expected
     share that it decides; sharpened: nats by which it narrows the parameters where one cause is left.
     expected, at_level: peaks of every quantity.

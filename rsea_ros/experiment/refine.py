@@ -50,7 +50,7 @@ def _inner(name: str, value: float) -> float:
 
 
 def _outer(name: str, x: float, asked: Asked) -> float:
-    """Return the value of a shape's number inside what makes sense for it."""
+    """Return the value of a shape's number within its sensible range."""
     value = math.exp(min(x, 50.0)) if name in _LOGARITHMIC else x
     low, high = {
         "bias": (-0.8, 0.8),

@@ -24,7 +24,7 @@ ENOUGH = 12.0
 
 
 def separation(true: Response, rival: Response, information: FloatArray) -> float:
-    """Return S of a rival, with what is known of its numbers."""
+    """Return S of a rival, with the priors of its numbers."""
     left = rival.predicted - true.if_there
     if not np.isfinite(left).all():
         return 0.0
@@ -46,8 +46,10 @@ def separations(hypotheses: Sequence[Hypothesis], responses: Sequence[Response])
 
 @dataclass(frozen=True)
 class Refit:
-    """A rival fitted to what another predicts. total: S; data: what of it the run shows, without what the
-    rival pays for leaving what is known of its numbers: that grows with the run's length, the rest does not.
+    """A rival fitted to the prediction of another.
+
+    total: S; data: its part from the run, without the cost to the
+    rival of leaving its priors; only the part from the run grows with its length.
     """
 
     total: float

@@ -1,4 +1,4 @@
-"""The shape of a run: a few numbers from which the command of a given length is made, N m.
+"""The shape of a run: a few numbers that determine the command (N m) of a given length.
 
 Every run begins and ends at zero torque under a raised cosine. Multisines have phases of low crest:
 Schroeder's, then made flatter by clipping (Schroeder, IEEE Trans. Inf. Theory 16, 1970; van der Ouderaa,
@@ -30,7 +30,7 @@ _HOLDS = np.array([0.35, 0.7, 1.0, 0.7, 0.35, 0.0, -0.35, -0.7, -1.0, -0.7, -0.3
 
 @dataclass(frozen=True)
 class Shape:
-    """What a run looks like; see KINDS.
+    """The form of a run; see KINDS.
 
     amplitude: N m, peak of the moving part. bias: N m, held beside it. low, high: band, Hz, of multisine and
     chirp. tilt: an amplitude goes with frequency to the power of -tilt, 1. hold: s, of one level of steps (up
@@ -50,7 +50,7 @@ class Shape:
 def command_of(shape: Shape, duration: float, rate: float, slew: float = np.inf) -> FloatArray:
     """Return the command of a shape, N m, shape (n,), at rest for LEAD before it and TAIL after it.
 
-    duration: s, of what moves, its ramps and rest included. slew: N m/s. Where its change from sample to
+    duration: s, of the excitation, its ramps and rest included. slew: N m/s. Where its change from sample to
     sample would be faster, a multisine or chirp gets smaller and a step becomes a ramp.
     """
     n = round(duration * rate)

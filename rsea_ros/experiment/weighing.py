@@ -6,8 +6,8 @@ The logarithm of the evidence is Laplace's, with priors on the rig's values and 
     ln p(data | cause) = -C / (2 k) - (ln det(J'J / k + L) - ln det L) / 2
 
 C: cost of the fit, prior included; L: the prior's information; k: the variance that the best fit leaves, in
-units of the noise, not below 1. A cause of which the data show nothing weighs as much as nothing does: it
-stays possible until a run could have shown it. Every cause is as likely as any other beforehand. (MacKay,
+units of the noise, not below 1. A cause that the data cannot show weighs as much as no cause: it
+stays possible until a run could have shown it. All causes have the same prior probability. (MacKay,
 Neural Computation 4, 1992.)
 """
 
@@ -43,7 +43,7 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Weighing:
-    """What all records say. probability: by cause, of those that were not given up before, which sum to 1."""
+    """The result from all records. probability: by cause, for those not dropped before; they sum to 1."""
 
     cases: tuple[Case, ...]
     fits: Mapping[str, Weighed]
@@ -63,7 +63,7 @@ class Weighing:
     def near_by_data(self, least: float) -> list[str]:
         """Return the causes of no more parameters than the best that fit less than `least` worse, in S.
 
-        By the data alone, whatever the priors say of them.
+        By the data alone, without their priors.
         """
         best = self.fits[self.best].solution
         others = {n: f.solution for n, f in self.fits.items() if n != self.best}
@@ -116,7 +116,7 @@ def weigh(
 ) -> Weighing:
     """Weigh causes, and that there is none, by all records of a bench.
 
-    before: what the earlier ones of the records said; fits go on from there, and what was HOPELESS is left
+    before: the weighing of the earlier records; fits continue from it, and HOPELESS causes are left
     out. Raises IdentificationError for records from which nothing can be fitted.
     """
     cases = cases_of(records, rig)

@@ -1,1 +1,1 @@
-"""Rigs for other programs: what each can say of a rig and its effects in its own terms, what it cannot."""
+"""Rigs for other programs: the parts of a rig and its effects that each can represent, and the others."""

@@ -64,7 +64,7 @@ def _model(effects: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def _dry(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
-    """Return what does not depend on the load."""
+    """Return the parameters that do not depend on the load."""
     base = effects.get("coulomb_friction", {}).get("torque", 0.0)
     if base:
         said.append(Said("coulomb_friction", "friction_base"))
@@ -83,7 +83,7 @@ def _dry(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[s
 
 
 def _load(effects: Mapping[str, Mapping[str, float]], said: list[Said]) -> dict[str, float]:
-    """Return what depends on the load."""
+    """Return the parameters that depend on the load."""
     model, name = _model(effects), "directional_load_friction"
     if model in ("m3", "m4"):
         said.append(Said("load_dependent_friction", "load_friction_base, half of the coefficient"))

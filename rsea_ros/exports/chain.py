@@ -67,7 +67,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Chain:
-    """links and joints from the world on. left_out: what of the rig the chain has no place for, and why."""
+    """links and joints from the world on.
+
+    left_out: parts of the rig without a place in the chain, and why.
+    """
 
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
@@ -148,7 +151,7 @@ def _to_world(rig: Rig, end: str, name: str) -> Joint:
 
 
 def _left_out(rig: Rig) -> dict[str, str]:
-    """Return what acts between parts that are no neighbours in the chain."""
+    """Return the elements between parts that are not neighbours in the chain."""
     left = {}
     free = [end for end in ("housing_end", "spring_end") if rig.end_is_free(end)]
     far = free if len(free) == 1 else free[1:]

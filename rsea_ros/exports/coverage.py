@@ -1,4 +1,4 @@
-"""What a target says of a rig, and what it leaves out."""
+"""The parts of a rig that a target represents, and those that it leaves out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Said:
 
 @dataclass(frozen=True)
 class Unsaid:
-    """Something of a rig that the file leaves out. why: what the target lacks."""
+    """A part of a rig that the file leaves out. why: the feature that the target lacks."""
 
     name: str
     why: str
@@ -28,7 +28,7 @@ class CannotSay(Exception):
 
 @dataclass(frozen=True)
 class Export:
-    """The file for a target, and what it says and leaves out. content: text or the bytes of an archive."""
+    """The file for a target, with exported and omitted parts. content: text or the bytes of an archive."""
 
     target: str
     suffix: str

@@ -36,7 +36,7 @@ class Difference:
 
 
 def ours(rig: Rig, command: FloatArray, rate: float) -> dict[str, FloatArray]:
-    """Return what our simulation of a rig measures at the begin of each command's hold.
+    """Return the measurements of our simulation of a rig at the beginning of each command's hold.
 
     command: N m, or target rad of a rig with a position loop. rate: Hz.
     """

@@ -22,7 +22,7 @@ SLAVE = Path(__file__).with_name("_fmu_slave.py")
 
 def export_fmu(rig: Rig) -> Export:
     """Return the archive of a rig. Raises ParameterError without pythonfmu3, and as a simulation does."""
-    build(rig, STEP, 1.0, in_loop=rig.loop is not None)  # what it refuses, the FMU would only in its player
+    build(rig, STEP, 1.0, in_loop=rig.loop is not None)  # otherwise the FMU would refuse it only when played
     try:
         from pythonfmu3 import FmuBuilder
     except ImportError:

@@ -15,7 +15,7 @@ from rsea_ros.signals import FloatArray
 
 
 def play_fmu(archive: bytes, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
-    """Return what the exported rig measures at the begin of each command's hold.
+    """Return the measurements of the exported rig at the beginning of each command's hold.
 
     command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without FMPy.
     """

@@ -106,5 +106,5 @@ def _file(
 
 
 def _plain(text: str) -> str:
-    """Return text that cannot end the docstring it stands in."""
+    """Return text that cannot end the docstring around it."""
     return text.replace("\\", "/").replace('"', "'")

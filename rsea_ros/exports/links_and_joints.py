@@ -1,6 +1,6 @@
-"""A rig as a chain of links and joints in XML, with a block of our own for what the format has no words for.
+"""A rig as a chain of links and joints in XML, with our own block for everything that the format lacks.
 
-The block holds every value and effect of the rig; other programs pass it by.
+The block holds every value and effect of the rig; other programs ignore it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ Frame = Callable[[str], tuple[xml.Element, xml.Element]]
 
 @dataclass(frozen=True)
 class Language:
-    """How a format writes a chain. block: the tag of what holds every value and effect of the rig."""
+    """The spelling of a chain in a format.
+
+    block: the tag of the block with all values and effects of the rig.
+    """
 
     target: str
     has_springs: bool
@@ -47,7 +50,7 @@ def export_chain(rig: Rig, language: Language) -> Export:
 
 
 def _coverage(rig: Rig, chain: Chain, *, has_springs: bool) -> tuple[tuple[Said, ...], tuple[Unsaid, ...]]:
-    """Return what the joints say, and what only the block does."""
+    """Return the parts in the joints, and those in the block alone."""
     only = "only in the block rsea"
     said = [Said(one.name, _how(one, has_springs)) for one in chain.joints]
     unsaid = [Unsaid(name, f"{why}; {only}") for name, why in chain.left_out.items()]

@@ -20,7 +20,10 @@ from rsea_ros.model.structure import structured
 
 
 def export_mjcf(rig: Rig) -> Export:
-    """Return the model of a rig. Raises RigError for what no MJCF can be made of (see design/mjcf.py)."""
+    """Return the model of a rig.
+
+    Raises RigError for a rig that MJCF cannot represent (see design/mjcf.py).
+    """
     check_rotary(rig)
     rig = acting(rig)
     finite = sized(rig)
@@ -53,6 +56,6 @@ def play_of(rig: Rig) -> float:
 
 
 def unsaid_of(rig: Rig) -> list[Unsaid]:
-    """Return what of the rig itself, without its effects, the model leaves out."""
+    """Return the parts of the rig itself, without its effects, that the model leaves out."""
     noise = "sensors of MJCF are those of perfect instruments; the rig's noise and quanta stay with the rig"
     return [Unsaid("sensor noise", noise)] if rig.sensors else []

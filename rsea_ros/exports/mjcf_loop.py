@@ -12,7 +12,7 @@ from rsea_ros.model.rig import Rig
 
 
 def say_loop(rig: Rig, root: xml.Element) -> tuple[Said, list[Unsaid]]:
-    """Turn the motor into the loop's actuator; return what it says and what it leaves out."""
+    """Turn the motor into the loop's actuator; return exported and omitted parts."""
     if rig.loop is None:
         return Said("motor", "motor on the tendon output - housing"), []
     gains = _gains(rig)

@@ -14,12 +14,14 @@ from rsea_ros.exports.difference import RATE
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
+PIECE = 100
+"""Commands that are played in one call, which serves no signal until it returns."""
 BESIDE = ("spring", "hard_stop", "hysteresis_")
 """How the names of sums of hinges begin whose torque the F/T sensor sees."""
 
 
 def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, FloatArray]:
-    """Return what the bench of an exported rig measures at the begin of each command's hold.
+    """Return the measurements of an exported rig's bench at the beginning of each command's hold.
 
     command: N m, or target rad of a rig with a position loop, at RATE. Raises ParameterError without MuJoCo,
     and for a model that MuJoCo refuses.
@@ -30,17 +32,12 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ParameterError(f"MuJoCo {mujoco.__version__} refuses the model: {reason}") from None
-    data, hold = mujoco.MjData(model), round(1.0 / RATE / STEP)
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    state = np.zeros(mujoco.mj_stateSize(model, kind))
-    mujoco.mj_getState(model, data, state, kind)
-    control = np.zeros((1, hold * len(command), model.nu))
-    control[0, :, 0] = np.repeat(command, hold)
+    hold = round(1.0 / RATE / STEP)
     names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SENSOR, i) for i in range(model.nsensor)]
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)  # else it writes them into a file in the working directory
     try:
-        sensed = rollout.rollout(model, data, state[None], control)[1][0]
+        sensed = _sensed(mujoco, rollout, model, np.repeat(command, hold), PIECE * hold)
     finally:
         mujoco.set_mju_user_warning(None)
     if warnings:
@@ -49,8 +46,27 @@ def play_mujoco(model_text: str, rig: Rig, command: FloatArray) -> dict[str, Flo
     return {name: y[::hold] for name, y in _channels(rig, model_text, read).items()}
 
 
+def _sensed(mujoco: Any, rollout: Any, model: Any, torque: FloatArray, piece: int) -> FloatArray:
+    """Return what the model's sensors read at every step, shape (steps, sensors).
+
+    torque: of every step, N m or target rad. piece: steps that are played in one call.
+    """
+    data, kind = mujoco.MjData(model), mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.zeros(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, data, state, kind)
+    sensed = []
+    for first in range(0, len(torque), piece):
+        control = np.zeros((1, len(torque[first : first + piece]), model.nu))
+        control[0, :, 0] = torque[first : first + piece]
+        warm = data.qacc_warmstart.copy()
+        states, read = rollout.rollout(model, data, state[None], control, initial_warmstart=warm[None])
+        state = states[0, -1]
+        sensed.append(read[0])
+    return np.concatenate(sensed)
+
+
 def _channels(rig: Rig, model_text: str, read: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return the rig's channels from what the model's sensors read at every step."""
+    """Return the rig's channels from the readings of the model's sensors at every step."""
     position, velocity = read["output"], read["output_rate"]
     if rig.encoder_end == "spring_end":
         for name in ("deflection", "play"):

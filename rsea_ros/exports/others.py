@@ -1,4 +1,4 @@
-"""What targets without a spring or without dynamics of sensors leave out, said in one place."""
+"""Parts that targets without a spring or without sensor dynamics leave out."""
 
 from __future__ import annotations
 

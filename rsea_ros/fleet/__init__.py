@@ -1,6 +1,6 @@
 """A fleet over months: many bags of many joints become rows of one Parquet store, on Dask or without it.
 
-`history` and `recordings` read a store as columns; `rsea fleet` is the command line of all of it.
+`history` and `recordings` read a store as columns; `rsea fleet` is the command line.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Alarms as files, one each, never twice: the store remembers reported alarms.
 
-A file is what Prometheus' Alertmanager sends to a webhook, so that whatever takes that takes these.
+A file has the form that Prometheus' Alertmanager sends to a webhook, so that any such receiver accepts it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FOLDER = "alarms"
 
 @dataclass(frozen=True)
 class Told:
-    """A new alarm. file: its path. text: what happened, in a sentence."""
+    """A new alarm. file: its path. text: the event in a sentence."""
 
     file: Path
     text: str
@@ -37,7 +37,7 @@ class Told:
 def tell_alarms(store: Store) -> list[Told]:
     """Write a file for each alarm that the store has not reported before, and return those.
 
-    Two at once write each alarm once. Raises OSError where the store cannot be written.
+    Two processes at once write each alarm once. Raises OSError where the store cannot be written.
     """
     folder = store.path / FOLDER
     make_folder(folder)
@@ -80,7 +80,7 @@ def webhook(alarm: Alarm) -> dict[str, Any]:
 
 
 def sentence(alarm: Alarm) -> str:
-    """Return what happened: joint, what, how much, since when."""
+    """Return a sentence on the event: joint, cause, size, date."""
     since = f" since {_time(alarm.since_s)[:10]}" if math.isfinite(alarm.since_s) else ""
     if alarm.size is None:
         return f"{alarm.joint}: {alarm.about} ({alarm.kind}){since}"

@@ -1,4 +1,4 @@
-"""One recording of one joint: read, checked, identified, diagnosed where that is asked for."""
+"""One recording of one joint: read, checked, identified and, on request, diagnosed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _MAIN = ("ft", "deflection", "position", "velocity")
 def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
     """Fill a row from a recording, and return the artefacts by file name.
 
-    What is known before an error stands in the row. Raises RseaError for a recording that cannot be used.
+    The row keeps the results before an error. Raises RseaError for a recording that cannot be used.
     """
     rig = rig_from_document(strict_yaml.parse(joint.rig).content, default_name=joint.name)
     run = read_run(path, url, joint)
@@ -61,7 +61,7 @@ def analyse(row: Row, path: Path, url: str, joint: Joint) -> dict[str, str]:
 
 
 def _fit_for_fit(run: Run, rig: Rig) -> Record:
-    """Return the run without the samples that the checks mask; strictly read where none are."""
+    """Return the run without the samples that the checks mask."""
     checked = check(bounded(run.lenient), rig)
     measured = [n for n in checked.record.channels if n not in ("command", "reference")]
     if not any(checked.masked[n].any() for n in measured if n in checked.masked):
@@ -72,10 +72,10 @@ def _fit_for_fit(run: Run, rig: Rig) -> Record:
 
 
 def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
-    """Fill in the diagnosis, and return its artefacts. One that cannot be made leaves its reason.
+    """Fill in the diagnosis, and return its artefacts; a failed one leaves its reason.
 
     The parameters become those beside the causes: a fit without them takes dry friction for damping and
-    backlash for a softer spring, by as much as the work of the day makes of it (docs/fleet-trends.md).
+    backlash for a softer spring, by an amount that depends on the day's work (docs/fleet-trends.md).
     """
     from rsea_ros.diagnosis.diagnose import diagnose
     from rsea_ros.report.diagnosis.json import diagnosis_json
@@ -97,7 +97,7 @@ def _diagnosed(row: Row, record: Record, rig: Rig) -> dict[str, str]:
 
 
 def identified(result: Identification) -> dict[str, Any]:
-    """Return what an identification says, as columns of the row."""
+    """Return the results of an identification as columns of the row."""
     times = result.times_noise
     main = next((n for n in _MAIN if n in times), next(iter(times), ""))
     return {
@@ -125,7 +125,7 @@ def _cause(cause: Any) -> dict[str, Any]:
 
 
 def excitation(record: Record) -> list[dict[str, Any]]:
-    """Return how much the run moved: size and band of what drove it, and the travel of the output."""
+    """Return the excitation of the run: size and band of the command, and the travel of the output."""
     figures: list[tuple[str, float, str]] = []
     name = next((n for n in ("command", "reference") if n in record), "")
     if name:

@@ -45,7 +45,7 @@ COUNTED_EVERY = 10.0
 class OnDask:
     """Runs jobs on a cluster; at most PER_WORKER for each worker are in flight.
 
-    refill: starts workers anew in the place of those that nobody restarts, killed before they were up.
+    refill: restarts workers that were killed before they were up, which nothing else restarts.
     """
 
     def __init__(self, client: Any, refill: Callable[[], object] = lambda: None) -> None:
@@ -138,5 +138,5 @@ def cores() -> int:
 
 
 def memory_for(workers: int) -> int:
-    """Return the bytes that each of some workers may have: what Dask takes for this machine's, shared."""
+    """Return the memory (bytes) of each worker: Dask's value for this machine, divided."""
     return int(0.9 * distributed.system.MEMORY_LIMIT / workers)

@@ -1,4 +1,4 @@
-"""A store as columns: what reports and trends are made from."""
+"""A store as columns, for reports and trends."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def history(store: str | Path) -> Columns:
 
     Columns, shape (n,): joint, parameter, unit, recording, artefacts (text); time_s (s since 1970, NaN where
     unknown), value, low, high (in unit), temperature (°C, NaN where unknown); identifiable (bool).
-    Raises FleetError for what is no store.
+    Raises FleetError for a folder that is not a store.
     """
     return _columns(store, _HISTORY)
 
@@ -41,7 +41,7 @@ def recordings(store: str | Path) -> Columns:
 
     Columns, shape (n,): those of the row that are one value (text, float; time_s as in history; verdict: of
     the diagnosis where there is one); faults and causes: a list of dicts each, as in the row.
-    Raises FleetError for what is no store.
+    Raises FleetError for a folder that is not a store.
     """
     return _columns(store, _RECORDINGS)
 

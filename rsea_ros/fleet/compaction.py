@@ -1,7 +1,7 @@
 """Many files of one row become one file of many rows.
 
-The new file names those that it replaces; it gets its name first, then they go. Killed in between, it leaves
-rows twice, which every reader of this package counts once, until the next run takes the rest away.
+The new file lists those that it replaces; it gets its name before they are removed. A kill in between leaves
+rows twice, which every reader of this package counts once, until the next run removes the old files.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _KEY = ("recording", "model_version", "settings")
 
 
 def compact(folder: Path) -> None:
-    """Make one file of a partition's rows, those twice there counted once. Raises OSError."""
+    """Make one file of a partition's rows, duplicates counted once. Raises OSError."""
     files = sorted(folder.glob("*.parquet"))
     if len(files) > 1:
         _replace(folder, files, _once(pa.concat_tables([read(file) for file in files])))
@@ -47,7 +47,7 @@ def take_out(rows: Path, outcomes: Collection[str]) -> None:
 
 
 def finish(rows: Path) -> None:
-    """Take away what compactions that were killed have replaced but not removed. Raises OSError."""
+    """Remove the files that killed compactions have replaced but not removed. Raises OSError."""
     for folder in rows.glob("joint=*/month=*"):
         for part in folder.glob(f"{_PART}*.parquet"):
             _remove(folder, json.loads(metadata(part).get(_REPLACES, b"[]")))

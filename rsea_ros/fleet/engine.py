@@ -1,7 +1,7 @@
-"""The engine: which recordings are new, what is in flight, what is tried again, what is written.
+"""The engine: it finds new recordings, runs and repeats tasks, and writes their rows.
 
 One loop in one process: it alone writes to the store. A recording that the store does not know by path, bytes
-and stamp is fingerprinted first; its content says whether it is new.
+and stamp is fingerprinted first; its content decides whether it is new.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Limits:
 
 
 class Engine:
-    """One run over some recordings. work: what a task does, on whatever process the executor has."""
+    """One run over some recordings. work: the function of a task, called in a process of the executor."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class Engine:
         self._summary = Summary()
 
     def run(self, held: Sequence[Held]) -> Summary:
-        """Work through recordings with the joints that they hold; return what came of it.
+        """Process recordings with the joints that they hold; return a summary.
 
         Raises FleetError where the scheduler is lost, OSError where the store cannot be written.
         """
@@ -105,7 +105,7 @@ class Engine:
         return None
 
     def _look_at(self, bag: Bag) -> None:
-        """Plan the tasks of a recording that the store knows; of any other, ask for its fingerprint."""
+        """Plan the tasks of a recording that the store knows; request the fingerprint of any other."""
         recording = self._recordings.get((bag.url, bag.size, bag.stamp))
         if recording is None:
             self._ready.append(Job(read_fingerprint, bag))
@@ -135,7 +135,7 @@ class Engine:
         return f"{size}, a worker may have {limit / 1e9:.3g} GB: fewer workers or --memory, then --again"
 
     def _take(self, done: Done) -> None:
-        """Write what a task has left, plan the task of a fingerprint, or try again."""
+        """Write the outcome of a task, plan the task of a fingerprint, or try again."""
         job = done.job
         if isinstance(done.error, WorkerLost) and job.attempt + 1 < ATTEMPTS:
             due = time.monotonic() + self._limits.back_off * 2.0**job.attempt

@@ -1,4 +1,4 @@
-"""What can go wrong with a fleet as a whole; what is wrong with one bag is a row of the store."""
+"""Errors of a fleet as a whole; an error in one bag is a row of the store."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from rsea_ros.errors import FieldError, RseaError
 
 
 class FleetError(RseaError, ValueError):
-    """A source, a store or a cluster that cannot be used as asked."""
+    """A source, a store or a cluster that cannot be used."""
 
 
 class JointMapError(FieldError):

@@ -1,4 +1,4 @@
-"""Where tasks run: here, one after another, or on Dask's workers. The engine speaks to either in this way."""
+"""The interface of executors: tasks run in this process, one after another, or on Dask's workers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class WorkerLost(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A function and what it is called with; `attempt` counts from 0."""
+    """A function and its arguments; `attempt` counts from 0."""
 
     function: Callable[[Any], Any]
     argument: Any
@@ -24,7 +24,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Done:
-    """What came of a job: a value, or an error."""
+    """The outcome of a job: a value, or an error."""
 
     job: Job
     value: Any = None
@@ -46,7 +46,7 @@ class Executor(Protocol):
 
 
 class Serial:
-    """Runs jobs in this process, when they are asked for."""
+    """Runs jobs in this process, when their results are requested."""
 
     places = 1
 

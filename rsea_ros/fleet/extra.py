@@ -1,4 +1,4 @@
-"""Packages of the extra `fleet`: all there before anything begins."""
+"""Packages of the extra `fleet`, checked before any work."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ PACKAGES = ("pyarrow", "duckdb", "fsspec", "dask", "distributed")
 
 
 def need_extra() -> None:
-    """Refuse to begin where a package of the extra `fleet` is not installed. Raises FleetError."""
+    """Raise FleetError where a package of the extra `fleet` is not installed."""
     missing = [name for name in PACKAGES if find_spec(name) is None]
     if missing:
         install = "pip install 'rsea_ros[fleet]'"

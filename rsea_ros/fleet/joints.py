@@ -29,7 +29,7 @@ _DIGITS = 16
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint as its map states it, with all that a worker on another machine needs.
+    """A joint of the map, with everything that a worker on another machine needs.
 
     rig: the text of the rig's file. bags: patterns of paths, none for every bag. temperature: a topic, or
     empty. date: a pattern of strptime, or empty. table: the import map where the sources are not bags.
@@ -51,7 +51,7 @@ class Joint:
 
     @property
     def settings(self) -> str:
-        """The hash of everything here that changes a row: 16 hexadecimal digits."""
+        """The hash of all fields that change a row: 16 hexadecimal digits."""
         table = self.table and replace(self.table, path=Path(self.table.path.name))
         parts = (self.rig, sorted(asdict(self.topics).items(), key=lambda item: item[0]), self.temperature,
                  self.date, table, self.index, self.diagnose)  # fmt: skip
@@ -59,7 +59,7 @@ class Joint:
 
 
 def load_joints(path: str | Path) -> tuple[Joint, ...]:
-    """Read a joint map. Raises JointMapError with file, line, field, value and what was expected."""
+    """Read a joint map. Raises JointMapError with file, line, field, value and the expected value."""
     path = Path(path)
     try:
         document = strict_yaml.read(path)

@@ -1,4 +1,4 @@
-"""What a store already holds: the keys of its rows, and which bags they came from."""
+"""The content of a store: the keys of its rows, and the bags that they came from."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def known_rows(rows: Path) -> tuple[set[str], dict[tuple[str, int, str], str]]:
 
 
 def read(file: Path, columns: list[str] | None = None) -> pa.Table:
-    """Return some columns of one file, all by default, as they stand in it: the path adds none."""
+    """Return some columns of one file, all by default, without those in its path."""
     with parquet.ParquetFile(file) as opened:
         return opened.read(columns=columns)
 
 
 def metadata(file: Path) -> dict[Any, Any]:
-    """Return what a file says of itself."""
+    """Return the metadata of a file."""
     return dict(parquet.read_schema(file).metadata or {})

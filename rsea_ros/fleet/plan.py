@@ -14,7 +14,7 @@ Held = tuple[Bag, tuple[Joint, ...]]
 
 
 def is_anything_new(store: Store, held: Sequence[Held]) -> bool:
-    """Return whether some recording of a joint has no row, as far as paths, bytes and stamps say."""
+    """Return whether some recording of a joint has no row, by paths, bytes and stamps."""
     keys, recordings = store.known()
     for bag, joints in held:
         recording = recordings.get((bag.url, bag.size, bag.stamp))

@@ -87,5 +87,5 @@ def _check_reads(statements: Sequence[Any]) -> None:
 
 
 def _quoted(path: str) -> str:
-    """Return a path as it stands between quotes in SQL."""
+    """Return a path escaped for SQL."""
     return path.replace("'", "''")

@@ -38,7 +38,7 @@ class Run:
 
 
 def read_run(path: Path, url: str, joint: Joint) -> Run:
-    """Read a recording. path: where it is on this machine. Raises RseaError for what cannot be read."""
+    """Read a recording. path: on this machine. Raises RseaError for one that cannot be read."""
     if joint.table is not None:
         record = import_record(path, joint.table, joint.index)
         return Run(record, lambda: record, None, time_of(record, url, joint.date))
@@ -62,7 +62,7 @@ def time_of(record: Record, url: str, date: str) -> datetime | None:
 
 
 def date_in(path: str, pattern: str) -> datetime | None:
-    """Return the last date of a pattern of strptime that stands in a path, None for none."""
+    """Return the last date in a path that matches a strptime pattern, or None."""
     parts = re.split(r"%(.)", pattern)
     letters = [_LETTERS.get(part, re.escape(part)) for part in parts[1::2]]
     texts = [re.escape(part) for part in parts[::2]]

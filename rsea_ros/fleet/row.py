@@ -1,6 +1,6 @@
 """The row of a recording and a joint: its columns, and how it is written to a Parquet file.
 
-The column `joint` stands in the path of the file (joint=NAME/month=YYYY-MM), as every reader of partitioned
+The column `joint` is in the path of the file (joint=NAME/month=YYYY-MM), as every reader of partitioned
 Parquet expects; its month is that of `time`.
 """
 
@@ -69,12 +69,12 @@ def empty(joint: str, **stated: Any) -> Row:
 
 
 def analysis_of(model_version: str, settings: str) -> str:
-    """Return the hash of what a row was made with: 8 hexadecimal digits."""
+    """Return the hash of software and settings of a row: 8 hexadecimal digits."""
     return hashlib.sha256(f"{model_version} {settings}".encode()).hexdigest()[:8]
 
 
 def key_of(row: Mapping[str, Any]) -> str:
-    """Return what no two rows of a store share: joint, recording, and what the row was made with."""
+    """Return the unique key of a row: joint, recording, and hash of software and settings."""
     return f"{row['joint']}/{row['recording']}-{analysis_of(row['model_version'], row['settings'])}"
 
 

@@ -53,7 +53,7 @@ def bags_of(sources: Iterable[str], joints: Sequence[Joint]) -> list[tuple[Bag, 
 
 
 def relisted(bag: Bag) -> Bag:
-    """Return a recording as it is now. Raises FleetError where it is gone."""
+    """Return a recording with its present size and stamp. Raises FleetError where it is gone."""
     return _bag(bag.url, _parts(bag.url))
 
 
@@ -117,7 +117,7 @@ def _is_local(files: Any) -> bool:
 
 
 def _files(source: str) -> dict[str, Mapping[str, Any]]:
-    """Return what the file system says of every file under a source, by path or URL."""
+    """Return the file system's entry of every file under a source, by path or URL."""
     files, inner = _file_system(source)
     try:
         roots = [inner] if files.exists(inner) else files.glob(inner)
@@ -139,7 +139,7 @@ def _parts(url: str) -> dict[str, Mapping[str, Any]]:
 
 
 def _is_hidden(path: str) -> bool:
-    """Return whether a name says that the file lasts only while something is written."""
+    """Return whether a name is that of a temporary file."""
     return PurePosixPath(path).name.startswith(".")
 
 
@@ -173,7 +173,7 @@ def _bag(url: str, files: Mapping[str, Mapping[str, Any]]) -> Bag:
 
 
 def _stamp(info: Mapping[str, Any]) -> str:
-    """Return what the file system offers to distinguish contents: size, and time or tag."""
+    """Return size and time or tag, by which the file system distinguishes contents."""
     return " ".join(str(info.get(name)) for name in _MARKS)
 
 

@@ -1,11 +1,11 @@
 """The store of a fleet: a folder of Parquet files, with the artefacts beside them.
 
-    store.json                                   what this folder is
+    store.json                                   marks the folder as a store
     rows/joint=NAME/month=YYYY-MM/*.parquet      one row a file, or many after compaction
     artefacts/NAME/RECORDING-ANALYSIS/           identification.json, diagnosis.json, …
-    alarms/                                      what `rsea fleet watch` has told of
+    alarms/                                      alarms that `rsea fleet watch` has reported
 
-One run at a time writes (see locked); whoever reads needs no lock. A file gets its name when it is complete.
+One run at a time writes (see locked); readers need no lock. A file gets its name when it is complete.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ LOOSE = 64
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task leaves: its row, and the texts of its artefacts by file name."""
+    """The outcome of a task: its row, and the texts of its artefacts by file name."""
 
     row: Row
     files: Mapping[str, str] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class Store:
             compact(folder)
 
     def finish(self) -> None:
-        """Finish what a writer that was killed has left."""
+        """Complete or remove what a killed writer has left."""
         finish(self.rows)
 
     def take_out(self, outcomes: Collection[str]) -> None:
@@ -93,9 +93,9 @@ class Store:
 
 
 def open_store(path: str | Path, *, create: bool = False) -> Store:
-    """Return a store. create: make it where nothing is.
+    """Return a store. create: make a new one if necessary.
 
-    Raises FleetError for a folder that is none, or whose schema is not known here.
+    Raises FleetError for a folder that is not a store, or whose schema is unknown.
     """
     store = Store(Path(path))
     mark = store.path / MARK
@@ -129,10 +129,10 @@ def _write_mark(mark: Path) -> None:
 
 @contextmanager
 def locked(store: Store, waiting: Callable[[str], None] | None) -> Iterator[None]:
-    """Hold the store's lock; the system lets go of it when this process ends, however it ends.
+    """Hold the store's lock; the system releases it when this process ends in any way.
 
-    waiting: is told once who holds it, and the block begins when that run has ended; None: do not wait.
-    Raises FleetError where another run holds it and nobody waits.
+    waiting: called once with the holder; the block begins when that run has ended. None: do not wait.
+    Raises FleetError where another run holds it and `waiting` is None.
     """
     lock = os.open(store.path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     try:

@@ -1,4 +1,4 @@
-"""What came of a run over some recordings."""
+"""The summary of a run over some recordings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Summary:
-    """What came of a run.
+    """The summary of a run.
 
     outcomes: rows written, by outcome. before: rows that the store had. unmapped: recordings that hold no
     joint. changed: recordings that were being written, unreadable: those that could not be read, with the

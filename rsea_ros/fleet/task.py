@@ -1,6 +1,6 @@
-"""A task: one recording of one joint, worked through on whatever machine a worker runs on.
+"""A task: one recording of one joint, processed on the machine of a worker.
 
-It needs the recording and nothing else: rig and topics come along, the row and the artefacts go back.
+It needs only the recording: rig and topics are included, row and artefacts are returned.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class Task:
 
     @property
     def key(self) -> str:
-        """What no two rows of a store share."""
+        """The unique key of the row."""
         analysis = analysis_of(self.model_version, self.joint.settings)
         return f"{self.joint.name}/{self.recording}-{analysis}"
 
     def row(self, **stated: object) -> Row:
-        """Return the row, of which only what is stated and what the task is are known."""
+        """Return the row with the stated values and the identity of the task only."""
         return empty(
             self.joint.name,
             recording=self.recording,
@@ -59,9 +59,9 @@ class Task:
 
 
 def read_fingerprint(bag: Bag) -> tuple[Bag, str]:
-    """Return a recording as it is listed now, and the hash of its content.
+    """Return a recording with its present listing, and the hash of its content.
 
-    Raises Changed where it was written to meanwhile, FleetError where it cannot be read.
+    Raises Changed where it changed meanwhile, FleetError where it cannot be read.
     """
     before = relisted(bag)
     digest = fingerprint(before)
@@ -71,9 +71,9 @@ def read_fingerprint(bag: Bag) -> tuple[Bag, str]:
 
 
 def work(task: Task) -> Outcome:
-    """Read, check, identify and, where that is asked for, diagnose; return row and artefacts.
+    """Read, check, identify and, on request, diagnose; return row and artefacts.
 
-    Whatever is wrong with the recording is the row's outcome and reason. Raises Changed as read_fingerprint.
+    An error in the recording becomes the row's outcome and reason. Raises Changed as read_fingerprint.
     """
     from rsea_ros.fleet.analysis import analyse  # a second of numerics that the client never needs
 
@@ -109,11 +109,11 @@ def _fault(error: Exception) -> str:
     """Return one line about an error that nobody expected."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     kind = type(error).__name__
-    return f"a fault of rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"
+    return f"a bug in rsea, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: {error}"
 
 
 def _forget_peak() -> None:
-    """Let the system count this process's peak of memory anew, where it can."""
+    """Reset the system's count of this process's peak memory, where possible."""
     with suppress(OSError):
         switch = os.open("/proc/self/clear_refs", os.O_WRONLY)
         try:

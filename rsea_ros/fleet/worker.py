@@ -1,4 +1,4 @@
-"""What a worker process of this machine does first; Dask calls it (SETTINGS in cluster.py)."""
+"""The start-up of a worker process on this machine; Dask calls it (SETTINGS in cluster.py)."""
 
 from __future__ import annotations
 

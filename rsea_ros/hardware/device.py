@@ -1,4 +1,4 @@
-"""Device: what a driver can do with an actuator, real or simulated."""
+"""Device: the interface of an actuator, real or simulated, to a driver."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Refused(DeviceError):
 
 
 class PortLost(DeviceError):
-    """The port is not there, or not any more."""
+    """The port does not exist, or has vanished."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ class State:
     on when the system clock is set. position: rad, velocity: rad/s, of the gear
     output relative to the housing. motor_torque: N m at the gear output, from measured current. wrench:
     force x, y, z (N) and torque x, y, z (N m) of the F/T sensor; None without one.
-    wrenches: all that came since the last reading, as (stamp, wrench), where the sensor is faster.
+    wrenches: all since the last reading, as (stamp, wrench), where the sensor is faster.
     current A, voltage V, temperature °C: nan where the device does not measure them.
-    hardware_error, ft_trouble: what motor and sensor complain of, in words; empty when of nothing.
-    motor_trouble: what the motor has become that it was not made to be, such as torque off, in words.
+    hardware_error, ft_trouble: errors reported by motor and sensor, in words; empty without any.
+    motor_trouble: settings that the motor has lost, such as torque off, in words.
     deflection: rad, of the spring, from a second encoder, the drive's side less the distal one; nan without.
-    inferred: whether the wrench is stiffness times deflection, and no sensor's.
+    inferred: whether the wrench is stiffness times deflection, not measured.
     """
 
     stamp: int
@@ -64,9 +64,9 @@ class Device(Protocol):
     A DeviceError is a fault of the device: the driver latches it, NoReply only after `lost_cycles` of them.
     Any other exception is a mistake of the program: the driver closes the device and is unconfigured.
     `read` and `write` are called in every cycle, by one thread: together they may block for the rest of a
-    period, and a reply that does not come by then is a NoReply. All others may take seconds; no cycle runs
+    period, and a reply that is not received by then is a NoReply. All others may take seconds; no cycle runs
     meanwhile, but beside `zero_ft` and `health`, which must not touch what `read` and `write` use.
-    protection: what ends the torque when the driver's process dies; asked once the device is open.
+    protection: against a dead driver process; read once the device is open.
     """
 
     @property
@@ -89,10 +89,10 @@ class Device(Protocol):
         """Command zero torque and switch it off."""
 
     def zero_ft(self) -> None:
-        """Take what the F/T sensor measures now for zero."""
+        """Set the zero of the F/T sensor at its present reading."""
 
     def recover(self) -> None:
-        """Connect again where the connection was lost. Raises DeviceError while a fault is still there."""
+        """Reconnect a lost connection. Raises DeviceError while a fault is still present."""
 
     def reboot(self) -> None:
         """Restart the actuator, with no torque."""
@@ -101,7 +101,8 @@ class Device(Protocol):
         """Return counts and values for diagnostics, by name."""
 
     def close(self) -> None:
-        """Command zero torque and let go. It follows on everything: a failed `open`, any exception, itself.
+        """Command zero torque and release the device.
 
-        It raises nothing for a device that is away: that its torque ends then is the protection's work.
+        May follow anything: a failed `open`, any exception, itself.
+        It raises nothing for an absent device: the protection ends its torque.
         """

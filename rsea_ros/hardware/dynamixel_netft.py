@@ -95,7 +95,7 @@ class DynamixelNetft:
         return self._last
 
     def _take_wrenches(self) -> None:
-        """Keep what the sensor has sent until a reading takes it along, also over a lost reply."""
+        """Keep the sensor's wrenches until a reading includes them, also after a lost reply."""
         if self._sensor is None:
             return
         wrenches, trouble = self._sensor.take()
@@ -126,14 +126,14 @@ class DynamixelNetft:
         self._recover_sensor()
 
     def _recover_sensor(self) -> None:
-        """Wait for the sensor; what records said of themselves before that counts no more."""
+        """Wait for the sensor; errors in earlier records no longer count."""
         if self._sensor is not None:
             self._sensor.recover()
             self._take_wrenches()
             self._trouble = ""
 
     def health(self) -> Mapping[str, object]:
-        """Return errors of bus and stream by kind, and what the motor said of itself last."""
+        """Return errors of bus and stream by kind, and the motor's last report."""
         values: dict[str, object] = {f"bus_{kind}": n for kind, n in self._motor.bus.errors.items()}
         own = self._motor.own
         if self._motor.table is not None and own is not None:

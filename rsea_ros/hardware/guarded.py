@@ -1,4 +1,4 @@
-"""A device behind its limits: what a driver does in each cycle, without ROS."""
+"""A device behind its limits: the work of a driver in each cycle, without ROS."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from dataclasses import replace
 from rsea_ros.errors import DeviceError, ParameterError
 from rsea_ros.hardware.device import Device, NoReply, State
 from rsea_ros.hardware.limits import Fault, Guard, Limits, complaint
+from rsea_ros.hardware.losses import Losses
 from rsea_ros.hardware.protection import NONE
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.hardware.together import cycle
@@ -20,11 +21,11 @@ BUSY = "clear_fault or reboot is under way, expected it to be over"
 
 
 class Guarded:
-    """Reads and writes once a cycle; turns what goes wrong into latched faults, never into an exception.
+    """Reads and writes once a cycle; errors become latched faults, never exceptions.
 
-    enabled: whether commands get through. cycles: `failed_reads`, `failed_writes` of the cycles so far.
-    away: whether somebody else talks to the device, which takes longer than a cycle; cycles leave it alone.
-    spring: by which a measured deflection becomes a wrench where no sensor measures one; None: it does not.
+    enabled: whether commands pass. cycles: `failed_reads`, `failed_writes` of the cycles so far.
+    away: whether another thread uses the device for longer than a cycle; cycles then leave it alone.
+    spring: turns a measured deflection into a wrench where no sensor measures one; None: no such wrench.
     """
 
     def __init__(self, device: Device, limits: Limits, rate: float, spring: Spring | None = None) -> None:
@@ -35,7 +36,7 @@ class Guarded:
         self.state: State | None = None
         self._taring = self.away = False
         self._turn = threading.Lock()
-        self._lost = {"read": 0, "write": 0}
+        self._losses = {what: Losses(limits.lost_cycles) for what in ("read", "write")}
 
     @property
     def fault(self) -> Fault | None:
@@ -43,10 +44,10 @@ class Guarded:
         return self.guard.fault
 
     def open(self, *, unprotected: bool = False) -> None:
-        """Open the device and ask for its protection against a dead host.
+        """Open the device and check its protection against a dead host.
 
-        unprotected: whether there may be none. Raises ParameterError where there is none and may not be,
-        DeviceError; nothing stays open then.
+        unprotected: whether protection may be missing. Raises ParameterError for a device without it
+        otherwise, DeviceError; nothing stays open then.
         """
         self.device.open()
         if self.device.protection.kind == NONE and not unprotected:
@@ -77,14 +78,14 @@ class Guarded:
         return not self.away
 
     def read(self) -> State | None:
-        """Return the reading of this cycle; None when there was none."""
+        """Return the reading of this cycle; None without one."""
         try:
             self.device.protection.beat()  # to wait for a reply that is lost is not to hang
             state = self._read()
         except DeviceError as error:
             self._failed("read", error)
             return None
-        self._lost["read"] = 0
+        self._losses["read"].take(lost=False)
         self.guard.look(state)
         self.state = state
         return state
@@ -98,7 +99,7 @@ class Guarded:
         except DeviceError as error:
             self._failed("write", error)
         else:
-            self._lost["write"] = 0
+            self._losses["write"].take(lost=False)
         return torque
 
     def enable(self) -> None:
@@ -113,7 +114,7 @@ class Guarded:
             self.enabled = True
 
     def disable(self) -> None:
-        """Command zero torque and switch it off. Whoever has the device does it where that is away."""
+        """Command zero torque and switch it off. The thread that uses the device does it while it is away."""
         self.enabled = False
         with self._turn:
             self.guard.torque = 0.0
@@ -132,9 +133,9 @@ class Guarded:
             self._taring = False
 
     def clear(self) -> bool:
-        """Connect again if need be and forget the fault; return whether there was one.
+        """Reconnect if necessary and clear the fault; return whether there was one.
 
-        Raises DeviceError while its cause is there: a reading is asked.
+        Raises DeviceError while its cause is present, checked by a reading.
         """
         if self.guard.fault is None:
             return False
@@ -165,7 +166,7 @@ class Guarded:
         return f"{self._spring}" if self.state.inferred else "sensor"
 
     def _read(self) -> State:
-        """Return a reading, with the spring's torque where that is what is measured of it."""
+        """Return a reading, with the spring's torque where only the deflection is measured."""
         state = self.device.read()
         if self._spring is None:
             return state
@@ -175,31 +176,30 @@ class Guarded:
         return state
 
     def _alone(self, work: Callable[[], None]) -> None:
-        """Do something with the device while the cycles leave it alone, then begin anew, at zero torque."""
+        """Use the device while the cycles leave it alone, then restart at zero torque."""
         with self._turn:
             if self.away:
                 raise DeviceError(BUSY)
             self.away = True
         try:
             work()
-            self._lost = dict.fromkeys(self._lost, 0)
+            for losses in self._losses.values():
+                losses.clear()
             if self.enabled:
                 self.device.enable()
             self.guard.clear()
         finally:
             with self._turn:
                 self.away = False
-                if not self.enabled:  # also where it was asked for meanwhile
+                if not self.enabled:  # also where it was requested meanwhile
                     with suppress(DeviceError):
                         self.device.disable()
                         self.device.protection.beat(False)
 
     def _failed(self, what: str, error: DeviceError) -> None:
-        """Count a failure. One lost answer costs a cycle; several in a row, and any other failure, trip."""
-        self._lost[what] += 1
+        """Count a failure. One lost answer costs a cycle; many of them, and any other failure, trip."""
         self.cycles[f"failed_{what}s"] += 1
-        limit = self.guard.limits.lost_cycles
         if not isinstance(error, NoReply):
             self.guard.trip(Fault(type(error).__name__.lower(), detail=str(error)))
-        elif self._lost[what] >= limit:
-            self.guard.trip(Fault("no_reply", self._lost[what], limit, "cycles", str(error)))
+        elif fault := self._losses[what].take(lost=True):
+            self.guard.trip(replace(fault, detail=fault.detail + str(error)))

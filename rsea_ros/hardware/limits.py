@@ -1,4 +1,4 @@
-"""What an actuator may do: limits, the torque within them, and the fault that ends it until it is cleared."""
+"""Limits of an actuator, the torque within them, and the fault that ends it until it is cleared."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Limits:
     """SI. torque N m, slew N m/s, temperature °C, current A, voltage V (at least), velocity rad/s, position
     rad from where the device was opened, ft N m about the actuator's axis, power W, measured, either way.
 
-    deflection: rad, of the spring, as a second encoder measures it, else of the drive's angle where that is
+    deflection: rad, of the spring by a second encoder, otherwise of the drive's angle where that is
     the spring's.
     soft_start: N m/s, by which the largest torque grows after an activation and a fault.
     effort: N m by which the measured torque may miss the commanded one, for effort_time, s.
-    command_timeout: s without a command while torque is commanded. ramp: s from there to zero torque.
-    lost_cycles: cycles in a row without an answer. ft_axis: place in the wrench.
+    command_timeout: s without a command while torque is commanded. ramp: s from then to zero torque.
+    lost_cycles: cycles in a row without an answer, see Losses. ft_axis: place in the wrench.
     """
 
     torque: float
@@ -62,7 +62,7 @@ class Fault:
 
 
 def complaint(limits: Limits, state: State) -> Fault | None:
-    """Return what a reading says is wrong, the first of it."""
+    """Return the first fault in a reading."""
     if not math.isfinite(state.position + state.velocity + state.motor_torque):
         reading = f"{state.position} rad, {state.velocity} rad/s, {state.motor_torque} N m"
         return Fault("reading", detail=f"{reading}, expected finite values")
@@ -94,8 +94,8 @@ def complaint(limits: Limits, state: State) -> Fault | None:
 class Guard:
     """Keeps the torque within limits, and at zero once a fault is latched.
 
-    fault: the first one since it was cleared. limited: commands that were cut down. halted: whether the end
-    of the program was asked for: from then on there is no torque, and no fault either.
+    fault: the first one since it was cleared. limited: commands that were cut. halted: whether the end
+    of the program was requested: from then on there is no torque and no fault.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
@@ -116,18 +116,18 @@ class Guard:
             self._ramp = self._ramp_from * self._period / max(self.limits.ramp, self._period)
 
     def clear(self) -> None:
-        """Forget the fault. The torque begins at zero, and softly."""
+        """Clear the fault. The torque restarts softly from zero."""
         self.fault, self.torque, self._room, self._missed = None, 0.0, 0.0, 0
         self._written.clear()
 
     def look(self, state: State) -> None:
-        """Latch what a reading says is wrong."""
+        """Latch the fault in a reading."""
         fault = complaint(self.limits, state) or self._missing(state.motor_torque)
         if fault is not None:
             self.trip(fault)
 
     def allowed(self, wanted: float, age: float | None) -> float:
-        """Return the torque to write now (N m). age: of the command, s; None when there is none."""
+        """Return the torque to write now (N m). age: of the command, s; None without a command."""
         limits = self.limits
         if self.fault is None and age is not None and age > limits.command_timeout and self.torque != 0.0:
             self.trip(Fault(COMMAND_TIMEOUT, 1e3 * age, 1e3 * limits.command_timeout, "ms"))
@@ -144,7 +144,7 @@ class Guard:
         return self.torque
 
     def _ramped(self, age: float | None) -> float:
-        """Return how large the torque may be in the ramp: less by each cycle and by the time that passed.
+        """Return the largest torque during the ramp: it falls with each cycle and with the time that passed.
 
         Cycles are late on a busy machine, and the torque of a dead publisher must not last as long as they.
         """
@@ -153,7 +153,7 @@ class Guard:
         return max(0.0, min(abs(self.torque) - self._ramp, self._ramp_from * left))
 
     def _open(self, age: float | None) -> None:
-        """Let the largest torque grow while commands come; it begins anew when they have ceased."""
+        """Let the largest torque grow while commands come; it restarts after they have ceased."""
         if age is None or age > self.limits.command_timeout:
             self._room = 0.0
         else:
@@ -167,7 +167,7 @@ class Guard:
         return torque
 
     def _missing(self, measured: float) -> Fault | None:
-        """Return a fault when the motor has not made the torque that was written for too long."""
+        """Return a fault when the motor has not made the written torque for too long."""
         if not self._written or self.fault is not None:
             return None
         low, high = min(self._written), max(self._written)

@@ -18,7 +18,7 @@ EXTRA_PATH = "RSEA_DEVICES"
 
 @dataclass(frozen=True)
 class DeviceKind:
-    """What a file has as DEVICE.
+    """The constant DEVICE of a file.
 
     name: value of the driver's parameter `device`. make: returns the device, not open, of the driver's
     parameters by name; `device_options` among them is a mapping of texts by name.

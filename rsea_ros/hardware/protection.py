@@ -1,4 +1,4 @@
-"""What takes the torque away when the driver's process dies or hangs: each device has its way."""
+"""Protection that ends the torque when the driver's process dies or hangs; each device states its kind."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Protection:
 
     @property
     def kind(self) -> str:
-        """What it is at this moment."""
+        """The present kind."""
         return self._kind
 
     def beat(self, armed: bool | None = None) -> None:
-        """Say that the driver lives, and whether torque is commanded (None: as before)."""
+        """Report that the driver runs, and whether torque is commanded (None: as before)."""
 
     def __str__(self) -> str:
         return self.kind if math.isnan(self._within) else f"{self.kind}, {self._within:g} s"

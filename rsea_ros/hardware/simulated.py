@@ -1,4 +1,4 @@
-"""The simulated actuator: its physics go on with a clock, whoever reads or writes it, and when."""
+"""The simulated actuator: its physics follow a clock, independently of reads and writes."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class SimulatedDevice:
     """A rig behind the Device interface.
 
     The fixed step divides the period of `rate` (Hz). A torque written within a step acts from that instant
-    on: the step gets the mean of what was held in it. A reading is the end of the last whole step.
+    on: the step uses the mean of the torques held in it. A reading is the end of the last whole step.
     clock: returns the time, ns since the epoch, without a jump; by default the monotonic clock with the
-    system clock's time when the device is made. duration: over which drifts come to their full size, s.
+    system clock's time when the device is made. duration: over which drifts reach their full size, s.
     """
 
     protection = Protection(PROCESS)
@@ -84,7 +84,7 @@ class SimulatedDevice:
         self.write(0.0)
 
     def zero_ft(self) -> None:
-        """Do nothing: the sensor has no offset that a tare would take away."""
+        """Do nothing: the sensor has no offset to tare."""
 
     def recover(self) -> None:
         """Do nothing: the connection cannot be lost."""
@@ -94,7 +94,7 @@ class SimulatedDevice:
         self.write(0.0)
 
     def health(self) -> Mapping[str, object]:
-        """Return nothing: what could fail is not simulated here."""
+        """Return nothing: failures are not simulated here."""
         return {}
 
     def close(self) -> None:
@@ -105,7 +105,7 @@ class SimulatedDevice:
             self._start = None
 
     def _instant(self, steps: int) -> int:
-        """Return the stamp at the end of so many steps, ns."""
+        """Return the stamp at the end of a number of steps, ns."""
         if self._start is None:
             raise DeviceError("simulated device is not open")
         return self._start + round(steps * SECOND / self._per_second)

@@ -12,8 +12,8 @@ from rsea_ros.hardware.device import State, Wrench
 class Spring:
     """stiffness: of the rig, N m/rad. place: of the actuator's axis in the wrench; sign: of it, +1 or -1.
 
-    What it gives is the torque of the elastic element alone, K d: a sensor in series feels the spring's
-    damper too, K d + b d'. It is as right as the stiffness, and zero where the deflection is.
+    It gives the torque of the elastic element alone, K d: a sensor in series also measures the spring's
+    damper, K d + b d'. It is as accurate as the stiffness, and zero at zero deflection.
     """
 
     stiffness: float
@@ -24,7 +24,7 @@ class Spring:
         return f"stiffness of {self.stiffness:.4g} N m/rad times measured deflection"
 
     def felt(self, state: State) -> State:
-        """Return a reading with the wrench that its deflection means; as it is with a sensor's or none."""
+        """Return a reading with the wrench of its deflection, unless it has a wrench or no deflection."""
         if state.wrench is not None or math.isnan(state.deflection):
             return state
         values = [0.0] * 6

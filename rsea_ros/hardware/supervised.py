@@ -29,14 +29,14 @@ class SupervisorLost(DeviceError):
 
 
 class HeldUp(DeviceError):
-    """This process stood still with torque on for about as long as the supervisor bears."""
+    """This process was stopped with torque on for about as long as the supervisor tolerates."""
 
 
 class _End(Protocol):
     """Where beats go."""
 
     def send(self, beat: bytes) -> None:
-        """Send a beat. Raises OSError when nobody is there."""
+        """Send a beat. Raises OSError when nobody listens."""
 
     def alive(self) -> bool:
         """Return whether the supervisor runs."""
@@ -127,9 +127,10 @@ class Supervisor:
         return self._end.alive()
 
     def beat(self, armed: bool | None = None) -> None:
-        """Say that this process lives, and whether torque is commanded (None: as before).
+        """Report that this process runs, and whether torque is commanded (None: as before).
 
-        A change of that is told at once, else what was told last counts for a 20th of the time-out.
+        A change of the torque is reported at once, otherwise the last report counts for a 20th of the
+        time-out.
         Raises SupervisorLost, and HeldUp when the last beat is so old that the supervisor may have acted.
         """
         now = time.monotonic()

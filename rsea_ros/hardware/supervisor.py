@@ -1,9 +1,9 @@
-"""A process that outlives the driver: when that is gone or hangs, it sends the frames that stop the motor.
+"""A process that outlives the driver: when the driver ends or hangs, it sends the frames that stop the motor.
 
 Run as a file of its own with nothing but the standard library:
 supervisor.py DESCRIPTOR TIMEOUT_S FRAME_HEX… with the driver's beats on stdin: `a` torque is on, `d` it is
 off, `q` all is well, end. End of input without `q` is the death of the driver, by whatever signal.
-supervisor.py --listen SOCKET is the same as a service, which outlives whatever takes driver and children
+supervisor.py --listen SOCKET is the same as a service, which survives anything that kills driver and children
 together (a control group, a container, a login): a driver connects to the Unix socket, sends a line
 {"timeout": S, "frames": [HEX, …]} with the descriptor of its port, and its beats.
 """

@@ -16,10 +16,10 @@ class Shared(Protocol):
     """A bus whose devices are written and read in one transaction."""
 
     def exchange(self) -> None:
-        """Send what was written, and fetch what will be read."""
+        """Send written values, and fetch those to be read."""
 
     def send(self) -> None:
-        """Send what was written."""
+        """Send written values."""
 
 
 def cycle(

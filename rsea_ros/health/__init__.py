@@ -1,1 +1,1 @@
-"""Health of a joint while it works: what changed against its model, by how much, since when, how sure."""
+"""Health of a joint at work: changes against its model, with size, date and probability."""

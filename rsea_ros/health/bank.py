@@ -66,7 +66,7 @@ class Bank:
 
 
 def whitened(observer: BatchObserver, look: Look) -> tuple[FloatArray, ...]:
-    """Return the innovations of a look by channel over their standard deviations; nan where there is none."""
+    """Return the innovations of a look by channel over their standard deviations; nan where missing."""
     w = observer.innovations(look.t, look.kind, look.values)
     state, ft = look.judged & (look.kind == STATE), look.judged & (look.kind == FT)
     return w[state, 0], w[ft, 0], w[state, 1]

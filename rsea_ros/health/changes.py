@@ -1,7 +1,7 @@
-"""Changes of a joint against its model: alarms, the cause of each, and the model as the joint is now.
+"""Changes of a joint against its model: alarms, the cause of each, and the updated model.
 
-A cause that is sure becomes part of the model, so that a second change is compared with the joint as it is.
-One that is not sure is said with its probability, and asked for again when more has been seen: play on one
+A sure cause becomes part of the model, so that a second change is compared with the present joint.
+An unsure one is reported with its probability and fitted again with more looks: play on one
 flank is a shifted zero until the torque changes its sign.
 """
 
@@ -41,7 +41,7 @@ REMEMBERED = 64
 
 @dataclass(frozen=True)
 class _Base:
-    """A joint as it is compared with, and since when (s) it is so."""
+    """The model that a joint is compared with, and its date (s)."""
 
     rig: Rig
     hypotheses: tuple[Hypothesis, ...]
@@ -51,9 +51,9 @@ class _Base:
 
 @dataclass(frozen=True)
 class Answer:
-    """Causes beside the model as it is, and in place of the last one that was taken over.
+    """Causes beside the present model, and in place of the last adopted one.
 
-    The second are fitted to some looks more, right after that one: first is what the model leaves of these.
+    The second are also fitted to the looks right after its adoption; first is the model's cost on these.
     """
 
     beside: Sequence[Cause]
@@ -65,7 +65,7 @@ Job = Callable[[], Answer]
 
 
 class Changes:
-    """Give looks with `take`; when `job` is there, run it and give its result to `conclude`."""
+    """Pass looks to `take`; when there is a `job`, run it and pass its result to `conclude`."""
 
     def __init__(
         self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], models: Mapping[str, float],
@@ -97,7 +97,7 @@ class Changes:
         return self._cusum.suspects
 
     def take(self, look: Look, evidence: Evidence) -> None:
-        """Take in a look that something moved."""
+        """Process a look with motion."""
         self._looks.append(look)
         score, information = evidence.scaled(self._scatter.scale)
         self.estimates.take(score, information, self._scatter.phi)
@@ -111,7 +111,7 @@ class Changes:
             self._ask(score / np.maximum(np.diag(information), 1e-300))
 
     def _ask(self, starts: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
-        """Ask for a fit of each cause: to the newest looks, and to the first ones of this change."""
+        """Request a fit of each cause: to the newest looks, and to the first ones of this change."""
         since = min(max(self._cusum.since, 1), len(self._looks))
         recent = list(self._looks)[-since:]
         self._began = recent[0].t[0] + SETTLE
@@ -161,7 +161,7 @@ class Changes:
         return Finding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
 
     def _later(self, finding: Finding | None) -> Finding | None:
-        """Say what is not sure, and ask again after as many looks as were waited for before, twice over."""
+        """Report an unsure cause, and fit again after twice as many looks as before."""
         self._patience = min(2 * self._patience + 2, REMEMBERED)
         self._wait = self._patience
         if finding is None:
@@ -173,7 +173,7 @@ class Changes:
         return None if known else finding
 
     def _adopt(self, cause: Cause, finding: Finding) -> Finding | None:
-        """Take a cause over into the model; a change within the doubt in the model is none."""
+        """Adopt a cause into the model; a change within the model's doubt does not count."""
         h = cause.hypothesis
         adopted = replace(h, value=h.value + cause.change)
         hypotheses = tuple(adopted if other.name == h.name else other for other in self._base.hypotheses)

@@ -1,6 +1,6 @@
 """The one table of codes that `health` puts on /diagnostics; docs/health.md repeats it, and a test compares.
 
-A code is for ever: fault managers make faults of it. One that is no longer used stays out of use.
+Codes are permanent, because fault managers rely on them. A discarded code is never used again.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Code(NamedTuple):
-    """A code: what it means, and what its size is (unit; empty where it has none)."""
+    """A code: its meaning, and the unit of its size (empty without a size)."""
 
     name: str
     meaning: str

@@ -7,8 +7,8 @@ for each parameter and each sign, a look adds
 
 and E exp(s) <= 1 for every change up to inner. Hence (Lorden 1971) the mean number of looks to a false alarm
 is at least exp(h): with m such sums and looks T apart false alarms come at most every exp(h) T / m. A look
-that nothing moves has c = A = 0 and adds nothing. phi is how many times the scores scatter more than white
-innovations let them. A single look adds at most a share of h: a knock or an outlier is no change.
+without motion has c = A = 0 and adds nothing. phi is the variance of the scores over that of white
+innovations. A single look adds at most a share of h: a knock or an outlier is no change.
 Sources: Page, Biometrika 41, 1954; Lorden, Annals of Mathematical Statistics 42, 1971, theorem 2.
 """
 
@@ -28,7 +28,10 @@ SUSPECT = 0.25
 
 
 def threshold(rate: float, sums: int, every: float) -> float:
-    """Return h for a rate of false alarms an hour of a joint. sums: that run. every: s between looks."""
+    """Return h for a rate of false alarms an hour of a joint.
+
+    sums: number of sums. every: s between looks.
+    """
     return math.log(max(sums, 1) * HOUR / (rate * every))
 
 
@@ -45,12 +48,12 @@ class Cusum:
         return Cusum(self._inner, self._outer, h)
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Restart."""
         self.sums = np.zeros((2, len(self._linear)))
         self.looks = np.zeros((2, len(self._linear)), dtype=np.int64)
 
     def take(self, score: FloatArray, information: FloatArray, phi: FloatArray) -> bool:
-        """Take in a look: scores, informations and dispersions of the changes, (p,); report an alarm."""
+        """Process a look: scores, informations and dispersions of the changes, (p,); report an alarm."""
         gains = np.array([self._linear * sign * score - self._square * information for sign in (1.0, -1.0)])
         self.sums = np.maximum(0.0, self.sums + np.minimum(gains / phi, SHARE * self.h))
         self.looks = np.where(self.sums > 0.0, self.looks + 1, 0)

@@ -2,9 +2,9 @@
 
     F <- l F + A / phi,   r <- l r + c / phi,   change = r / (F + F_0)
 
-of each parameter alone, the others as the model has them: together, calibrations and stiffness would follow
-the smallest misfit. l forgets only by as much as the look tells of a parameter: what is not excited keeps
-what was known, and the look is said to hold it. F_0 is a weak prior.
+of each parameter alone, the others at the model's values: together, calibrations and stiffness would follow
+the smallest misfit. l forgets only as much as the look informs: a parameter without excitation keeps
+its estimate (held). F_0 is a weak prior.
 Source: Cao, Schwartz, Automatica 36, 2000 (forgetting where there is excitation).
 """
 
@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 MEMORY = 60.0
@@ -46,7 +47,7 @@ class Estimates:
         self._held = np.ones(p, dtype=bool)
 
     def take(self, score: FloatArray, information: FloatArray, phi: FloatArray) -> None:
-        """Take in a look: c (p,), A (p, p), dispersion (p,)."""
+        """Process a look: c (p,), A (p, p), dispersion (p,)."""
         own = np.diag(information) / phi
         self._held = own < self._prior
         told = own / np.maximum(self._information / MEMORY, np.maximum(own, 1e-300))
@@ -55,14 +56,14 @@ class Estimates:
         self._score = forget * self._score + score / phi
 
     def hold(self) -> None:
-        """Take in a look that nothing moved."""
+        """Process a look without motion."""
         self._held[:] = True
 
     def estimates(self) -> list[Estimate]:
         """Return value and interval of each parameter."""
         variance = 1.0 / (self._information + self._prior)
         common = np.array([h.common for h in self._hypotheses])
-        change, half = variance * self._score, SURE * np.sqrt(variance + common**2)
+        change, half = variance * self._score, Z95 * np.sqrt(variance + common**2)
         return [
             Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
             for h, c, d, held in zip(

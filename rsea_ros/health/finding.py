@@ -1,4 +1,4 @@
-"""What health says of a joint: a code, what changed by how much, since when, how sure."""
+"""A finding on a joint: a code, the change with size, date and probability."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def unexplained(since: float, share: float) -> Finding:
 
 
 def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[Finding]:
-    """Return what is wrong with the sensors themselves. jumps: of the stamps. late: samples left out."""
+    """Return the findings on the sensors themselves. jumps: of the stamps. late: samples left out."""
     found = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
     found += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
     counts = {"no numbers": sensors.bad_values, "jumps of the stamps": jumps, "late samples": late}

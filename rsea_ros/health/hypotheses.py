@@ -1,4 +1,4 @@
-"""What may change in a joint: for each parameter the model with another value, and what counts as changed."""
+"""Possible changes of a joint: for each parameter another value in the model, and the least that counts."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.rig import EffectSetting, Rig
+from rsea_ros.normal import Z95
 
-SURE = 1.96
-"""Standard deviations on either side of a 95 % interval."""
 FACTOR = "friction.factor"
 GAINS = ("torque_constant_error.gain", "ft_gain_error.gain")
 """Calibrations, which no record of the joint alone can separate from its stiffness and inertia."""
@@ -27,7 +26,7 @@ class Hypothesis:
     value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
     alarm. step: change at which the sensitivity is taken. low, high: bounds of the value. grain: difference
     below which the data cannot show it, as a delay within a sample. relative: `apply` takes the new value
-    over the old one. common: one sigma of the value that every look has in common, as that of a calibration.
+    over the old one. common: one sigma of the part that all looks share, as of a calibration.
     """
 
     code: str
@@ -47,7 +46,7 @@ class Hypothesis:
     @property
     def inner(self) -> float:
         """Largest change that the doubt in the model allows."""
-        return SURE * self.doubt
+        return Z95 * self.doubt
 
     @property
     def outer(self) -> float:
@@ -61,7 +60,7 @@ class Hypothesis:
 
 
 def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
-    """Return what may change in a joint. period: s, between measurements."""
+    """Return the possible changes of a joint. period: s, between measurements."""
     found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
     found.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
     found.append(_friction(rig))
@@ -82,7 +81,7 @@ def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
 
 
 def nuisances_of(rig: Rig) -> tuple[Hypothesis, ...]:
-    """Return what no code stands for and the model may have a little wrong: inertia, the spring's damping."""
+    """Return parameters without a code that may be slightly wrong in the model: inertia, spring damping."""
     names = ["rotor.reflected_inertia", *([] if rig.rigid_spring else ["spring.damping"])]
     found = (_field(rig, name, "", 0.1) for name in names)
     return tuple(h for h in found if h is not None)
@@ -117,7 +116,7 @@ def _field(rig: Rig, name: str, code: str, part: float) -> Hypothesis | None:
 def _doubt(rig: Rig, name: str) -> float:
     quantity = rig.quantities[name]
     if quantity.ci95 is not None:
-        return (quantity.ci95[1] - quantity.ci95[0]) / (2.0 * SURE)
+        return (quantity.ci95[1] - quantity.ci95[0]) / (2.0 * Z95)
     return 0.0 if name in rig.known else 0.5 * quantity.spread * quantity.value
 
 

@@ -1,4 +1,4 @@
-"""A look: a second of what came from a joint, in order, with what the filters need before it to settle."""
+"""A look: a second of a joint's events in order, with the events before it that let the filters settle."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ class Look(NamedTuple):
 
 
 class Cutter:
-    """Cuts looks out of the stream. every: s from the beginning of a look to that of the next one."""
+    """Cuts looks out of the stream. every: s from the beginning of one look to that of the next."""
 
     def __init__(self, every: float) -> None:
         self.every = every
         self.clear()
 
     def clear(self) -> None:
-        """Forget what came."""
+        """Forget all events."""
         self._t, self._kind = np.empty(0), np.empty(0, dtype=np.int64)
         self._values = np.empty((0, 2))
         self._begin = -np.inf
@@ -54,7 +54,7 @@ class Cutter:
     def take(
         self, t: FloatArray, kind: IntArray, values: FloatArray, *, closer: bool = False
     ) -> Iterator[Look]:
-        """Take in events, sorted and later than those before; yield the looks that are complete.
+        """Add events, sorted and later than those before; yield complete looks.
 
         closer: one look follows the other without a pause.
         """
@@ -82,7 +82,7 @@ class Cutter:
         return Look(t, kind, self._values[part], judged) if judged.sum() >= FEWEST else None
 
     def _drop(self) -> None:
-        """Forget what no look will need: all before its beginning, but for the command in force."""
+        """Drop events before the beginning of the next look, except the command in force."""
         first = int(np.searchsorted(self._t, min(self._begin, self._t[-1] if len(self._t) else 0.0)))
         before = np.flatnonzero(self._kind[:first] == COMMAND)[-1:]
         keep = int(before[0]) if len(before) else first

@@ -1,4 +1,4 @@
-"""The health of one joint from what its topics bring: looks at it, what they say, and its sensors."""
+"""The health of one joint from its topics: looks, their evidence, and its sensors."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ STILL = 30.0
 
 
 class Monitor:
-    """Take in events with `take`; when `job` is there, run it (seconds), then `conclude` with its result.
+    """Pass events to `take`; when there is a `job`, run it (seconds) and pass its result to `conclude`.
 
-    looks, still: looks that were judged, and that nothing moved. jumps: of the stamps. late: events left out.
+    looks, still: looks that were evaluated, and looks without motion. jumps: of the stamps. late: events left
+    out.
     """
 
     def __init__(self, rig: Rig, noise: Noise, settings: Settings | None = None) -> None:
@@ -50,14 +51,14 @@ class Monitor:
         self.begin()
 
     def begin(self) -> None:
-        """Learn anew how the joint is."""
+        """Restart the learning of the joint."""
         self._cutter = Cutter(self._settings.every)
         self._first: list[Look] = []
         self.changes: Changes | None = None
         self.now = -math.inf
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
-        """Take in events (see Look), sorted by stamp; those before what was taken are counted, not used."""
+        """Process events (see Look), sorted by stamp; late ones are counted, not used."""
         if len(t) and math.isfinite(self.now) and abs(t[0] - self.now) > JUMP:
             self.jumps += 1
             self._cutter.clear()
@@ -81,7 +82,7 @@ class Monitor:
 
     @property
     def job(self) -> Callable[[], Answer] | None:
-        """What must be computed before more can be said."""
+        """The computation that the next finding needs."""
         return None if self.changes is None else self.changes.job
 
     def conclude(self, answer: Answer) -> Finding | None:
@@ -90,7 +91,7 @@ class Monitor:
         return self.changes.conclude(answer)
 
     def findings(self) -> list[Finding]:
-        """Return what is wrong."""
+        """Return the present findings."""
         changed = [] if self.changes is None else list(self.changes.found.values())
         return [*changed, *sensor_findings(self.sensors, self.jumps, self.late)]
 
@@ -110,7 +111,7 @@ class Monitor:
             self._learn(look)
 
     def _learn(self, look: Look) -> None:
-        """Gather the first looks; then begin, with the values and the scatter that they show."""
+        """Collect the first looks; then begin with their values and scatter."""
         self._first.append(look)
         if len(self._first) < self._settings.learn:
             return

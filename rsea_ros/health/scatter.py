@@ -51,7 +51,7 @@ def scatter_of(looks: Sequence[Evidence]) -> Scatter:
 
 
 def _loudness(evidence: Evidence) -> FloatArray:
-    """Return the logarithm of the mean square by channel; zero for one that is not there."""
+    """Return the logarithm of the mean square by channel; zero for a missing one."""
     there = evidence.counts > 0.0
     mean = np.where(there, evidence.squares, 1.0) / np.where(there, evidence.counts, 1.0)
     assert len(mean) == len(CHANNELS)

@@ -38,7 +38,7 @@ class _Sensor:
 
 @dataclass
 class Sensors:
-    """What is wrong with the sensors of a rig just now. bad_values: samples that were not numbers."""
+    """The present faults of a rig's sensors. bad_values: samples that were not numbers."""
 
     rig: Rig
     bad_values: int = 0
@@ -53,12 +53,12 @@ class Sensors:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was measured."""
+        """Forget all measurements."""
         self._begin, self._now, self._spans = math.inf, -math.inf, {}
         self._state = {name: _Sensor() for name in CHANNELS if name in self.rig.sensors}
 
     def take(self, t: FloatArray, kind: IntArray, values: FloatArray) -> None:
-        """Take in events, sorted."""
+        """Process events, sorted."""
         if not len(t):
             return
         self._begin, self._now = min(self._begin, float(t[0])), float(t[-1])
@@ -81,7 +81,7 @@ class Sensors:
         return {name: t for name, t in last.items() if self._now - t > SILENT}
 
     def _note(self, name: str, t: FloatArray, y: FloatArray) -> None:
-        """Keep between which values a signal was, for as long as others may be compared with it."""
+        """Keep the range of a signal for as long as others may be compared with it."""
         finite = y[np.isfinite(y)]
         self.bad_values += len(y) - len(finite) if name in self._state and len(finite) else 0
         spans = self._spans.setdefault(name, [])
@@ -116,7 +116,7 @@ class Sensors:
         return False
 
     def _needed(self, name: str, other: str) -> float:
-        """Return by how much another signal must move so that this one had to, in the other's unit."""
+        """Return the motion of another signal, in its unit, from which this one must have moved too."""
         beside = MOVED * self._noise.get(other, 0.0)
         if name == "motor_torque" or other == "position":
             return beside

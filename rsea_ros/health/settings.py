@@ -1,4 +1,4 @@
-"""What steers the watch over a joint."""
+"""Settings of the watch over a joint."""
 
 from __future__ import annotations
 

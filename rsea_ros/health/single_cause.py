@@ -1,9 +1,9 @@
-"""Which single cause explains some looks best, how large it is and how sure: a fit of each, not its slope.
+"""The single cause that explains some looks best, with size and probability: a fit of each, not its slope.
 
 Each hypothesis is fitted by Gauss-Newton with the observer itself, so play or a long delay, which no slope at
-zero describes, are compared by what they really do. The cost of an innovation w is that of Student's t with
+zero describes, are compared by their real effect. The cost of an innovation w is that of Student's t with
 four degrees of freedom, 2.5 log(1 + w^2 / 4): outliers do not decide. The gain is the drop of its sum, over
-how much more the best cause leaves than white innovations would.
+the ratio of the best cause's cost to that of white innovations.
 Source: Lange, Little, Taylor, Journal of the American Statistical Association 84, 1989 (t instead of Gauss).
 """
 
@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.bank import whitened
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.hypotheses import Hypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 FREEDOM = 4.0
@@ -38,7 +39,7 @@ STARTS = (-3.0, 3.0, 12.0)
 class Cause:
     """A fitted cause. change, ci95: in the parameter's unit. probability: among the causes that were fitted.
 
-    explained: part of the excess of the innovations that it takes away. cost: what it leaves (see Fitter).
+    explained: part of the excess of the innovations that it explains. cost: of the fit (see Fitter).
     """
 
     hypothesis: Hypothesis
@@ -90,7 +91,7 @@ class Fitter:
         return sorted(found, key=lambda cause: -cause.probability)
 
     def now(self) -> float:
-        """Return what the rig as it is leaves of the looks; zero without any."""
+        """Return the cost of the unchanged rig on the looks; zero without any."""
         return cost(self._innovations(self._rig)) if self._looks else 0.0
 
     def _start(self, hypothesis: Hypothesis, start: float) -> _Point:
@@ -101,7 +102,7 @@ class Fitter:
         return min(tried, key=lambda one: one[2])
 
     def _fit(self, hypothesis: Hypothesis, first: _Point, limit: float) -> _Fit:
-        """Return the best fit of one hypothesis: Gauss-Newton, weighted as the cost asks."""
+        """Return the best fit of one hypothesis: Gauss-Newton with the weights of the cost."""
         low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         change, w, size = first
         step, sigma = max(0.1 * hypothesis.least, hypothesis.grain), math.inf
@@ -123,7 +124,7 @@ class Fitter:
                     break
             if abs(change - last) < SHORTEST * max(sigma, SHORTEST * hypothesis.least):
                 break
-        return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / SURE))
+        return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / Z95))
 
     def _at(self, hypothesis: Hypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
@@ -142,5 +143,5 @@ def cost(w: FloatArray) -> float:
 
 
 def _interval(fit: _Fit, phi: float) -> tuple[float, float]:
-    half = SURE * fit.sigma * math.sqrt(phi)
+    half = Z95 * fit.sigma * math.sqrt(phi)
     return fit.change - half, fit.change + half

@@ -1,8 +1,8 @@
-"""The model as the first looks have it, within its doubts: an identification is right to its intervals only.
+"""The model tuned to the first looks within its doubts: an identification is right within its intervals only.
 
-    d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= 1.96 doubt
+    d = argmin d' (A + F_0) d / 2 - c' d,   F_0 = diag(1 / doubt^2),   |d| <= Z95 doubt
 
-for all parameters together. What lies beyond the doubt stays a change, to be alarmed.
+for all parameters together. A deviation beyond the doubt stays a change and alarms.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_ros.health.bank import Bank, Evidence
-from rsea_ros.health.hypotheses import SURE, Hypothesis
+from rsea_ros.health.hypotheses import Hypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
 _CERTAIN = 1e-6
@@ -61,4 +62,4 @@ def _change(
     root = np.linalg.cholesky(information + np.eye(len(doubt)))
     wanted = np.linalg.solve(root, score + information @ (before / doubt))
     sigma = doubt * np.sqrt(np.diag(np.linalg.inv(root @ root.T)))
-    return doubt * lsq_linear(root.T, wanted, bounds=(-SURE, SURE)).x, sigma
+    return doubt * lsq_linear(root.T, wanted, bounds=(-Z95, Z95)).x, sigma

@@ -1,1 +1,1 @@
-"""From records to parameters with their confidence, and what the data cannot determine."""
+"""From records to parameters with their confidence, and to those that the data cannot determine."""

@@ -41,7 +41,7 @@ class RunLimits:
 
 @dataclass(frozen=True)
 class Run:
-    """An excitation by its settings, which excite has too, and what it does to a rig: a case without noise.
+    """An excitation by its settings, which excite has too, and the noise-free case of a rig under it.
 
     peak: the largest command, N m, or rad where positions command the rig.
     """
@@ -83,7 +83,7 @@ def allowed_run(
 
 
 def _bounds(rig: Rig, like: Case, limits: RunLimits) -> Mapping[str, float]:
-    """Return the limits by what a simulation shows; a rig that positions command bounds its own torque."""
+    """Return the limits by simulated quantity; a rig commanded by positions bounds its own torque."""
     present: dict[str, float] = {
         n: float(np.nanmax(np.abs(y))) for n, y in like.measured.items() if n in ("position", "velocity")
     }
@@ -110,7 +110,7 @@ def _scaled(kind: str, settings: Settings, peak: float) -> tuple[Settings, Float
 
 
 def _rounded(value: float) -> float:
-    """Return a value with four digits, rounded towards zero: it is what a person types."""
+    """Return a value with four digits, rounded towards zero, for a person to type."""
     if value == 0.0:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(value)) - 3)
@@ -120,7 +120,7 @@ def _rounded(value: float) -> float:
 def _simulated(
     rig: Rig, like: Case, command: FloatArray, rate: float
 ) -> tuple[Case, Mapping[str, FloatArray]]:
-    """Return a case whose measurements are the rig's without noise, and all that limits speak of."""
+    """Return a case with the rig's noise-free measurements, and all limited quantities."""
     t = np.arange(len(command)) / rate
     names = sorted({*like.measured, *filter(rig.measures, _SHOWN)})
     blank = {n: Channel(t + 1.0 / rate, np.zeros(len(t))) for n in names}

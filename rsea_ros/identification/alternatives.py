@@ -1,10 +1,10 @@
-"""What the estimates would be, were some simple thing wrong that the rig does not list.
+"""The estimates with a simple law added that the rig does not list.
 
-Where the model does not fit, its estimates are biased by whatever is missing, and no covariance of the
+Where the model does not fit, the missing law biases its estimates, and no covariance of the
 residual shows that: a motor constant 10 % off moves K_s by 11 % while K_s seems known to 0.01 %. So each of a
 few laws that a bench often has is added in turn and fitted with everything else. One that takes away part of
 the misfit is credible, and its estimates widen the intervals (model averaging, Buckland et al. 1997, in its
-most careful form: the span). Which law it is, the diagnosis tells, not this.
+most careful form: the span). Only the diagnosis decides which law it is.
 """
 
 from __future__ import annotations
@@ -54,16 +54,17 @@ class Alternative:
 def extended(
     present: Problem, theta: FloatArray, effect: Effect, start: dict[str, float]
 ) -> tuple[Problem, FloatArray]:
-    """Return the present problem with one more effect whose parameters may move, and where it begins."""
+    """Return the present problem with one more effect whose parameters may move, and its start."""
     unknowns = (*present.unknowns, *unknowns_of_effect(effect, start))
-    problem = replace(present, rig=with_effect(present.rig, effect.name, start), unknowns=unknowns)
+    rig = with_effect(present.rig, effect.name, start)
+    problem = replace(present, rig=rig, unknowns=unknowns, newest=effect.name)
     return problem, np.concatenate([theta, start_vector(problem.unknowns)[len(theta) :]])
 
 
 def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[Alternative, ...]:
-    """Return the laws that would explain a part of what a solution leaves, the best first.
+    """Return the laws that would explain a part of a solution's residual, the best first.
 
-    cases: with the noise of their sensors, not with the weights that the misfit made of it.
+    cases: with the noise of their sensors, not with weights from the misfit.
     """
     problem = solution.problem
     if is_inverse(problem.rig):
@@ -78,7 +79,7 @@ def alternatives(solution: Solution, cases: Sequence[Case], run: Map) -> tuple[A
 
 
 def _fitted(solution: Solution, effect: Effect, run: Map) -> Solution | None:
-    """Return the fit with an effect beside everything else; None where the rig cannot have it."""
+    """Return the fit with one more effect; None where the rig cannot have it."""
     try:
         there = extended(solution.problem, _clocks_at_zero(solution), effect, effect.typical)
         return solve(*there, iterations=_ITERATIONS, run=run)
@@ -93,7 +94,7 @@ def _clocks_at_zero(solution: Solution) -> FloatArray:
 
 
 def _settled(solution: Solution, cases: Sequence[Case], run: Map) -> Solution:
-    """Return an alternative fitted again, every channel in units of what it leaves of it, or of the noise."""
+    """Return an alternative fitted again, every channel in units of its residual or its noise."""
     known = replace(solution.problem, cases=tuple(cases))
     ratios = misfit_ratios(replace(solution, problem=known))
     weighted = tuple(reweighted(case, ratios) for case in cases)

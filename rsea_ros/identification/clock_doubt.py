@@ -1,7 +1,7 @@
-"""What the doubt of an even clock adds to the doubt of a fit.
+"""The contribution of an even clock's doubt to the doubt of a fit.
 
 The zero of an even clock through n stamps of scatter s is known to s / sqrt(n). A clock off by d moves a fit
-by -H^-1 J' c d, with c = d r / d clock. Channels that came in one message share a clock; a late command is an
+by -H^-1 J' c d, with c = d r / d clock. Channels of one message share a clock; a late command is an
 early sensor, all of them together.
 """
 
@@ -35,7 +35,7 @@ def with_even_clocks(
 
 
 def _moved(solution: Solution, stamped: Sequence[Record], even: Sequence[Record]) -> Iterator[FloatArray]:
-    """Yield what one sigma of each even clock does to the residual, shape (m,)."""
+    """Yield the change of the residual by one sigma of each even clock, shape (m,)."""
     problem = solution.problem
     doubts = [_doubts(before, after) for before, after in zip(stamped, even, strict=True)]
     if not any(doubts):

@@ -1,11 +1,12 @@
-"""Which clocks of the sensors a fit must move, asked of its residual, and what they would cost.
+"""The sensor clocks that a fit must move, by a test of its residual, and their cost.
 
 With c = d r / d clock, the other unknowns projected out of it, and r the weighted residual without the clock,
 
     z = c'r / sqrt(max(sum_b s_b^2, c'c)),   s_b = c_b' (r_b - c_b c'r / c'c) of blocks of one second
 
-is a standard normal where the clock is right (score test; blocks as in confidence.py). A clock that is not
-asked for is taken as right: free, it takes the place of damping, for a late F/T sensor looks like more b_m.
+is a standard normal where the clock is right (score test; blocks as in confidence.py). A clock that the test
+does not free counts as right: a free one would compete with damping, because a late F/T sensor looks like
+more b_m.
 """
 
 from __future__ import annotations
@@ -37,14 +38,14 @@ WORTH = 2.0
 
 @dataclass(frozen=True)
 class Asked:
-    """Clocks that the data ask for, and by unknown how much wider its interval were with the others free."""
+    """Clocks that the data require, and by unknown the widening of its interval with the others free."""
 
     clocks: tuple[Unknown, ...] = ()
     cost: Mapping[str, float] | None = None
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What taking the other clocks as right saves; none where it saves little."""
+        """Remarks on the precision gained by taking the other clocks as right; empty where it is small."""
         name, times = max((self.cost or {"": 0.0}).items(), key=lambda item: item[1])
         return (Remark("clocks_taken_as_right", (name,), (times,)),) if times >= WORTH else ()
 
@@ -73,7 +74,7 @@ def asked_of(solution: Solution, run: Map = serial) -> Asked:
 
 
 def freed(solution: Solution, asked: Asked) -> tuple[Problem, FloatArray]:
-    """Return the problem of a fit with the clocks asked for beside its unknowns, and where to begin."""
+    """Return the problem of a fit with the required clocks among its unknowns, and its start."""
     problem = replace(solution.problem, unknowns=(*solution.problem.unknowns, *asked.clocks))
     return problem, np.concatenate([solution.theta, np.zeros(len(asked.clocks))])
 
@@ -110,7 +111,7 @@ def _score(
 
 
 def _left_over(solution: Solution, columns: FloatArray, taken: Sequence[Unknown]) -> float:
-    """Return the RMS over the noise of what a fit would leave with some clocks free, by its derivatives."""
+    """Return the RMS over the noise of the residual with some clocks free, by the derivatives."""
     base = np.column_stack([solution.jacobian, columns])
     known = (*solution.problem.unknowns, *taken)
     normal = base.T @ base + np.diag([u.doubt**-2 for u in known])

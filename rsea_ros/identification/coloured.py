@@ -1,8 +1,8 @@
-"""Is what a model leaves of a channel noise of its sensor, coloured or not, or something that it lacks?
+"""Whether a channel's residual is noise of its sensor, coloured or not, or a misfit of the model.
 
 Sensor noise is stationary; its spectrum falls with frequency and is flat below what a block of a second
-resolves; whitened, it is nearly Gaussian; and it knows nothing of the command, of the motion, or of what
-another sensor shows. A residual that passes all of this is noise, however large; one that fails in any point
+resolves; whitened, it is nearly Gaussian; and it is independent of the command, of the motion, and of
+other sensors. A residual that passes all of these tests is noise, however large; one that fails in any point
 is a misfit. Limits were set between noise of first order with a memory of up to 0.25 s and mild effects,
 inside and outside the catalogue, of the second bench in test/independent.
 """
@@ -43,7 +43,7 @@ def is_noise(case: Case, outputs: Mapping[str, FloatArray], channel: str, ratio:
     """Return whether the residual of a channel is noise of its sensor, coloured or not.
 
     outputs: of the fitted model, by channel. ratio: of the gear, rotor over output.
-    False where the record is too short to tell.
+    False where the record is too short to decide.
     """
     left = residual_of(case, outputs, channel)
     if len(left) < FEWEST or not np.any(left):

@@ -1,4 +1,4 @@
-"""How sure a fit is, and what its data cannot determine.
+"""The confidence of a fit, and the values that its data cannot determine.
 
 The covariance is the sandwich H^-1 (sum_b g_b g_b' + W^2) H^-1 with H = J'J + W^2, W the inverse prior
 doubts, and g_b = J_b' r_b the scores of blocks of one second: right also where the residual is coloured or
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_ros.identification.determined import shares_told
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.solver import Solution, central_jacobian
@@ -27,8 +28,6 @@ BLOCK = 1.0
 """s. Residuals further apart than this are taken as independent."""
 _MOST_CORRECTED = 4.0
 """Largest correction for the blocks that the fit has used up: n / (n - p) of n blocks and p unknowns."""
-_NULL = 1e-9
-"""Of the prior's information: what stands in for none, so that data that say nothing give a wide variance."""
 _WEAK = 100.0
 """Of the prior's information: below it forward differences may take curvature for information."""
 _INVOLVED = 0.2
@@ -41,9 +40,7 @@ _ALIKE = 0.8
 class Confidence:
     """Covariance in the fit's coordinates, shape (n, n), and by unknown the share determined by the data.
 
-    told: d^2 / (d^2 + v) with d the doubt before and v the variance that the data alone leave, all other
-    unknowns free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
-    theta: where the fit ended, shape (n,).
+    told: by determined.shares_told. information: J'J, shape (n, n). theta: where the fit ended, shape (n,).
     """
 
     theta: FloatArray
@@ -74,15 +71,15 @@ def confidence_of(solution: Solution) -> Confidence:
     least = np.minimum(least, np.maximum(np.diag(inverse), doubt**2))
     larger = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     covariance = covariance * np.outer(larger, larger)
-    return Confidence(solution.theta, covariance, _told(information, doubt), information)
+    return Confidence(solution.theta, covariance, shares_told(information, doubt), information)
 
 
 def inverse_of(matrix: FloatArray) -> FloatArray:
     """Return the inverse of a positive definite matrix whose unknowns may be scaled very differently.
 
     Each unknown is brought to the scale of its own diagonal first: otherwise a value that only wide bounds
-    hold is taken for a singular direction beside one that is known well. What rounding hides of an eigenvalue
-    counts as the smallest that rounding shows, which leaves a wide variance and never none.
+    hold is taken for a singular direction beside one that is known well. An eigenvalue lost in rounding
+    counts as the smallest resolvable one, which leaves a wide variance and never zero.
     """
     scale = 1.0 / np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
@@ -92,16 +89,9 @@ def inverse_of(matrix: FloatArray) -> FloatArray:
 
 
 def _alike(case: Case) -> float:
-    """Return how many samples of a case are worth one independent sample: a filter makes them alike."""
+    """Return how many samples of a case equal one independent sample: a filter correlates them."""
     drive = case.drive
     return 1.0 if isinstance(drive, Drive) else max(1.0, 0.5 / (CUT_OFF * float(drive.t[1] - drive.t[0])))
-
-
-def _told(information: FloatArray, doubt: FloatArray) -> FloatArray:
-    """Return by unknown the share of what is known of it that the data alone brought, 0 … 1."""
-    scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
-    told: FloatArray = 1.0 / (1.0 + np.diag(np.linalg.inv(scaled)))
-    return told
 
 
 def _block_scores(solution: Solution) -> FloatArray:
@@ -131,7 +121,7 @@ def interval(unknown: Unknown, coordinate: float, sd: float) -> tuple[float, flo
 
 
 def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[Remark, ...]:
-    """Return what the data cannot determine.
+    """Return remarks on values that the data cannot determine.
 
     The eigenvectors of the data's information, in units of the prior, whose information is less than the
     prior's: of several values only ratios are determined, or only all together, or a single value is not.
@@ -155,9 +145,9 @@ def undetermined(unknowns: Sequence[Unknown], confidence: Confidence) -> tuple[R
 
 
 def torque_scale(problem: Problem) -> tuple[Remark, ...]:
-    """Return on what every torque rests where no F/T sensor measures one and no fit asks for that.
+    """Return a remark on the basis of every torque without an F/T sensor, where no fit needs one.
 
-    The motor's torque is its current times a constant: it says nothing of the constant.
+    The motor's torque is its current times a constant, which it cannot determine.
     """
     fitted = any(u.name.startswith("torque_constant_error.") for u in problem.unknowns)
     if fitted or any("ft" in case.measured for case in problem.cases):
@@ -178,7 +168,7 @@ def _without_the_rest(information: FloatArray, index: Sequence[int]) -> FloatArr
 
 
 def _size(unknown: Unknown, coordinate: float) -> float:
-    """Return what a change of the coordinate is measured against: the value, or near 0 its typical size."""
+    """Return the reference of a change of the coordinate: the value, or near 0 its typical size."""
     return 1.0 if unknown.logarithmic else max(abs(coordinate), 0.1 * unknown.scale)
 
 
@@ -187,7 +177,7 @@ def _at_bound(unknown: Unknown, coordinate: float) -> Remark:
 
 
 def _remark(unknowns: Sequence[Unknown], moved: FloatArray) -> Remark:
-    """Return what is undetermined of unknowns that move together. moved: how far each, relatively."""
+    """Return the remark on unknowns that are undetermined together. moved: relative change of each."""
     names = tuple(u.name for u in unknowns)
     if len(names) == 1:
         return Remark("only_prior" if np.isfinite(unknowns[0].doubt) else "not_shown", names)

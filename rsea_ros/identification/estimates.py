@@ -1,4 +1,4 @@
-"""What a fit says: its errors by channel, its estimates with their intervals, the rig with them."""
+"""The results of a fit: errors by channel, estimates with intervals, the rig with them."""
 
 from __future__ import annotations
 
@@ -41,8 +41,9 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
             unit=in_motion(u.unit, linear=solution.problem.rig.linear),
             ci95=interval(u, float(theta), float(s)),
             start=u.start,
-            spread=u.doubt,
+            spread=u.spread,
             told_by_data=float(told),
+            spreads_off=u.sigmas(float(theta)),
         )
         for u, theta, s, told in zip(
             solution.problem.unknowns, solution.theta, sd, confidence.told, strict=True
@@ -51,7 +52,7 @@ def parameters_of(solution: Solution, confidence: Confidence) -> tuple[Parameter
 
 
 def identified_rig(solution: Solution, parameters: Sequence[ParameterEstimate]) -> Rig:
-    """Return the rig with what was fitted, its intervals, and its doubt as the next fit's spread."""
+    """Return the rig with the fitted values, their intervals, and their doubt as the next fit's spread."""
     rig, clocks = apply(solution.problem.rig, solution.problem.unknowns, solution.theta)
     sensors = {
         n: replace(

@@ -1,9 +1,10 @@
-"""Commands and sensors on an even clock that were stamped with scatter, as a driver's process stamps them.
+"""Commands and sensors on an even clock whose stamps scatter, as those of a driver's process.
 
 Scattered stamps read the simulation at wrong instants, and those of commands drive it at wrong instants. That
-is no mere noise: it makes quick motion look dear, and a fit finds too much damping (errors in variables;
-Fuller, Measurement Error Models, 1987). Whether the stamps or the even clock behind them are right the values
-tell: the simulation agrees with one of them.
+is more than noise: quick motion seems to need more torque, and a fit finds too much damping (errors in
+variables; Fuller, Measurement Error Models, 1987). The values decide whether the stamps or the even clock
+behind them are
+right: the simulation agrees with one of them.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Evened:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Return what was done; nothing where no stamps scatter."""
+        """Return remarks on the changes; empty where no stamps scatter."""
         names = tuple(sorted(self.scatter))
         return (Remark("even_clocks", names, tuple(self.scatter[n] for n in names)),) if names else ()
 
@@ -69,8 +70,8 @@ def may_be_even(record: Record) -> bool:
 def even_clock(t: FloatArray, shared: float = 0.0) -> FloatArray:
     """Return the stamps of an even clock that come nearest to t, s, shape of t; samples may be missing.
 
-    shared: period of all channels, s: taken where the stamps do not speak against it, for it is surer.
-    Returns t itself where no even clock comes near to all of it, or where t is even already.
+    shared: period of all channels, s: used where the stamps do not contradict it, because it is surer.
+    Returns t itself where no even clock is near all of it, or where t is already even.
     """
     line = _line(t)
     period = shared if abs(line.period - shared) < _SURE * line.doubt else line.period
@@ -130,7 +131,7 @@ def _taking(record: Record, steady: Record, names: Collection[str]) -> Record:
 def _preferred(
     record: Record, steady: Record, changed: Collection[str], rig: Rig, solution: Solution
 ) -> set[str]:
-    """Return the channels that leave less on the even clock: sensors each, the command by what all leave."""
+    """Return the channels with a smaller residual on the even clock: each sensor, the command by all."""
     sensors = set(changed) - {"command"}
     chosen, left = _sensors_preferred(record, steady, sensors, rig, solution)
     if "command" not in changed:
@@ -144,7 +145,7 @@ def _preferred(
 def _sensors_preferred(
     record: Record, steady: Record, sensors: set[str], rig: Rig, solution: Solution
 ) -> tuple[set[str], dict[str, float]]:
-    """Return the sensors that leave less on the even clock, and what every sensor leaves then."""
+    """Return the sensors with a smaller residual on the even clock, and the residual of every sensor then."""
     stamped = _left(record, rig, solution)
     if not sensors:
         return set(), stamped

@@ -1,6 +1,6 @@
 """Excitations: torque commands on a uniform grid, N m.
 
-Every kind is a function of one `Settings` and stands in KINDS under the name by which the excite node and the
+Every kind is a function of one `Settings`, in KINDS under the name by which the excite node and the
 command line choose it. `excitation()` adds the ramps.
 """
 
@@ -27,7 +27,7 @@ _DETECTION_GROUP = 4
 
 @dataclass(frozen=True)
 class Settings:
-    """What shapes an excitation.
+    """The settings of an excitation.
 
     rate: Hz. duration: s, without the ramps of periodic kinds. amplitude: N m, peak of chirp and steps, rms
     of multisine and white noise. noise: N m, standard deviation of the noise on top of the chirp. low, high:
@@ -103,7 +103,7 @@ def multisine(settings: Settings) -> FloatArray:
 
         u(t) = sqrt(2 / K) A sum_k cos(2 pi k t / period + phi_k),   k in odd_lines(settings)
 
-    The lines left out tell odd distortion, the even ones even distortion (Pintelon, Schoukens, System
+    The omitted odd lines show odd distortion, the even ones even distortion (Pintelon, Schoukens, System
     Identification, 2nd ed., section 4.3). Raises ParameterError for a period that is not a whole number of
     samples or does not fit the duration.
     """

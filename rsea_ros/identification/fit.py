@@ -1,4 +1,4 @@
-"""The fit of a rig: output error, with the noise that the residual shows and the clocks that it asks for."""
+"""The fit of a rig: output error, with noise and clocks determined by the residual."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ _OTHER_NOISE = 1.1
 def fit(
     cases: Sequence[Case], rig: Rig, run: Map = serial, start: Rig | None = None
 ) -> tuple[Solution, tuple[Case, ...], Asked]:
-    """Fit the rig's free values, its effects and the clocks that the data ask for.
+    """Fit the rig's free values, its effects and the clocks that the data require.
 
-    Returns the cases with their noise too, and what was asked of the clocks.
+    Returns also the cases with their noise, and the result of the clock tests.
 
     The noise is the one that the first fit's residual shows. Where a channel's residual stays above it the
-    weight becomes that residual, as maximum likelihood with unknown noise has it. start: where to begin,
-    should the records fit it better than `rig`.
+    weight becomes that residual, as in maximum likelihood with unknown noise. start: a start,
+    if the records fit it better than `rig`.
     """
     unknowns = tuple(u for u in unknowns_of(rig, cases) if not u.is_clock)
     problem = Problem(tuple(cases), rig, unknowns, MEASURED)

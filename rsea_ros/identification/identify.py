@@ -1,4 +1,4 @@
-"""Identification: the parameters of a rig from records, by output error on all channels that are there."""
+"""Identification: the parameters of a rig from records, by output error on all present channels."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from rsea_ros.identification.even_stamps import Evened, evened
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.joint_start import joint_start
 from rsea_ros.identification.misfit import ratios_of
+from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case, case_from
 from rsea_ros.identification.record_checks import check_excited, check_usable
 from rsea_ros.identification.responses import model_response, responses_of
@@ -51,7 +52,7 @@ from rsea_ros.signals import FloatArray, Record
 def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = None) -> Identification:
     """Return the parameters of the rig, effects that it lists included, with their confidence.
 
-    Raises IdentificationError when the records do not hold what the rig needs.
+    Raises IdentificationError when the records lack a channel that the rig needs.
     """
     report = progress or (lambda step, share: None)
     report("reading", 0.0)
@@ -86,7 +87,7 @@ def identify(records: Sequence[Record], rig: Rig, progress: Progress | None = No
 
 
 def _start(record: Record, rig: Rig, responses: Sequence[FrequencyResponse]) -> Rig | None:
-    """Return where a fit may begin beside the rig's own values."""
+    """Return a start of the fit other than the rig's own values."""
     if is_inverse(rig):
         return None
     return start_from(responses, rig) if rig.loop is None else joint_start(record, rig)
@@ -130,7 +131,11 @@ def _result(
         models=tuple(model_response(rig, r.output, r.frequency) for r in responses),
         overlays=overlays_of(problem.cases[0], outputs[0]),
         statics=statics_of(records[0], rig),
-        remarks=(*torque_scale(problem), *undetermined(problem.unknowns, confidence)),
+        remarks=(
+            *off_rig(parameters),
+            *torque_scale(problem),
+            *undetermined(problem.unknowns, confidence),
+        ),
         notes=tuple(note for r in records for note in r.notes),
         faults=tuple(fault for r in records for fault in r.faults),
     )

@@ -1,4 +1,4 @@
-"""Where the fit of a joint in a position loop begins: a regression of torques along its measured motion.
+"""The start of the fit of a joint in a position loop, by a regression of torques along its measured motion.
 
     u = J a + b v + F sign(v) + c_s sin q + c_c cos q + T_0,   m g l = |(c_s, c_c)|, its angle atan2(c_c, c_s)
 
@@ -29,7 +29,7 @@ INERTIA, DAMPING = "rotor.reflected_inertia", "rotor.reflected_damping"
 
 
 def joint_start(record: Record, rig: Rig) -> Rig:
-    """Return the rig with its free values begun by the regression; as it is where that cannot be made.
+    """Return the rig with its free values from the regression; unchanged where that is impossible.
 
     record: with the targets as its command.
     """

@@ -1,4 +1,4 @@
-"""What every method of estimation returns: the sampled response line by line, with its doubt."""
+"""The result of every method of estimation: the sampled response line by line, with its doubt."""
 
 from __future__ import annotations
 

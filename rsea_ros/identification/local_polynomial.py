@@ -12,7 +12,7 @@ European Journal of Control 15, 2009.)
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import rfft
+from numpy.fft import rfft
 
 from rsea_ros.identification.lines import Lines, detrended, widened
 from rsea_ros.identification.resample import Aligned

@@ -32,7 +32,7 @@ def scale_of(cases: Sequence[Case], rig: Rig) -> Scale:
 def torque_size(case: Case, rig: Rig) -> float:
     """Return the largest torque of a run, N m: commanded, or measured in the motor or by the F/T sensor.
 
-    Of a position loop: measured in the motor, else what it asks for by its errors. 0 where none shows it.
+    Of a position loop: measured in the motor, otherwise computed from its errors. 0 where unknown.
     """
     if rig.loop is None:
         shown = [_largest(case, n) for n in ("motor_torque", "ft") if n in case.measured]
@@ -44,7 +44,7 @@ def torque_size(case: Case, rig: Rig) -> float:
 
 
 def _asked_by_errors(case: Case, rig: Rig) -> float:
-    """Return the largest torque that a position loop asks for by its errors, N m; 0 without a position."""
+    """Return the largest torque of a position loop by its errors, N m; 0 without a position."""
     if "position" not in case.measured or not isinstance(case.drive, Drive):
         return 0.0
     keep, drive = case.mask["position"], case.drive

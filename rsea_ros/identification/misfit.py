@@ -30,5 +30,5 @@ def ratios_of(
 
 
 def reweighted(case: Case, ratios: Mapping[str, float]) -> Case:
-    """Return a case in which what a fit leaves of a channel counts as its noise, where that is more."""
+    """Return a case in which the residual of a channel counts as its noise, where it is larger."""
     return replace(case, noise={n: s * max(1.0, ratios.get(n, 1.0)) for n, s in case.noise.items()})

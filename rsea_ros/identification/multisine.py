@@ -1,6 +1,6 @@
 """Periodic excitation: every period is a repetition, so noise and distortion can be distinguished.
 
-The spread between periods is noise. What the mean period has at lines that were not excited, beyond that
+The spread between periods is noise. The mean period's power at lines that were not excited, beyond that
 noise, is nonlinear distortion: even at even lines, odd at odd ones.
 (Pintelon, Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., chapter 4.)
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import rfft
+from numpy.fft import rfft
 
 from rsea_ros.identification.lines import Lines, widened
 from rsea_ros.identification.periodicity import Periods

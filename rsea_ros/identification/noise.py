@@ -1,9 +1,10 @@
-"""The noise floor of a channel before any fit: from the record, and from what the rig states of its sensor.
+"""The noise floor of a channel before any fit: from the record, and from the rig's statement on its sensor.
 
-White sensor noise is all that is left at the top of the band of a torque-driven actuator once what follows
-the command linearly has been taken away: S_nn = (1 - coherence) S_yy, median over the top of the band. Where
+At the top of the band of a torque-driven actuator only white sensor noise remains once the linear response to
+the command is removed: S_nn = (1 - coherence) S_yy, median over the top of the band. Where
 that is not flat (a smoothed log) or the channel is slower than the command, so that the command's upper half
-is folded over it, the record cannot tell its noise; the rig's statement stands until a fit has its residual.
+is folded over it, the record does not show its noise; the rig's statement counts until a fit has its
+residual.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _ROUNDING = 1e-9
 def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
     """Return the RMS of a channel's noise, in its unit: white noise with the level at the top of the band.
 
-    sensor: as the rig states it; its statement counts where the record cannot tell.
+    sensor: as the rig states it; its statement counts where the record does not show the noise.
     """
     t, y = _finite(record[name])
     least = least_noise(y, sensor)
@@ -50,10 +51,10 @@ def noise_floor(record: Record, name: str, sensor: Sensor) -> float:
 
 
 def least_noise(values: FloatArray, sensor: Sensor) -> float:
-    """Return the least that a channel's noise is taken for: no model is asked for more.
+    """Return the least noise of a channel: no model has to fit better.
 
     Half the rig's quantum, or where the values come in steps larger than that, q / sqrt(12) of those; and a
-    tenth of the noise that the rig states: what looks better than that was filtered.
+    tenth of the noise that the rig states: a smaller one comes from a filter.
     """
     step = step_of(values)
     coarse = step / math.sqrt(12.0) if step > sensor.quantum else 0.0

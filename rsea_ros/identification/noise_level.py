@@ -1,8 +1,8 @@
-"""The noise of every channel after a fit, from what the model leaves of it.
+"""The noise of every channel after a fit, from its residual.
 
-A floor never lies above the residual's white part, which no law of the bench can make; and where all of a
-residual passes for noise of the sensor (coloured.py) it lies as high as that. Such noise is called coloured
-only where it lies above its white part by more than the doubt of that part, which is large in short records.
+A floor is never above the residual's white part, which no law of the bench can make; and where all of a
+residual passes for noise of the sensor (coloured.py) it equals that residual. That noise is called coloured
+only where it exceeds its white part by more than the doubt of that part, which is large in short records.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _BLOCK = 1.0
 
 
 def reestimate_noise(case: Case, outputs: Mapping[str, FloatArray], ratio: float = 1.0) -> Case:
-    """Return a case with its noise as a fitted model's residual shows it.
+    """Return a case with its noise from a fitted model's residual.
 
     outputs: simulated, by channel. ratio: of the gear, rotor over output, for ripple. Coloured noise is taken
     only where every channel above its white noise passes for noise: a misfit seldom shows in one alone.

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from numpy.fft import irfft, rfft
 
+from rsea_ros.fast_length import next_fast_length
 from rsea_ros.signals import FloatArray
 
 FEWEST_PERIODS = 3
@@ -37,7 +38,7 @@ def _likely_lags(command: FloatArray) -> list[int]:
     """Return the shortest lags at which the autocorrelation peaks, samples."""
     n = len(command)
     centred = command - command.mean()
-    size = next_fast_len(2 * n, real=True)
+    size = next_fast_length(2 * n, real=True)
     correlation = irfft(np.abs(rfft(centred, size)) ** 2, size)[: n // FEWEST_PERIODS + 1]
     if len(correlation) < 3 or correlation[0] <= 0.0:
         return []

@@ -1,4 +1,4 @@
-"""A fit as a value: what was measured, with which weight, and the simulation that is held against it."""
+"""A fit as a value: measurements with their weights, and the simulation compared with them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Case:
     """One record ready to be simulated: drive, measured channels, their noise, and which samples count.
 
     floating: channels whose zero is unknown; they are compared without their means.
-    least: by channel the least that its noise is taken for. coloured: channels whose residual, all of it, was
+    least: by channel its least noise. coloured: channels whose entire residual was
     taken for noise of the sensor after a fit (noise_level.py).
     """
 
@@ -118,8 +118,8 @@ def channels_that_tell(record: Record, rig: Rig) -> list[str]:
 def _inverse_case(record: Record, rig: Rig) -> Case:
     """Make a record of a drive without a spring ready: its torque against the one that its motion takes.
 
-    Noise: what the filter lets through of the white noise that the torque has at the top of its band, or
-    where that is not flat of what the rig states, if that is more.
+    Noise: the part that passes the filter of the white noise at the top of the torque's band, or
+    where that is not flat of the stated noise, if that is more.
     """
     motion, torque = motion_from(record), acted(record)
     for name, channel in (("position", record["position"]), ("the torque that acted", torque)):
@@ -185,9 +185,10 @@ def weighted(case: Case, outputs: Mapping[str, FloatArray], channels: Sequence[s
 
 @dataclass(frozen=True)
 class Problem:
-    """Records, the rig, and what may move. channels: what the residual is made of.
+    """Records, the rig, and the unknowns. channels: of the residual.
 
     stated: names of the effects that belong to the nominal rig; a search adds others beside them.
+    newest: name of the effect that the search added last; empty for none.
     """
 
     cases: tuple[Case, ...]
@@ -196,6 +197,7 @@ class Problem:
     channels: tuple[str, ...]
     ride: bool = False
     stated: frozenset[str] = frozenset()
+    newest: str = ""
 
     @property
     def acting(self) -> tuple[str, ...]:

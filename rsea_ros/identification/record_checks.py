@@ -1,4 +1,4 @@
-"""What records must have to be identified: finite values, rising stamps, a command that changes."""
+"""Requirements on records for identification: finite values, rising stamps, a command that changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Remarks: what a fit or a diagnosis has to say beside its numbers, as facts (report/remark_words.py)."""
+"""Remarks of a fit or a diagnosis beside its numbers, as facts (worded by report/remark_words.py)."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ Code = Literal[
     "coherence_lost",
     "on_measured_angle",
     "coloured_noise",
+    "off_rig",
 ]
 """What a remark says.
 
@@ -35,12 +36,13 @@ also_in_model: effects that the extended model has and that are no causes.
 coherence_lost: of a channel with the command, above a frequency (Hz).
 on_measured_angle: an effect was simulated on the measured rotor angle.
 coloured_noise: of channels, taken from the residual.
+off_rig: the rig states a value, the data another (that, 95 % interval), so many of its stated spreads away.
 """
 
 
 @dataclass(frozen=True)
 class Remark:
-    """A fact: what it says, the parameters, channels or effects that it is about, and its numbers."""
+    """A fact: its code, the parameters, channels or effects concerned, and its numbers."""
 
     code: Code
     names: tuple[str, ...] = ()

@@ -1,8 +1,8 @@
 """One channel beside the command on the command's own clock, header stamps honoured.
 
 The command is known at all times (it is held from stamp to stamp), the channel only at its own stamps. So
-the command's clock is the grid, and the channel is moved as little as possible: a constant offset stays an
-offset, told to the caller; only jitter, gaps and foreign rates are interpolated.
+the command's clock is the grid, and the channel is shifted as little as possible: a constant offset stays an
+offset, returned to the caller; only jitter, gaps and other rates are interpolated.
 """
 
 from __future__ import annotations
@@ -115,13 +115,13 @@ def held_mean(command: Channel, edges: FloatArray) -> FloatArray:
 
 
 def _offset(place: FloatArray) -> float:
-    """Return the typical offset of samples from the grid, in periods, -0.5 … 0.5; 0 where there is none."""
+    """Return the typical offset of samples from the grid, in periods, -0.5 … 0.5; 0 without one."""
     mean = np.exp(2j * np.pi * place).mean()
     return float(np.angle(mean) / (2.0 * np.pi)) if abs(mean) > 0.5 else 0.0
 
 
 def _at(place: FloatArray, y: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return the channel at the wanted places: as it is where it was sampled there, else by a spline."""
+    """Return the channel at the wanted places: unchanged where sampled, otherwise by a spline."""
     near = np.searchsorted(place, wanted - 0.5)
     near = np.minimum(near, len(place) - 1)
     if np.all(np.abs(place[near] - wanted) < _STEADY):

@@ -8,7 +8,7 @@ from rsea_ros.signals import FloatArray
 
 
 def edges_of(values: FloatArray, count: int, *, equal: bool) -> FloatArray:
-    """Return the edges of bins, rising: equally wide ones, or such that hold equally many of the values.
+    """Return the edges of bins, rising: of equal width, or with equal numbers of values.
 
     Where many values are the same the bins are fewer than `count`.
     """

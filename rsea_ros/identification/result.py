@@ -1,4 +1,4 @@
-"""What an identification says, as values. Reports and files are made from these."""
+"""The result of an identification as values, for reports and files."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from rsea_ros.identification.determined import TOLD, Determined, how_determined
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.identification.statics import Statics
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import SENSED, ComplexArray, Fault, FloatArray
 
 Verdict = Literal["adequate", "misfit", "not_identifiable"]
 """Whether the model fits down to the noise, and if so, whether the data determine any of its values."""
 AT_NOISE = 1.1
 """RMS of a residual over the noise, up to which it is the noise."""
-_TOLD = 0.5
-"""Share of what is known of a value that the data must have brought for it to be identified."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,9 @@ CLOCKS = ("clock.", "clock_rate.")
 class ParameterEstimate:
     """A parameter in SI with its 95 % interval.
 
-    told_by_data: share of what is known of it that the data brought, 1 - var(posterior) / var(prior).
-    start: the value that the rig stated. spread: relative one-sigma prior spread around it.
+    told_by_data: share of its information that comes from the data, 1 - var(posterior) / var(prior).
+    start: the value that the rig stated. spread: relative one-sigma prior spread around it. spreads_off:
+    distance of the value from it in spreads.
     """
 
     name: str
@@ -60,11 +61,17 @@ class ParameterEstimate:
     start: float
     spread: float
     told_by_data: float
+    spreads_off: float = 0.0
 
     @property
     def is_told(self) -> bool:
-        """Return whether the data determine the value, rather than what the rig states."""
-        return self.told_by_data >= _TOLD
+        """Return whether the data determine the value, rather than the rig's prior."""
+        return self.told_by_data >= TOLD
+
+    @property
+    def determined(self) -> Determined:
+        """Return how well the data determine the value."""
+        return how_determined(self.name, self.value, self.ci95, self.told_by_data)
 
 
 @dataclass(frozen=True)
@@ -79,15 +86,14 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters with confidence, how well they explain the record, and what the data cannot determine.
+    """Parameters with confidence, their fit to the record, and values that the data cannot determine.
 
     rig: the rig with the identified values. residual_rms, noise_rms: by channel, in its unit.
     fit_percent: 100 (1 - ||e|| / ||y - mean y||) by channel. models: the fitted model's response at the
-    frequencies of each of `responses`. remarks: what is not identifiable, and what was done to the stamps.
+    frequencies of each of `responses`. remarks: on values that are not identifiable, and on corrected stamps.
     statics: of slow ramps against a locked output. alternatives: laws that would explain a part of the
-    misfit; the intervals span what each makes of the values. coloured: channels whose residual was taken for
-    coloured noise of the sensor. rig_option: the rig as the user named it. clocks: what unknown clocks of
-    the sensors would cost.
+    misfit; the intervals span their estimates. coloured: channels whose residual was taken for
+    coloured noise of the sensor. clocks: cost of unknown clocks of the sensors.
     """
 
     rig: Rig
@@ -109,7 +115,7 @@ class Identification:
     alternatives: tuple[str, ...] = ()
     coloured: tuple[str, ...] = ()
     clocks: tuple[Remark, ...] = ()
-    rig_option: str = ""
+    rig_choice: RigChoice = field(default_factory=RigChoice)
 
     @property
     def times_noise(self) -> dict[str, float]:
@@ -120,7 +126,7 @@ class Identification:
 
     @property
     def at_noise(self) -> bool:
-        """Return whether every channel that judges is down to its noise."""
+        """Return whether every channel that counts is at its noise."""
         return all(ratio <= AT_NOISE for ratio in self.times_noise.values())
 
     @property
@@ -130,9 +136,9 @@ class Identification:
 
     @property
     def verdict(self) -> Verdict:
-        """Return whether the model fits what the sensors measured, and whether that determines any value.
+        """Return whether the model fits the measurements, and whether they determine any value.
 
-        A sensor that measures nothing is a misfit: the model says what it should have measured.
+        A sensor that measures nothing is a misfit: the model predicts its measurement.
         """
         if not self.at_noise or self.silent:
             return "misfit"

@@ -1,4 +1,4 @@
-"""The paper's second-order fit of T_d / T_m, and what it says of the actuator (Eq. (10)).
+"""The paper's second-order fit of T_d / T_m, and the values of the actuator from it (Eq. (10)).
 
     T_d / T_m = c / (s^2 + a1 s + a0)
 
@@ -93,7 +93,7 @@ def fit_second_order(measured: FrequencyResponse, low: float = 0.0, high: float 
 
 
 def effective_values(k_s: float, c: float, a1: float, a0: float) -> EffectiveValues:
-    """Return what Eq. (10) says: J_eff = K_s / mean(c, a0), b_eff = a1 J_eff. k_s: measured, N m/rad."""
+    """Return the values by Eq. (10): J_eff = K_s / mean(c, a0), b_eff = a1 J_eff. k_s: measured, N m/rad."""
     inertia = k_s / (0.5 * (c + a0))
     return EffectiveValues(inertia, a1 * inertia)
 

@@ -137,9 +137,9 @@ def solve(problem: Problem, theta: FloatArray | None = None, *, iterations: int 
     """Minimise from theta (or the unknowns' starts). gain: smallest relative fall of the cost to go on.
 
     matrix: derivatives to begin with, those of a fit that ended near, shape (m, n).
-    A start from where the simulation runs away is returned as it is, at an infinite cost.
-    Where a step brings what the derivatives promised, they are kept and only corrected along the step
-    (Broyden, Math. Comp. 19, 1965); they are made anew where it does not, or where no step helps.
+    A start at which the simulation diverges is returned unchanged, at an infinite cost.
+    Where a step gains as the derivatives predict, they are kept and only corrected along the step
+    (Broyden, Math. Comp. 19, 1965); otherwise, or where no step helps, they are recomputed.
     """
     start = start_vector(problem.unknowns)
     theta = start.copy() if theta is None else theta.copy()
@@ -199,7 +199,7 @@ def corrected(matrix: FloatArray, step: FloatArray, change: FloatArray) -> Float
 def bounded_step(problem: Problem, theta: FloatArray, normal: FloatArray, slope: FloatArray) -> FloatArray:
     """Return theta - normal^-1 slope inside the bounds.
 
-    What meets a bound stays there and the rest makes up for it.
+    An unknown that reaches a bound stays at it, and the others compensate.
     """
     low, high = (np.array([u.inner(b(u)) for u in problem.unknowns]) for b in (_lowest, _highest))
     step, free = np.zeros(len(theta)), np.ones(len(theta), bool)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, rfft
+from numpy.fft import irfft, rfft
 
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -22,7 +22,7 @@ _TOP = 0.96
 def segment_spectra(values: FloatArray, longest: int, fewest: int) -> ComplexArray:
     """Return the spectra of half-overlapping Hann segments without their means, shape (segments, lines).
 
-    longest: samples in a segment, a power of two. fewest: so many segments fit side by side.
+    longest: samples in a segment, a power of two. fewest: number of segments that fit side by side.
     Scaled so that white noise has the square of its RMS in every line.
     """
     length = min(longest, 2 ** math.floor(math.log2(max(len(values), 8 * fewest) / fewest)))

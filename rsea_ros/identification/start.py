@@ -1,10 +1,10 @@
-"""Where a fit begins: the rig's values fitted to the measured frequency responses.
+"""The start of a fit: the rig's values fitted to the measured frequency responses.
 
 An output error of hundreds of times the noise has many minima; the logarithm of a response has hardly any,
 
     r = ln(G_model / G_measured) / w,   w^2 = (sd / |G|)^2 + 0.05^2
 
-so a rig that is far off still finds its way. The result only starts the fit and decides nothing.
+so a rig that is far off still converges. The result only starts the fit and decides nothing.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What slow ramps of torque against a locked output show without a dynamic model: travel, stiffness, limit.
+"""Travel, stiffness and limit from slow ramps of torque against a locked output, without a dynamic model.
 
-The torque is the measured one where it is there, so friction of motor and gear is in all three.
+The torque is the measured motor torque where present, so friction of motor and gear is in all three.
 """
 
 from __future__ import annotations

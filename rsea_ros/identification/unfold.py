@@ -1,4 +1,4 @@
-"""From sampled to continuous: what holds and samples did to a response is taken out.
+"""From sampled to continuous: the effects of hold and sampling on a response are removed.
 
 A command held over T and samples taken d periods after its steps see, with x in cycles a period and
 s_k = 2 pi i (x + k) / T,
@@ -10,7 +10,7 @@ second-order response. Above the band every finite actuator is a short series in
 
     G(s) ~ e^{-s tau} (m_1 / s + m_2 / s^2 + m_3 / s^3 + m_4 / s^4)
 
-whose real Markov parameters m are fitted to the upper part of the band; what sampling makes of 1/s^p is
+whose real Markov parameters m are fitted to the upper part of the band; the sampled 1/s^p is
 known in closed form (sampled_integrators).
 (Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed., section 4.3; Kailath, Linear Systems, 2.4.)
 """
@@ -48,7 +48,7 @@ def unfold(
 
 
 def sampled_integrators(x: FloatArray, offset: float) -> ComplexArray:
-    """Return what hold and sampling make of 1/s^p, p = 1 … 4, per period^p, shape (4, n).
+    """Return 1/s^p after hold and sampling, p = 1 … 4, per period^p, shape (4, n).
 
     e^{-2 pi i x d} (1 - w) sum_{n + d > 0} (n + d)^p / p! w^n,   w = e^{-2 pi i x}
     """

@@ -1,4 +1,4 @@
-"""What a fit may move: values of the rig, parameters of effects, and the clocks of the sensors."""
+"""The unknowns of a fit: values of the rig, parameters of effects, and the clocks of the sensors."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Clocks:
 
     @property
     def are_right(self) -> bool:
-        """Whether every channel is read when its stamps say."""
+        """Whether every channel is read at its stamps."""
         return not any(self.offset.values()) and not any(self.rate.values())
 
 
@@ -65,6 +65,11 @@ class Unknown:
     logarithmic: bool
     doubt: float
     scale: float
+
+    @property
+    def spread(self) -> float:
+        """Return the prior's one sigma over the value that it is around; absolute where that is 0."""
+        return self.doubt if self.logarithmic else self.doubt / (abs(self.start) or 1.0)
 
     @property
     def is_clock(self) -> bool:
@@ -197,12 +202,12 @@ def _moved(setting: EffectSetting, values: Mapping[str, float]) -> EffectSetting
 
 
 def start_vector(unknowns: Sequence[Unknown]) -> FloatArray:
-    """Return where the fit begins, in its own coordinates."""
+    """Return the start of the fit in its coordinates."""
     return np.array([u.inner(u.start) for u in unknowns])
 
 
 def vector_of(unknowns: Sequence[Unknown], rig: Rig) -> FloatArray:
-    """Return the coordinates of a rig's values, of what it does not state where the fit begins."""
+    """Return the coordinates of a rig's values; for values that it does not state, the fit's start."""
     values = rig.values()
     return np.array([u.inner(values.get(u.name, u.start)) for u in unknowns])
 

@@ -9,8 +9,9 @@ overlap by half. (Welch, IEEE Trans. Audio Electroacoust. 15, 1967; Bendat, Pier
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
+from numpy.fft import rfft
 
+from rsea_ros.fast_length import next_fast_length
 from rsea_ros.identification.lines import Lines, detrended, widened
 from rsea_ros.identification.resample import Aligned
 from rsea_ros.signals import ComplexArray, FloatArray, IntArray
@@ -68,7 +69,7 @@ def _length(aligned: Aligned) -> int:
     """Return the segment length in samples, even."""
     duration = len(aligned.command) * aligned.period
     seconds = min(LONGEST_SEGMENT, duration / (FEWEST_SEGMENTS / 2.0 + 1.0))
-    return 2 * int(next_fast_len(int(seconds / aligned.period / 2.0), real=True))
+    return 2 * int(next_fast_length(int(seconds / aligned.period / 2.0), real=True))
 
 
 def _starts(aligned: Aligned, length: int) -> IntArray:

@@ -1,7 +1,7 @@
-"""Signals that a misfit would be coherent with, and sensor noise is not.
+"""Signals with which a misfit would be coherent, but sensor noise is not.
 
-The command; what laws of friction, play, springs, ripple and drift make of the simulated motion; and what the
-model leaves of another sensor: two sensors that see the same misfit agree about it.
+The command; laws of friction, play, springs, ripple and drift over the simulated motion; and the
+residual of another sensor: two sensors that see the same misfit agree about it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _sign(x: FloatArray) -> FloatArray:
 
 
 def _motion(case: Case, outputs: Mapping[str, FloatArray], t: FloatArray) -> tuple[FloatArray, ...]:
-    """Return command, position, velocity and load at instants; what no sensor has follows from the rest."""
+    """Return command, position, velocity and load at instants; those without a sensor are derived."""
     drive = case.drive
     if not isinstance(drive, Drive):
         return tuple(np.interp(t, drive.t, y) for y in (drive.torque, drive.q, drive.v, drive.torque))

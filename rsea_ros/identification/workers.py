@@ -1,6 +1,6 @@
-"""Pools: fits side by side, and the derivatives within each, on two cores unless fewer are asked for.
+"""Pools: fits side by side, and the derivatives within each, on two cores unless fewer are requested.
 
-Two pools, for a fit waits for its derivatives: a single pool full of fits would wait for itself.
+Two pools, because a fit waits for its derivatives: a single pool full of fits would wait for itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def cores() -> int:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
-    """Let fits use so many cores within a with statement: one, where a program runs several side by side."""
+    """Set the number of cores for fits within a with statement: 1 where a program runs several at once."""
     token = _CORES.set(count)
     try:
         yield

@@ -1,1 +1,1 @@
-"""A law for what has no name: the torque that a model lacks, what it depends on, and an effect file of it."""
+"""Laws outside the catalogue: the missing torque of a model, its dependences, an effect file of it."""

@@ -14,6 +14,7 @@ from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.identification.fit import fit
 from rsea_ros.identification.joint_start import joint_start
+from rsea_ros.identification.noise_level import reestimate_noise
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Solution
 from rsea_ros.identification.steady import steadied
@@ -53,14 +54,16 @@ def fitted_base(records: Sequence[Record], rig: Rig) -> Base:
     problem = nominal_problem(checked, rig)
     parts = [part(c, FITTED, DEFAULT.blocks) for c in problem.cases]
     start = joint_start(checked[0].record, rig) if rig.loop is not None else None
-    solution, known, _ = fit(parts, rig, start=start)
-    cases = tuple(replace(c, noise=_finer(c, k)) for c, k in zip(problem.cases, known, strict=True))
-    return Base(solution, cases, replace(solution.problem, cases=cases).outputs(solution.theta))
+    solution = fit(parts, rig, start=start)[0]
+    whole = replace(solution.problem, cases=problem.cases)
+    outputs = whole.outputs(solution.theta)
+    return Base(solution, _with_noise(whole, outputs), outputs)
 
 
-def _finer(case: Case, known: Case) -> dict[str, float]:
-    """Return the noise of each channel: what a fit takes for noise may be a misfit."""
-    return {n: min(v, known.noise[n]) for n, v in case.noise.items()}
+def _with_noise(problem: Problem, outputs: Sequence[dict[str, FloatArray]]) -> tuple[Case, ...]:
+    """Return the cases with the noise that the base's residual shows, as a diagnosis estimates it."""
+    ratio = problem.rig["gear.ratio"]
+    return tuple(reestimate_noise(c, out, ratio) for c, out in zip(problem.cases, outputs, strict=True))
 
 
 def levels_of(

@@ -1,4 +1,4 @@
-"""The lines of a law's function: its variables, what it remembers, its terms, and where their sum acts."""
+"""The lines of a law's function: its variables, memories, terms, and where their sum acts."""
 
 from __future__ import annotations
 

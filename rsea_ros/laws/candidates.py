@@ -30,8 +30,6 @@ from rsea_ros.laws.variables import Variables
 from rsea_ros.signals import FloatArray
 
 _DEGREE = 2
-_WAVES = (1, 2, 3)
-"""Harmonics of a periodic law that knows no form."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Spline:
-    """A spline without a form over one variable, of so many parts, times a factor."""
+    """A spline of any form over one variable, with a number of parts, times a factor."""
 
     place: Place
     regressor: str
@@ -89,7 +87,7 @@ def spline_parts(variables: Variables, spline: Spline, knots: FloatArray) -> Flo
 
 
 def factor_of(variables: Variables, place: Place, over: str, factor: str) -> FloatArray | float:
-    """Return what a spline is multiplied by: loads act on friction by their size, speeds by their sign."""
+    """Return the factor of a spline: loads act on friction by their size, speeds by their sign."""
     if not factor:
         return 1.0
     values = variables.letters[factor]
@@ -99,12 +97,12 @@ def factor_of(variables: Variables, place: Place, over: str, factor: str) -> Flo
 
 
 def spline_knots(benches: Sequence[Bench], spline: Spline) -> FloatArray:
-    """Return the knots of a spline over what all records show of its variable."""
+    """Return the knots of a spline over the range of its variable in all records."""
     return knots_of(np.concatenate([b.variables.letters[spline.over] for b in benches]), spline.parts)
 
 
 def knots_of(x: FloatArray, parts: int) -> FloatArray:
-    """Return the knots of a spline of so many parts, most where the data are, none beyond them."""
+    """Return the knots of a spline with a number of parts, most where the data are, none beyond them."""
     inner = parts - _DEGREE + 1
     low, high = np.quantile(x, [0.001, 0.999])
     even, dense = np.linspace(low, high, inner), np.quantile(x, np.linspace(0.001, 0.999, inner))
@@ -156,7 +154,7 @@ def sensor_modes(bench: Bench) -> list[float]:
 
 
 def sensor_lines(bench: Bench) -> list[float]:
-    """Return the frequency of the sharpest line in what the F/T sensor has beside the mechanics, Hz."""
+    """Return the frequency of the sharpest line in the F/T signal that the mechanics do not explain, Hz."""
     case = bench.case
     keep = case.mask["ft"]
     t = case.t["ft"][keep]

@@ -79,7 +79,7 @@ def chosen_models(search: Search, depends: Sequence[Dependence]) -> Choice:
 def _curve(
     search: Search, depends: Sequence[Dependence], none: FloatArray, short: Model
 ) -> Dependence | None:
-    """Return the dependence that a learnt curve shall show, where short laws leave much of it."""
+    """Return the dependence for a learnt curve, where short laws leave much of it."""
     weight = search.gram.weights(none, SELECTION)
     room = float(((none - search.gram.count)[SELECTION] @ weight).sum())
     share = float(((none - short.left)[SELECTION] @ weight).sum()) / max(room, 1e-9)
@@ -109,16 +109,16 @@ def surely_helps(
 
 
 def _is_sure(gain: FloatArray, errors: float, worse: float) -> bool:
-    """Return whether the gains of groups are more than chance: beyond their error, or hardly any is a loss.
+    """Return whether the gains of groups are more than chance: beyond their error, or with hardly a loss.
 
-    What an excitation shows once, such as a mode that a chirp passes, gains in one group alone.
+    A feature that appears once, such as a mode passed by a chirp, gains in a single group.
     """
     lost, won = float(-gain[gain < 0.0].sum()), float(gain[gain > 0.0].sum())
     return gain.sum() > 0.0 and bool(gain.sum() > errors * standard_error(gain) or lost < worse * won)
 
 
 def tried_of(search: Search, choice: Choice, taken: Sequence[Model]) -> tuple[Tried, ...]:
-    """Return the compared models with what each leaves, held out, over what the base leaves."""
+    """Return the compared models with their held-out residuals over that of the base."""
     gram, first = search.gram, len(search.gram.prior)
     none = gram.held_out(np.array([], np.int64))
     weight = gram.weights(none, SELECTION)

@@ -1,4 +1,4 @@
-"""What a law's file claims of it, measured in simulation on the rig that it was learnt on."""
+"""The claims in a law's file, measured in simulation on the rig that it was learnt on."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _beginning(drive: Drive) -> Drive:
 
 
 def _change(law: Law, effect: Effect, rig: Rig, drive: Drive, factor: float) -> Mapping[str, FloatArray]:
-    """Return what the law changes of every channel under the command times a factor."""
+    """Return the change of every channel by the law, under the command times a factor."""
     scaled = replace(
         drive, command=factor * drive.command, impulse={n: factor * v for n, v in drive.impulse.items()}
     )

@@ -1,4 +1,4 @@
-"""What a torque of a law would change of all that was measured, as rows of a fit: one column a term."""
+"""The change of all measurements by a law's torque, as rows of a fit: one column for each term."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ GROUPS = 8
 
 @dataclass(frozen=True)
 class Bench:
-    """One case with its base model: what is missing, what a law may depend on, and how a torque answers.
+    """One case with its base model: missing torque, variables of a law, and the responses to a torque.
 
-    residual: measured less simulated by channel, zero where that is masked.
+    residual: measured less simulated by channel, zero where masked.
     """
 
     case: Case
@@ -55,7 +55,7 @@ class Bench:
         return tuple(place for place in PORTS if can[place])
 
     def answers(self, values: FloatArray, place: Place) -> dict[str, FloatArray]:
-        """Return what values along the steps change of each measured channel, acting at a place."""
+        """Return the response of each measured channel to values along the steps, acting at a place."""
         case = self.case
         if self.injector is None:
             return {"motor_torque": -smoothed(values, self.variables.step)}
@@ -75,7 +75,10 @@ class Bench:
 def bench_of(
     problem: Problem, theta: FloatArray, case: Case, outputs: Mapping[str, FloatArray], place: Place = "gear"
 ) -> Bench:
-    """Return a case with its base model at theta. outputs: simulated channels. place: of what is missing."""
+    """Return a case with its base model at theta.
+
+    outputs: simulated channels. place: of the missing torque.
+    """
     rig, clocks = apply(problem.rig, problem.unknowns, theta)
     residual = {n: np.where(case.mask[n], case.measured[n] - outputs[n], 0.0) for n in case.measured}
     if isinstance(case.drive, Motion):

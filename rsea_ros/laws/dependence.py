@@ -1,9 +1,9 @@
-"""What the missing torque depends on: laws without a form, each over other variables, judged held out.
+"""Dependences of the missing torque: splines, each over another variable, tested on held-out data.
 
-A spline over each variable (or terms of its past) is fitted beside all that the rig's own values can do;
-its share is what it takes of the power that is left above the noise. Beside the chosen law each is fitted
-again: what still takes much more than its standard error belongs to it, else it is the law's variable and
-nothing else.
+A spline over each variable (or terms of its past) is fitted beside the derivatives by the rig's values;
+its share is the part that it explains of the power above the noise. Beside the chosen law each is fitted
+again: one that still explains much more than its standard error belongs to the law, otherwise only the
+law's variable does.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ _RIDGE = 1e-4
 
 @dataclass(frozen=True)
 class Dependence:
-    """How much of what is left is a function of something. share: of the power above the noise, held out.
+    """The part of the residual that is a function of a variable.
 
-    se: its standard error. beside: what it takes of the power that the chosen law leaves, with its error.
+    share: of the power above the noise, held out.
+    se: its standard error. beside: its share of the power that the chosen law leaves, with its error.
     """
 
     place: Place
@@ -38,7 +39,7 @@ class Dependence:
 
 
 def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, str], list[int]]:
-    """Return the columns of every law without a form: of splines, and of memories where no spline can be."""
+    """Return the columns of splines over every variable, and of memories where a spline is impossible."""
     made: dict[tuple[Place, str], list[int]] = {}
     for k, c in enumerate(candidates):
         if c.part is not None:
@@ -54,7 +55,7 @@ def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, s
 def dependences(
     gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = ()
 ) -> tuple[Dependence, ...]:
-    """Return how much of what is left depends on what, most first. given: columns of a law that acts."""
+    """Return the dependences of the residual, the largest first. given: columns of a law that acts."""
     made = families(candidates, len(gram.prior))
     none = gram.held_out(np.array([], np.int64))
     law = gram.held_out(np.array([*given], np.int64)) if given else none

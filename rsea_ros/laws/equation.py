@@ -35,6 +35,6 @@ def _signed(coefficient: str, text: str, *, minus: bool) -> str:
 
 
 def about_of(law: Law) -> str:
-    """Return what the law is, in a few words."""
+    """Return the meaning of the law in a few words."""
     kind = "learnt law" if law.is_learnt else "law found in data"
     return f"{kind}: {'angle error' if law.place == 'encoder' else 'torque'} by {law.regressor}"

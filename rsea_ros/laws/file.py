@@ -1,4 +1,4 @@
-"""The files of fitted laws: fitted values, measured claims, provenance, and what is drawn of them."""
+"""The files of fitted laws: fitted values, measured claims, provenance, and points for figures."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def finished(
 
 
 def shown_of(problem: Problem, refined: Refined, law: Law, values: dict[str, float]) -> Shown:
-    """Return what is missing where a law is taken out of the fitted model, over what it depends on."""
+    """Return the missing torque of the fitted model without a law, over the law's variable."""
     off = {n: 0.0 if n in _sizes(law) else v for n, v in values.items()}
     rig = problem.rig
     others = [e if e.name != law.name else EffectSetting(law.name, off) for e in rig.effects]

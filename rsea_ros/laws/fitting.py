@@ -1,4 +1,4 @@
-"""Laws fitted in the simulation: thinned to what the fit needs, and what they gain."""
+"""Laws fitted in the simulation, without needless terms, and their gain."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from rsea_ros.diagnosis.score import Score, score_on
 from rsea_ros.diagnosis.score import gain_of as gain_of_blocks
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.effect import Effect
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.laws.base import FITTED, Base
 from rsea_ros.laws.file import Draft
 from rsea_ros.laws.refinement import Refined, refine
@@ -20,7 +19,7 @@ _NEEDED = 0.03
 
 
 def refined_laws(base: Base, drafts: Sequence[Draft]) -> Refined:
-    """Fit the laws in the simulation, in units of what they leave, without terms that it does not need."""
+    """Fit the laws in the simulation, in units of their residual, and drop terms that it does not need."""
     refined = refine(base.solution, base.cases, base.score(FITTED), _starts(drafts, None))
     weights = _score(base, refined, FITTED)
     refined = _again(base, drafts, refined, weights, frozenset())
@@ -90,10 +89,10 @@ def gain_of(without: Score, with_it: Score) -> tuple[float, tuple[float, float]]
 
 
 def share_of(before: dict[str, float], after: dict[str, float], noise: dict[str, float]) -> float:
-    """Return which share of the power above the noise is explained, of the channels that had any."""
+    """Return the explained share of the power above the noise, over the channels that had any."""
     shares = [
         ((before[n] ** 2 - after[n] ** 2), before[n] ** 2 - noise[n] ** 2)
         for n in before
-        if before[n] > AT_NOISE * noise[n]
+        if before[n] > DEFAULT.floor.reached * noise[n]
     ]
     return sum(a / b for a, b in shares) / len(shares) if shares else 0.0

@@ -1,7 +1,7 @@
-"""Least squares from sums of products, by group of blocks and channel: fits and held-out losses for nothing.
+"""Least squares from sums of products, by group of blocks and channel: cheap fits and held-out losses.
 
-For every group and channel the sums A = X'X, b = X'r and r'r are kept. A fit on some groups adds theirs; what
-it leaves in another group is r'r - 2 beta'b + beta'A beta, without looking at the data again.
+For every group and channel the sums A = X'X, b = X'r and r'r are kept. A fit on some groups adds theirs; its
+loss in another group is r'r - 2 beta'b + beta'A beta, without the data.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ class Gram:
         return np.arange(len(self.prior))
 
     def weights(self, loss: FloatArray, groups: IntArray) -> FloatArray:
-        """Return by channel 1 / (what a model leaves over the noise)^2, at most 1."""
+        """Return by channel 1 / (residual of a model over the noise)^2, at most 1."""
         ratio = loss[groups].sum(axis=0) / np.maximum(self.count[groups].sum(axis=0), 1.0)
         return np.asarray(1.0 / np.maximum(ratio, 1.0))
 
     def fit(self, columns: IntArray, groups: IntArray, ridge: float = _RIDGE) -> FloatArray:
         """Return coefficients of the rig's and some other columns, fitted to some groups.
 
-        Each channel weighs as what is left of it (maximum likelihood with unknown noise).
+        Each channel has the weight of its residual (maximum likelihood with unknown noise).
         """
         which = np.concatenate([self.nominal, columns])
         a = self.a[np.ix_(groups, np.arange(self.a.shape[1]), which, which)].sum(axis=0)

@@ -1,4 +1,4 @@
-"""A torque of any course put into the simulation at one port: the channels that answer to it.
+"""The responses of all channels to a torque of any course, put into the simulation at one port.
 
 The answer is (simulation with a small torque - simulation without it) / its size, so it holds for every rig
 that can be simulated: with other effects acting, in a loop, with free ends.
@@ -49,7 +49,7 @@ def _injected(s, p, x):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Injector:
-    """A rig and what drives it. sampled: record times of each channel's samples as its clock has them, s."""
+    """A rig and its drive. sampled: record times of each channel's samples by its clock, s."""
 
     rig: Rig
     drive: Drive
@@ -66,7 +66,7 @@ class Injector:
         return self._run(None, "gear")
 
     def answers(self, torque: FloatArray, place: Place) -> dict[str, FloatArray]:
-        """Return what a torque (N m, one value a step) at a port changes of each sampled channel."""
+        """Return the response of each sampled channel to a torque (N m, one value a step) at a port."""
         largest = float(np.max(np.abs(torque), initial=0.0))
         if largest == 0.0:
             return {n: np.zeros(len(t)) for n, t in self.sampled.items()}
@@ -78,7 +78,7 @@ class Injector:
         return {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in at}
 
     def raw(self, torque: FloatArray, place: Place) -> FloatArray:
-        """Return what a torque (N m) changes of all OUTPUTS at the ends of the steps, the start first."""
+        """Return the response of all OUTPUTS to a torque (N m) at the ends of the steps, the start first."""
         return self._run(torque, place) - self.base
 
     def quiet(self) -> Injector:

@@ -1,4 +1,4 @@
-"""The search for a law: what is missing, what it depends on, the shortest law of it, and its gain."""
+"""The search for a law: the missing torque, its dependences, the shortest law, and its gain."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ def learn(
     provenance: Provenance | None = None,
     progress: Progress | None = None,
 ) -> LawResult:
-    """Return what is missing in a rig's simulation of records, as laws with their effect files.
+    """Return the laws that a rig's simulation of records lacks, with their effect files.
 
-    Raises IdentificationError when the records are too short or do not hold what the rig needs.
+    Raises IdentificationError when the records are too short or lack a channel that the rig needs.
     """
     tell = progress or (lambda step, share: None)
     with one_blas_thread():

@@ -1,4 +1,4 @@
-"""What a term remembers of a signal: a lag, a delay, the way of a play, a bristle's bend.
+"""Memories of a signal in a term: a lag, a delay, the position in a play, the deflection of a bristle.
 
 Each is one small function of the state and the newest value; the generated files call the same.
 """
@@ -24,7 +24,7 @@ def lagged(before, value, step, time_constant):  # type: ignore[no-untyped-def]
 
 @njit(inline="always")
 def played(before, value, half):  # type: ignore[no-untyped-def]
-    """Return what is dragged along behind a signal with play on either side (Krasnoselskii's play)."""
+    """Return the position dragged behind a signal with play on either side (Krasnoselskii's play)."""
     return min(max(before, value - half), value + half)
 
 
@@ -63,7 +63,7 @@ def rings(values, step, frequency, damping_ratio):  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def lags(values, step, time_constant):  # type: ignore[no-untyped-def]
-    """Return the lag of a signal at the middle of each step, as one who is called there has it."""
+    """Return the lag of a signal at the middle of each step, where the step calls it."""
     out, now = np.empty(len(values)), 0.0
     for k in range(len(values)):
         now = lagged(now, values[k], step, time_constant)
@@ -92,7 +92,7 @@ def bends(values, angle):  # type: ignore[no-untyped-def]
 
 
 def delayed(values: FloatArray, steps: float) -> FloatArray:
-    """Return a signal that comes so many steps later, zero before."""
+    """Return a signal delayed by a number of steps, zero before."""
     at = np.arange(len(values)) - steps
     return np.asarray(np.interp(at, np.arange(-1, len(values)), np.concatenate([[0.0], values]), left=0.0))
 
@@ -100,7 +100,7 @@ def delayed(values: FloatArray, steps: float) -> FloatArray:
 def remembered(
     memory: str, values: FloatArray, step: float, shape: float, constant: float = 0.0
 ) -> FloatArray:
-    """Return what a memory makes of a signal along the steps; heat of its square. constant: damping ratio."""
+    """Return the memory of a signal along the steps; for `heat` of its square. constant: damping ratio."""
     if memory == "ring":
         return np.asarray(rings(values, step, shape, constant))
     if memory == "delay":
@@ -114,7 +114,7 @@ def remembered(
 
 @njit(inline="always")
 def from_ring(x, first, value, steps):  # type: ignore[no-untyped-def]
-    """Put a value into a ring of states from x[first] on, and return the one of so many steps ago."""
+    """Put a value into a ring of states from x[first] on, and return the delayed one."""
     back = min(max(steps, 0.0), RING - 2.0)
     whole, now = int(back), int(x[first])
     x[first + 1 + now] = value

@@ -1,6 +1,6 @@
 """The torque that a model lacks, by input estimation: a smoother over all channels, with its uncertainty.
 
-A torque d at the gear answers in channel c as H_c(f) D(f). What is measured less what is simulated is
+The response of channel c to a torque d at the gear is H_c(f) D(f). Measured less simulated is
 
     R_c = H_c D + noise of sigma_c,   D ~ prior of spectrum S(f)
 
@@ -9,7 +9,7 @@ and the mean and variance of D given all of R are, at every frequency,
     D = sum_c conj(H_c) R_c / sigma_c^2 / (L + 1 / S),   1 / (L + 1 / S),   L = sum_c |H_c|^2 / sigma_c^2
 
 the smoother of Kalman and of Rauch, Tung and Striebel in its steady state, at the cost of a few Fourier
-transforms. S is what the data themselves show above the noise (empirical Bayes).
+transforms. S comes from the data's power above the noise (empirical Bayes).
 Source: Wiener, Extrapolation, Interpolation and Smoothing of Stationary Time Series, 1949; Anderson, Moore,
 Optimal Filtering, 1979, chapter 10.
 """
@@ -33,7 +33,7 @@ from rsea_ros.signals import FloatArray
 class MissingTorque:
     """Torque that is missing at the gear, N m, at instants t (s since the record's start), with its sd.
 
-    answers: what it does to each channel, at the same instants.
+    answers: its effect on each channel, at the same instants.
     """
 
     t: FloatArray
@@ -69,7 +69,7 @@ def missing_torque(
 
 
 def _pulse_answers(injector: Injector, period: float, count: int, place: Place) -> dict[str, FloatArray]:
-    """Return what a torque of 1 N m held over one period changes of every output, at the periods' ends."""
+    """Return the response of every output to 1 N m held over one period, at the periods' ends."""
     if place in ("ft", "encoder"):
         return _at_sensor(place, period, count)
     drive, steps = injector.drive, len(injector.drive.command)
@@ -83,7 +83,7 @@ def _pulse_answers(injector: Injector, period: float, count: int, place: Place) 
 
 
 def _at_sensor(place: Place, period: float, count: int) -> dict[str, FloatArray]:
-    """Return what an error of 1 in a sensor changes of every output; an angle's changes the speed too."""
+    """Return the change of every output by an error of 1 in a sensor; an angle's changes the speed too."""
     answers = {n: np.zeros(count) for n in OUTPUTS}
     if place == "ft":
         answers["ft"][0] = 1.0
@@ -101,7 +101,7 @@ def _on_grid(case: Case, values: FloatArray, channel: str, at: FloatArray) -> Fl
 
 
 def _prior(right: FloatArray, told: FloatArray, count: int) -> FloatArray:
-    """Return the spectrum of the torque, per bin: what the plain estimate has above its noise."""
+    """Return the spectrum of the torque, per bin: the power of the plain estimate above its noise."""
     told = np.maximum(told, 1e-12 * np.max(told))
     power = np.abs(right / told) ** 2 / count
     width = max(2.0, len(power) / 400.0)

@@ -1,4 +1,4 @@
-"""A law's parameters by output error in the compiled step, beside the rig's own, and what that gains."""
+"""A law's parameters by output error in the compiled step, beside the rig's, and their gain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What repeats: periods of the missing torque over the rotor's angle, and lines of a residual over time."""
+"""Repetition: periods of the missing torque over the rotor's angle, and lines of a residual over time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ _LOWEST, _HIGHEST = 1.0, 0.45
 def periods(angle: FloatArray, torque: FloatArray) -> list[float]:
     """Return cycles per radian-turn of the waves that the torque follows best over an angle, at most two.
 
-    angle: rad, of the rotor. The torque is averaged in bins of the angle, so what only follows time is gone.
+    angle: rad, of the rotor. The torque is averaged in bins of the angle, which removes parts that follow
+    time only.
     """
     travel = float(np.ptp(angle))
     if travel <= 0.0:

@@ -1,4 +1,4 @@
-"""What a search for a law returns: the dependences, the laws with their files, and what they gain."""
+"""The result of a search for a law: the dependences, the laws with their files, and their gain."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rsea_ros.signals import FloatArray
 
 @dataclass(frozen=True)
 class Tried:
-    """A model that was compared: its terms, and what it leaves held out over what the base leaves."""
+    """A compared model: its terms, and its held-out residual over that of the base."""
 
     place: str
     terms: tuple[str, ...]
@@ -26,7 +26,7 @@ class Tried:
 class Shown:
     """The missing torque beside a law, point by point, for the page.
 
-    t: s. values, law: N m, rad at the encoder. over: the letter of what the law
+    t: s. values, law: N m, rad at the encoder. over: the letter of the variable that the law
     depends on most. sd: of a value.
     """
 
@@ -40,7 +40,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class WrittenLaw:
-    """A law, its effect, the text of its file, and what is drawn of it."""
+    """A law, its effect, the text of its file, and the points for its figure."""
 
     law: Law
     effect: Effect
@@ -51,10 +51,10 @@ class WrittenLaw:
 
 @dataclass(frozen=True)
 class LawResult:
-    """laws: most important first; none where nothing is left that a law takes.
+    """laws: most important first; empty where no law explains the residual.
 
-    gain: 1 - RMS(with the laws) / RMS(without) on test blocks that took part in nothing, with its 95 %
-    interval, each channel in units of what the base leaves. share: of the power above the noise.
+    gain: 1 - RMS(with the laws) / RMS(without) on test blocks that were not used before, with its 95 %
+    interval, each channel in units of the base's residual. share: of the power above the noise.
     left, noise: RMS of each channel before and after, and of its noise, on those blocks.
     """
 

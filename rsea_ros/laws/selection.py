@@ -1,7 +1,7 @@
 """Sparse regression: orthogonal matching among the terms of one place, each step by its held-out loss.
 
-A term enters whose addition leaves least of the blocks that its coefficients were not fitted to. Of all
-paths, one a place, the best model is the one of the largest held-out likelihood; what is taken is the
+The term enters whose addition leaves the least held-out loss. Of all
+paths, one a place, the best model is the one of the largest held-out likelihood; the result is the
 shortest model within one standard error of it (Breiman, Friedman, Olshen, Stone, CART, 1984, section 3.4).
 """
 
@@ -32,7 +32,7 @@ class Model:
     left: FloatArray
 
     def minus_log_likelihood(self, gram: Gram) -> float:
-        """Return half the number of samples times the logarithm of what is left, over all channels."""
+        """Return half the number of samples times the logarithm of the residual, over all channels."""
         left, count = self.left[SELECTION].sum(axis=0), gram.count[SELECTION].sum(axis=0)
         floor = np.maximum(left / np.maximum(count, 1.0), 1.0)
         return float(0.5 * np.sum(count * (np.log(floor) + left / np.maximum(count, 1.0) / floor)))
@@ -40,14 +40,14 @@ class Model:
 
 @dataclass(frozen=True)
 class Folded:
-    """The sums of a Gram in each fold, channels weighed alike: inside to fit, outside to judge."""
+    """The sums of a Gram in each fold, channels with equal weight: inside to fit, outside to test."""
 
     inside: tuple[tuple[FloatArray, FloatArray], ...]
     outside: tuple[tuple[FloatArray, FloatArray, float], ...]
     penalty: FloatArray
 
     def loss(self, which: IntArray) -> float:
-        """Return what fits of some columns leave of the folds that they did not see."""
+        """Return the held-out loss of fits of some columns."""
         total = 0.0
         for (a, b), (held, right, rr) in zip(self.inside, self.outside, strict=True):
             normal = a[np.ix_(which, which)]

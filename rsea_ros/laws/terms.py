@@ -1,6 +1,6 @@
-"""The terms that a law is made of: physical forms over what a machine shows, each written once.
+"""The terms of laws: physical forms over a machine's signals, each written once.
 
-An expression is read twice: over arrays, to see what it would explain, and as it stands in the generated
+An expression is used twice: over arrays, to see how much it explains, and as text in the generated
 file. In it: w speed, q angle, h angle of the load, theta rotor angle, d deflection, T load, u command, t time
 (all SI), share of the record's length, m what a memory holds, a the shape, such as a width.
 """
@@ -37,9 +37,9 @@ _ARRAYS = {
 class Term:
     """One term of a law: coefficient times an expression.
 
-    regressor: what it depends on, for people. unit: of the coefficient. over: the variable whose size sets
+    regressor: its variable, for people. unit: of the coefficient. over: the variable whose size sets
     the shape's; shapes: shapes that are tried, as shares of that size, or as they are where over is empty.
-    memory: what m is made of `over` with the shape. is_drag: takes energy when its coefficient is positive.
+    memory: makes m of `over` with the shape. is_drag: takes energy when its coefficient is positive.
     constant: damping ratio of a memory that rings.
     friction: the expression is a size to which the sign of the speed is added, smooth below a creep.
     """

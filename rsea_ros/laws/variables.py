@@ -1,6 +1,6 @@
-"""What a law may depend on, on the steps of a record: speed, angles, deflection, load, command and time.
+"""The variables of laws on the steps of a record: speed, angles, deflection, load, command and time.
 
-The motion is the measured one, smoothed: what is simulated plus what the missing torque answers for.
+The motion is the measured one, smoothed: the simulation plus the response to the missing torque.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ _LETTERS = {"w": "the speed ω, rad/s", "q": "the angle q, rad", "theta": "the r
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a law is from: date, version of the program, and the hash of every bag by name."""
+    """The origin of a law: date, version of the program, and the hash of every bag by name."""
 
     date: str
     version: str

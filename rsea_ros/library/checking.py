@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rsea_ros.checks.finding import Finding, Findings, Light
-from rsea_ros.library.frames import plain
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
@@ -28,10 +27,10 @@ class Checks:
         return self.result.findings
 
     def summary(self) -> str:
-        """Return the findings as a table in plain text."""
-        from rsea_ros.report.check.terminal import check_table
+        """Return the findings in plain text."""
+        from rsea_ros.report.check.terminal import check_lines
 
-        return plain(check_table(self.result))
+        return "\n".join(line.plain for line in check_lines(self.result))
 
     def __repr__(self) -> str:
         """Return the rig, the worst light and the findings that are not green in one line."""
@@ -47,4 +46,4 @@ def check(data: Record, rig: Rig | str) -> Checks:
     """
     from rsea_ros.checks.check import check_record
 
-    return Checks(check_record(data, load_rig(rig)))
+    return Checks(check_record(data, load_rig(rig), values=True))

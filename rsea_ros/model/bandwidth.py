@@ -37,7 +37,7 @@ def pure_torque_bandwidth(k_s: float, j_sc: float, factor: float = PAPER_FACTOR)
 
 
 def inner_inertia(rig: Rig) -> float:
-    """Return J_sc + n J_r, kg m^2: what (T_p - T_d) / q_c'' is with both ends clamped.
+    """Return J_sc + n J_r, kg m^2: (T_p - T_d) / q_c'' with both ends clamped.
 
     n J_r is the spin of the rotor, which Eqs. (5) to (7) leave out: J_m / N for a planetary train, negative
     where the rotor turns against the output (train.py). A lumped rotor counts with the whole J_m.
@@ -68,7 +68,7 @@ def _factor(inertia: FloatArray) -> FloatArray:
 
 
 def end_to_end(rig: Rig, sees: Sees = "spring_and_damper") -> TransferFunction:
-    """Return T_d / T_p of the rig with both ends clamped, exact: what Eq. (6) approximates."""
+    """Return T_d / T_p of the rig with both ends clamped, exactly; Eq. (6) approximates it."""
     return distal_per_proximal(_held(rig), sees)
 
 
@@ -87,7 +87,7 @@ def flat_band(
     """Return the frequency, Hz, up to which a transfer function stays within tolerances of 1, or inf.
 
     Exact: |f|^2 = 10^(±dB/10) and tan(arg f) = ±tan(deg) are polynomials in the frequency. 90 degrees leave
-    the phase out of account. Raises ParameterError for tolerances that are none.
+    the phase out of account. Raises ParameterError for impossible tolerances.
     """
     if not (tolerance_db > 0.0 and 0.0 < tolerance_deg <= 90.0):
         raise ParameterError(

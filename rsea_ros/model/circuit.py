@@ -42,7 +42,7 @@ def circuit(rig: Rig) -> tuple[Element, ...]:
 
 
 def circuit_response(rig: Rig, hz: FloatArray, port: str = "gear") -> Mapping[str, ComplexArray]:
-    """Return what can be read of a rig per N m at a port, by nodal analysis. hz: shape (n,), above 0.
+    """Return the outputs of a rig per N m at a port, by nodal analysis. hz: shape (n,), above 0.
 
     position, deflection: rad. housing_end, spring_end: torques on the two ends, N m. Each of shape (n,).
     A port in a branch that is open (a clamped end, a rigid spring) moves nothing.

@@ -1,4 +1,4 @@
-"""What drives a simulation: the command held at its stamps, on the grid of the fixed step, and where each
+"""The drive of a simulation: the command held at its stamps, on the grid of the fixed step, and where each
 channel is sampled. Made once for a record, used by every simulation of a fit."""
 
 from __future__ import annotations
@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from types import MappingProxyType
 
 import numpy as np
@@ -40,7 +40,7 @@ class Drive:
     N m, or of the held target of a position loop, rad, shape (steps,). reference: rad, shape (steps,) or
     empty. angle: measured position at the end of each step, rad, or empty. at: for each channel the
     sampling instants in steps since `start`.
-    impulse: what the held command has brought by each of these beside its mean over the step, N m s.
+    impulse: of the held command up to each instant beyond its mean over the step, N m s.
     initial: position (rad) and velocity (rad/s) at the start. hold: steps in a command period.
     origin, whole: when the drive begins in its record and how long that is, s; they differ from 0 and
     `duration` when the drive is a piece of one. jumps: the command is held, not a line between its stamps.
@@ -59,14 +59,19 @@ class Drive:
     whole: float = math.nan
     jumps: bool = True
 
-    @property
+    @cached_property
     def kinks(self) -> FloatArray:
         """Command by step where velocities have a kink: nowhere for one that does not jump."""
         return self.command if self.jumps else np.zeros(len(self.command))
 
+    @cached_property
+    def impulsive(self) -> frozenset[str]:
+        """The channels that are read where the held command has brought more or less than its mean."""
+        return frozenset(n for n, impulse in self.impulse.items() if impulse.any())
+
     @property
     def drift_time(self) -> float:
-        """Time over which drifts come to their full size, s."""
+        """Time over which drifts reach their full size, s."""
         return self.duration if math.isnan(self.whole) else self.whole
 
     @property
@@ -93,9 +98,9 @@ def drive_from(
 
     refine divides the step further. closed_loop: a controller makes the command from the reference; what
     the bag's command has beside the measured motor torque, where there is one, is an outside disturbance.
-    from_rest: the bench began at zero, whatever the first samples say. targeted: the commands are targets
-    of a position loop, rad: it began where the first sample is. hold: what acts between two stamps,
-    the command of the first (zero), a straight line (first), or for an analogue command that was filtered and
+    from_rest: the bench began at zero, not at the first samples. targeted: the commands are targets
+    of a position loop, rad: it began at the first sample. hold: the command between two stamps,
+    that of the first (zero), a straight line (first), or for an analogue command that was filtered and
     sampled the curve without a frequency above half the rate (band).
     """
     command = record["command"]
@@ -137,8 +142,8 @@ def drive_from(
 def coarser(drive: Drive) -> Drive:
     """Return a drive on steps twice as long, for a first look: at half the cost four times the error.
 
-    One whose command changes within such a step is returned as it is: the motor torque that is read there
-    would miss by the change.
+    One whose command changes within a doubled step is returned unchanged: the motor torque that is read there
+    would be off by the change.
     """
     steps = len(drive.command) // 2 * 2
     pairs = drive.command[:steps].reshape(-1, 2)
@@ -198,8 +203,8 @@ def _first(record: Record) -> tuple[float, float]:
 def _initial(record: Record) -> tuple[float, float]:
     """Return position and velocity at the start: rest, unless the first samples say otherwise.
 
-    The first sample comes a period after the first command; what the command may have done until then, the
-    largest change from sample to sample, is no motion of before.
+    The first sample comes a period after the first command; a motion that the command may have caused until
+    then, the largest change from sample to sample, is not an initial motion.
     """
     position, velocity = (_finite(record, n)[1] for n in ("position", "velocity"))
     moved = _moved(position) or _moved(velocity)

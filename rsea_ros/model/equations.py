@@ -72,7 +72,7 @@ def train_ratio(rig: Rig) -> float:
 
 
 def rotor_inertia(rig: Rig) -> float:
-    """Return J_r = J_m / N^2, kg m^2, what the rotor has on its own axis."""
+    """Return J_r = J_m / N^2, kg m^2, the rotor's inertia about its axis."""
     return rig["rotor.reflected_inertia"] / rig["gear.ratio"] ** 2
 
 
@@ -141,7 +141,7 @@ def actuator_matrices(rig: Rig) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _load_matrices(rig: Rig, linear_gravity: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mass, damping and stiffness of what is on the ends."""
+    """Return mass, damping and stiffness of the loads on the ends."""
     mass, damping, stiffness = (np.zeros((COORDINATES, COORDINATES)) for _ in range(3))
     for end, name in END_COORDINATES:
         if rig.end_is_free(name):

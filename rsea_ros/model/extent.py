@@ -20,7 +20,7 @@ MOST_EMPTY = 2.0
 def check_extent(record: Record, start: float, stop: float) -> None:
     """Raise IdentificationError where a grid from start to stop (s) is far longer than a record's samples.
 
-    A clock that was set while it recorded, or a pause of hours, would ask for millions of empty steps.
+    A clock that was set during the recording, or a pause of hours, would need millions of empty steps.
     """
     covered = max(_covered(c.t) for c in record.channels.values())
     if stop - start <= LONGEST_PAUSE + (1.0 + MOST_EMPTY) * covered:
@@ -41,7 +41,7 @@ def _covered(t: FloatArray) -> float:
 
 
 def bounded(record: Record) -> Record:
-    """Return the record with NaN for what is beyond LARGEST, and zero for what is below SMALLEST."""
+    """Return the record with NaN for values beyond LARGEST, and zero for values below SMALLEST."""
     return record.with_channels(**{n: _bounded(c) for n, c in record.channels.items()})
 
 

@@ -1,13 +1,13 @@
 """The inverse model: the motor torque that a measured motion takes.
 
 A drive without a spring drifts freely, so a simulation on its commands runs away from the measurement and
-the right model may look worse than the wrong one (realdata README, emps). The field's way is the inverse
+the right model may look worse than the wrong one. The field uses the inverse
 dynamic model (Gautier, Janot et al.): filter the measured position both ways, differentiate, and compare
 torques, filtered alike:
 
     T = J q'' + D q' + K q + m g l sin(q) - (torques of the effects)
 
-What effects make of a command is undone where the torque is only known as commanded; a limit cannot be.
+Effects on a command are undone where only the commanded torque is known; a limit cannot be undone.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _COMMAND, _MOTOR, _GEAR, _SENSOR = (
 class Motion:
     """A measured motion on a uniform grid, filtered: t (s), q (rad), v (rad/s), a (rad/s^2), torque (N m).
 
-    commanded: the torque is the command, not what was measured of it.
+    commanded: the torque is the command, not a measurement.
     """
 
     t: FloatArray
@@ -114,7 +114,7 @@ def _torque_at(record: Record, t: FloatArray) -> FloatArray:
     """Return the motor torque that acted at instants.
 
     A command is held from its stamp on. A measured torque that shows the command before its stamp was taken
-    at the end of a hold, and counts for the whole of it; any other is taken for what it is, at its stamp.
+    at the end of a hold, and counts for the whole hold; any other counts at its stamp.
     """
     command = record["command"]
     hold = np.searchsorted(command.t, t, side="right") - 1
@@ -166,7 +166,7 @@ def _parts(machine: Machine) -> tuple[Calls, FloatArray, FloatArray]:
 
 
 def _as_moved(machine: Machine, motion: Motion, period: float) -> Motion:
-    """Return a motion without what effects of the encoder added to it."""
+    """Return a motion without the errors that effects of the encoder added."""
     if machine.calls.first[_SENSOR] == machine.calls.first[_SENSOR + 1]:
         return motion
     error = smoothed(_sensor_errors(*_parts(machine), motion.q), period)
@@ -191,7 +191,7 @@ def predicted(rig: Rig, motion: Motion) -> Mapping[str, FloatArray]:
 
 @njit(cache=True, error_model="numpy")
 def motor_gains(calls, s, own, count):  # type: ignore[no-untyped-def]
-    """Return what the effects at the motor make of a torque of 1 N m, at each sample."""
+    """Return the gain of the effects at the motor, for a torque of 1 N m, at each sample."""
     gains = np.empty(count)
     for k in range(count):
         s[st.TIME], s[st.COMMAND] = k * s[st.STEP], 1.0
@@ -202,7 +202,7 @@ def motor_gains(calls, s, own, count):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _made_of(calls, s, own, command, v):  # type: ignore[no-untyped-def]
-    """Return what the effects at the command make of one, N m, along a motion."""
+    """Return the torque (N m) after the effects at the command, along a motion."""
     made = np.empty(len(command))
     for k in range(len(command)):
         s[st.TIME], s[st.OUTPUT_VELOCITY] = k * s[st.STEP], v[k]
@@ -214,7 +214,7 @@ def _made_of(calls, s, own, command, v):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _sensor_errors(calls, s, own, q):  # type: ignore[no-untyped-def]
-    """Return what the effects at the sensors add to the encoder's angle, rad, along a motion."""
+    """Return the angle (rad) that effects at the sensors add to the encoder's, along a motion."""
     errors = np.empty(len(q))
     for k in range(len(q)):
         s[st.TIME] = k * s[st.STEP]
@@ -226,7 +226,7 @@ def _sensor_errors(calls, s, own, q):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _effect_torques(calls, s, own, q, v, torque, load):  # type: ignore[no-untyped-def]
-    """Return what the effects add at the gear along a motion, N m."""
+    """Return the torque (N m) that the effects add at the gear along a motion."""
     added = np.empty(len(q))
     s[st.MOBILITY] = s[st.GEAR_VELOCITY_SPAN] = 0.0
     s[st.CREEP] = _SIGN

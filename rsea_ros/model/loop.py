@@ -3,9 +3,9 @@
     pd        u = k_p e + k_i int e dt - k_d q' + k_f r',   e = r - q; r follows its target within a speed
     cascade   v_r = k_pos e within a limit,   u = k_v (v_r - q') + k_vi int (v_r - q') dt
 
-The firmware takes the mean of the target since its last sample: when in it a new target comes nobody knows,
-and one that counted only at a sample would make every residual a staircase in the delay.
-u is limited, held until the next sample, and adds to what is commanded from outside. An integral stands still
+The firmware uses the mean of the target since its last sample: the instant of a new target in it is unknown,
+and a target that counted only at a sample would make every residual a staircase in the delay.
+u is limited, held until the next sample, and added to the external command. An integral stands still
 while u is at its limit and the error would drive it further (conditional integration; Astrom, Hagglund,
 Advanced PID Control, 2006, section 3.5).
 """

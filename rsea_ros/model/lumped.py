@@ -14,5 +14,5 @@ from rsea_ros.model.rig import Rig
 
 
 def lumped(rig: Rig) -> Rig:
-    """Return the rig as the lumped model sees it; every function of the model takes it."""
+    """Return the rig of the lumped model; every function of the model accepts it."""
     return replace(rig, name=f"{rig.name}, lumped", train="lumped", clamped=rig.clamped | {"housing_end"})

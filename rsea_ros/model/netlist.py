@@ -26,7 +26,7 @@ class Element:
     """A branch between two nodes; the current is counted from the first to the second.
 
     value: N m/rad, kg m^2, N m s/rad; of a transformer its ratio. nodes: of a transformer primary + and -,
-    secondary + and -. A source raises the voltage from its first node to its second by what drives it.
+    secondary + and -. A source raises the voltage from its first node to its second by its value.
     """
 
     name: str
@@ -55,7 +55,7 @@ def nodal_analysis(elements: Sequence[Element], s: complex, driven: str) -> Solu
 
     Modified nodal analysis (Ho, Ruehli, Brennan, IEEE TCAS 22, 1975): the unknowns are the voltages of the
     nodes and the currents of all branches; the rows are the sums of the currents at every node, then the law
-    of every branch. Raises ParameterError for a source that is not there.
+    of every branch. Raises ParameterError for an unknown source.
     """
     if driven not in {e.name for e in elements if e.kind == "source"}:
         raise ParameterError(f"circuit: no source {driven!r} to drive, expected one of its sources")

@@ -1,6 +1,6 @@
-"""What can be read from the equations of motion: torques on the two ends, the spring, the encoder.
+"""Outputs of the equations of motion: torques on the two ends, the spring, the encoder.
 
-A torque on an end is what the end has to hold, from that end's row of the equations of motion. Torques of
+A torque on an end is the torque that the end holds, from its row of the equations of motion. Torques of
 both ends are positive for positive motor torque: on the housing end backward, on the spring end forward. So
 
     T_p - T_d = (J_sc + n J_r) q_c''   with both ends clamped; n J_r = J_m / N for a planetary train
@@ -49,7 +49,7 @@ class Output:
 
 
 def position() -> Output:
-    """Return the gear output's angle against the housing, rad: what the encoder reads."""
+    """Return the gear output's angle against the housing, rad, as the encoder reads it."""
     return _of_coordinates({C: 1.0, H: -1.0})
 
 

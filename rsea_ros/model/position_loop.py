@@ -1,4 +1,4 @@
-"""A position loop as a rig states it: parameters of the compiled step, and what it makes of a response."""
+"""A position loop as a rig states it: parameters of the compiled step, and the closed-loop response."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def loop_parameters(rig: Rig) -> tuple[float, ...]:
 
 
 def commanded(record: Record, rig: Rig) -> Record:
-    """Return the record with what commands the rig as `command`: of a position loop its targets, rad.
+    """Return the record with the signal that commands the rig as `command`: a position loop's targets, rad.
 
-    So whatever follows the command (noise, blocks, responses) follows the targets. Raises ChannelError for a
+    Noise, blocks and responses then follow the targets. Raises ChannelError for a
     record without them, and for one that only positions commanded with another rig.
     """
     if rig.loop is None:

@@ -64,7 +64,7 @@ def read_row(rig: Rig, m: Mechanics, signal: int) -> FloatArray:
 
 
 def encoder_row(rig: Rig, m: Mechanics, *, is_rate: bool = False) -> FloatArray:
-    """Return the row that reads what the encoder sees from x: an angle, or its rate."""
+    """Return the row that gives the encoder's reading from x: an angle, or its rate."""
     difference = np.array(_LOAD_ANGLE if rig.encoder_end == "spring_end" else _DIFFERENCES[st.OUTPUT_ANGLE])
     row = np.zeros(2 * m.order)
     row[m.order * is_rate : m.order * (is_rate + 1)] = difference @ m.placement
@@ -97,13 +97,14 @@ def propagator(rig: Rig, h: float, reads: Iterable[int]) -> Linear:
         outputs=_outputs(rig, system.mechanics),
         gravity=np.array([rig[f"{end}.{key}"] for key in ("gravity", "gravity_angle") for end in END_NAMES]),
         reads_load=reads_load,
+        rest=(0.0,) * n,
     )
 
 
 def start_map(rig: Rig) -> FloatArray:
-    """Return what makes the state of least energy of output angle (rad) and velocity (rad/s), shape (2n, 2).
+    """Return the map from output angle (rad) and speed (rad/s) to the state of least energy, shape (2n, 2).
 
-    So an encoder that starts away from zero turns what is free to turn and leaves the spring alone.
+    An initial angle other than zero thus turns the free parts and does not load the spring.
     """
     m = mechanics(rig)
     row = encoder_row(rig, m)[: m.order]
@@ -132,7 +133,7 @@ def _outputs(rig: Rig, m: Mechanics) -> FloatArray:
 def _below(rig: Rig, m: Mechanics, spring: FloatArray) -> FloatArray:
     """Return the row of T_s less the torque that the load above the sensor takes: part of its J q''.
 
-    J q'' is T_s less what holds the load to ground.
+    J q'' is T_s less the torque between load and ground.
     """
     share = rig["spring_end.above_sensor"]
     if share == 0.0:

@@ -1,8 +1,8 @@
-"""Is the actuator a pure torque source for the torque that it transmits now?
+"""The pure-torque flag: whether the actuator is a pure torque source for its present torque.
 
 It is up to the edge: where |T_d / T_p| of this rig leaves its tolerance in dB or in degrees, exact and damped
 (bandwidth.py). The share of the torque's power above the edge is measured by a filter pair; a sine exactly at
-the edge has the share `limit`. The verdict changes only when the powers tell it through the sensors' noise,
+the edge has the share `limit`. The verdict changes only when the powers exceed the sensors' noise,
 beyond a hysteresis, for a hold time.
 """
 
@@ -63,8 +63,8 @@ class Settings:
     """tolerance_db, tolerance_deg: of T_d / T_p. limit: share of power of a sine at the edge, 0.05 to 0.5.
 
     hysteresis: part of the edge's frequency, either way. window: over which power is measured; hold_on,
-    hold_off: how long the powers must say so before the flag rises and falls; quiet: how long there must be
-    no torque before that is said, all in s.
+    hold_off: how long the powers must agree before the flag rises and falls; quiet: how long there must be
+    no torque before the verdict says so, all in s.
     """
 
     tolerance_db: float = 3.0
@@ -115,13 +115,13 @@ class PureTorque:
 
     @property
     def verdict(self) -> Verdict:
-        """What is true now; the flag is up when it is `pure`."""
+        """The present verdict; the flag is up when it is `pure`."""
         return VERDICTS[int(self._memory[VERDICT])]
 
     def calibrate(self, error: ErrorModel, dt: float) -> None:
-        """Take in what the sensors' noise makes of the estimates at a sample period of dt s.
+        """Set the noise floor from the noise of the estimates at a sample period of dt s.
 
-        Noise that is not a finite number, such as of an observer that does not settle, makes the flag deaf.
+        With noise that is not finite, as of an observer that does not settle, the flag ignores every torque.
         """
         corner = self._limits[CORNER]
         floor = np.array([0.0, error.sigma**2])
@@ -133,7 +133,7 @@ class PureTorque:
         self._period = dt
 
     def take(self, t: float, estimate: Estimate) -> Verdict:
-        """Take in an estimate and return the verdict. A stamp far before the last is of another run."""
+        """Process an estimate and return the verdict. A stamp far before the last one starts another run."""
         if self._memory[LAST] - t > AGAIN:
             self._memory[:] = 0.0
             self._memory[[HEARD, SINCE, LAST, FELL]] = -math.inf
@@ -142,7 +142,7 @@ class PureTorque:
         return self.verdict
 
     def reading(self) -> Reading:
-        """Return what the powers say now."""
+        """Return the present reading of the powers."""
         if self.verdict == "no torque":
             return Reading(self.verdict, math.nan, math.nan)
         above = max(self._memory[HIGH] - self._limits[NOISE_HIGH], 0.0)

@@ -1,4 +1,4 @@
-"""Is |T_p - T_d| within a tolerance of |T_d|: the error of who takes the two ends' torques for one.
+"""Whether |T_p - T_d| is within a tolerance of |T_d|: the error of treating the torques of both ends as one.
 
 Both are the observer's, and their RMS over the last `window` seconds are compared:
 
@@ -79,7 +79,7 @@ class ErrorSettings:
 
 
 class Edge(NamedTuple):
-    """Where a sine has the share `tolerance`, Hz: of the rig as it is, and over what is not known of it."""
+    """Where a sine has the share `tolerance`, Hz: for the rig as stated, and over its uncertain values."""
 
     hz: float
     low: float
@@ -101,9 +101,9 @@ class ErrorFlag:
         self.take(-math.inf, Estimate(*[0.0] * 6))  # compiles, and is too early to count
 
     def take(self, t: float, estimate: Estimate, *, heard: bool = False) -> int:
-        """Take in an estimate and return the verdict: NOTHING, PURE or BEYOND.
+        """Process an estimate and return the verdict: NOTHING, PURE or BEYOND.
 
-        heard: a finer detector (pure_torque.py) hears a torque, be it too small to be judged here.
+        heard: a finer detector (pure_torque.py) sees a torque that may be too small to be judged here.
         """
         distal, proximal, _, sigma_distal, sigma_proximal, _ = estimate
         sigma = sigma_distal + sigma_proximal

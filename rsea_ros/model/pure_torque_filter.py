@@ -36,15 +36,15 @@ class Pair(NamedTuple):
 
 
 def empty_pair() -> Pair:
-    """Return a pair that has heard nothing."""
+    """Return a pair without samples."""
     return Pair(np.array([0.0, 0.0, np.nan, 0.0, 0.0]), np.zeros((LENGTH, 3)))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def powers(pair, corner, window, t, torque):  # type: ignore[no-untyped-def]
-    """Take in a torque (N m) at t (s); return the mean squares of high and low over the window (s), N^2 m^2.
+    """Process a torque (N m) at t (s); return the mean squares of high and low over the window (s), N^2 m^2.
 
-    corner: Hz. After a pause in which the corner cannot be seen the pair begins anew.
+    corner: Hz. After a pause that is too long for the corner the pair restarts.
     """
     memory, squares = pair
     dt = t - memory[2]
@@ -88,7 +88,7 @@ DECIDED = 3.0
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-def]
-    """Take in a torque (N m) and its sigma at a later t (s), and bring the verdict in memory up to date."""
+    """Process a torque (N m) and its sigma at a later t (s), and update the verdict in memory."""
     if t <= memory[LAST]:
         return
     memory[LAST] = t
@@ -120,7 +120,7 @@ def judge(pair, limits, memory, t, torque, sigma):  # type: ignore[no-untyped-de
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _wanted(limits, verdict, high, low, noise_high, noise_low):  # type: ignore[no-untyped-def]
-    """Return what the powers without their noise say, or the verdict as it is when that is too little."""
+    """Return the verdict of the powers without their noise, or the present one when they are too small."""
     spread_high = 2.0 * noise_high**2 + 4.0 * noise_high * max(high, 0.0) / limits[VALUES]
     spread_low = 2.0 * noise_low**2 + 4.0 * noise_low * max(low, 0.0) / limits[VALUES]
     off, on = limits[OFF], limits[ON]

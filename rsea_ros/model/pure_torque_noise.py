@@ -1,4 +1,4 @@
-"""What noise of a linear system's inputs makes of the powers of the flag's filter pair, exactly."""
+"""The powers of the flag's filter pair by the noise of a linear system's inputs, exactly."""
 
 from __future__ import annotations
 

@@ -26,15 +26,15 @@ AGAIN = 1.0
 
 
 def empty_ring() -> FloatArray:
-    """Return a ring of t, error^2 and torque^2 (s, N^2 m^2) that has heard nothing."""
+    """Return an empty ring of t, error^2 and torque^2 (s, N^2 m^2)."""
     return np.zeros((LENGTH, 3))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def mean_squares(state, ring, window, t, error, torque):  # type: ignore[no-untyped-def]
-    """Take in an error and a torque (N m) at t (s); return their mean squares over the window (s), N^2 m^2.
+    """Process an error and a torque (N m) at t (s); return their mean squares over the window (s), N^2 m^2.
 
-    Sums are taken anew once in a round of the ring, so that rounding does not add up. A sample that is not
+    Sums are recomputed once in a round of the ring, so that rounding does not add up. A sample that is not
     finite is left out.
     """
     if not (np.isfinite(error) and np.isfinite(torque)):
@@ -67,7 +67,7 @@ def _anew(state, ring):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def judge_error(state, ring, t, distal, proximal, sigma, heard):  # type: ignore[no-untyped-def]
-    """Take in both torques and the sum of their sigmas (N m) at a later t (s); return the verdict.
+    """Process both torques and the sum of their sigmas (N m) at a later t (s); return the verdict.
 
     heard: hold the verdict while the torque is too small to be judged.
     """

@@ -1,4 +1,4 @@
-"""Phases that are another in every record, such as that of the mains when it began."""
+"""Phases that differ from record to record, such as that of the mains at its start."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rsea_ros.signals import FloatArray, Record
 
 
 def in_phase(rig: Rig, record: Record) -> Rig:
-    """Return the rig with every phase that belongs to a record as this record has it."""
+    """Return the rig with the phases that belong to this record."""
     for place, setting in enumerate(rig.effects):
         effect = effect_named(setting.name)
         for phase in (p.name for p in effect.parameters if p.per_record):

@@ -170,7 +170,7 @@ class Rig:
         return not (self.rigid_spring and channel in ("ft", "deflection"))
 
     def zero_unknown(self, channel: str) -> bool:
-        """Return whether a channel's sensor counts from another zero in every record."""
+        """Return whether a channel's sensor has another zero in every record."""
         return channel in self.sensors and self.sensors[channel].zero_unknown
 
     def clock(self, channel: str, since: FloatArray | float = 0.0) -> FloatArray | float:
@@ -178,8 +178,13 @@ class Rig:
         sensor = self.sensors.get(channel, Sensor())
         return sensor.clock + 1e-6 * sensor.clock_rate * since
 
+    def is_on_time(self, channel: str) -> bool:
+        """Return whether a channel is read when its stamps say."""
+        sensor = self.sensors.get(channel)
+        return sensor is None or sensor.clock == sensor.clock_rate == 0.0
+
     def clock_doubt(self, channel: str) -> float:
-        """Return one sigma of what a channel's clock may be off beside `clock`, s."""
+        """Return one sigma of the error of a channel's clock beside `clock`, s."""
         return self.sensors[channel].clock_doubt if channel in self.sensors else CLOCK_DOUBT
 
     def end_is_free(self, end: str) -> bool:

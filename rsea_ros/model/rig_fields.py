@@ -74,7 +74,7 @@ FIELDS: Mapping[str, Field] = MappingProxyType(
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a rig field. Raises RigError for a name that is none."""
+    """Return the unit of a rig field. Raises RigError for an unknown name."""
     if name not in FIELDS:
         raise RigError(f"{name}: no such rig field, expected one of {', '.join(FIELDS)}")
     return FIELDS[name].unit

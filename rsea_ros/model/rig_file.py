@@ -1,6 +1,6 @@
 """Rigs in YAML files: found by name, loaded with every error naming the file, saved complete or not at all.
 
-`model.yaml`, what identification and diagnosis write, is a rig file with an `effects` list.
+`model.yaml`, written by identification and diagnosis, is a rig file with an `effects` list.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rsea_ros.wording import did_you_mean, shown
 def rig_path(name_or_path: str | Path) -> Path:
     """Return the file of a rig given by path or by the bare name of a file in config/rigs.
 
-    Raises RigError for a name that no rig has, and for what is not a name of a file.
+    Raises RigError for a name that no rig has, and for text that cannot be a file name.
     """
     if not isinstance(name_or_path, (str, os.PathLike)) or "\0" in str(name_or_path):
         raise RigError(f"rig {shown(name_or_path)}: expected the name of a rig, or of a YAML file")

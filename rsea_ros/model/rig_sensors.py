@@ -20,7 +20,7 @@ _FASTEST = 1000.0
 
 
 def sensors_from(body: Mapping[str, Any]) -> dict[str, Sensor]:
-    """Return the sensors by channel, from what the file says under `sensors`."""
+    """Return the sensors by channel, from the file's `sensors`."""
     only_keys(body, set(UNITS), "sensors")
     sensors = {}
     for name, item in body.items():

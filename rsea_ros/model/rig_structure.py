@@ -1,4 +1,4 @@
-"""What the parts of a rig must agree on: its ends, its trains, its spring, its loop."""
+"""Consistency of the parts of a rig: its ends, its trains, its spring, its loop."""
 
 from __future__ import annotations
 

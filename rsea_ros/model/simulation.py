@@ -47,7 +47,7 @@ class Machine:
     start_map: FloatArray
 
     def begin(self, initial: tuple[float, float] = (0.0, 0.0)) -> None:
-        """Set the state to an output angle (rad) and velocity (rad/s), at time zero, nothing remembered."""
+        """Set the state to an output angle (rad) and velocity (rad/s), at time zero, with no history."""
         self.x[:] = self.start_map @ np.array(initial)
         self.own[:] = 0.0
         self.table[st.FIRST_READ : st.VELOCITY + 1] = 0.0
@@ -57,7 +57,7 @@ class Machine:
 
 
 def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArray]:
-    """Return what a noise-free bench would have measured: each channel of the record at its own stamps.
+    """Return the channels that a noise-free bench would have measured, each at its own stamps.
 
     The record's `command` drives it, held at its stamps; with `rig.controller` and a `reference` channel, or
     with a rig that positions command, the loop is closed in the simulation. refine divides the fixed step.
@@ -66,7 +66,7 @@ def simulate(rig: Rig, record: Record, *, refine: int = 1) -> dict[str, FloatArr
 
 
 def drive_of(record: Record, rig: Rig, *, refine: int = 1) -> Drive:
-    """Return what drives a rig in a record. Raises ChannelError where its commands are missing."""
+    """Return the drive of a rig from a record. Raises ChannelError where its commands are missing."""
     return drive_from(
         commanded(record, rig),
         refine=refine,
@@ -83,7 +83,7 @@ def simulate_drive(rig: Rig, drive: Drive, *, ride: bool = False) -> dict[str, F
 
 
 def simulate_drives(rig: Rig, drives: Sequence[Drive], *, ride: bool = False) -> list[dict[str, FloatArray]]:
-    """Return the channels of several drives of one rig; what they share is made once."""
+    """Return the channels of several drives of one rig, which is prepared once."""
     machines: dict[tuple[float, float, bool], Machine] = {}
     results = []
     for drive in drives:
@@ -106,15 +106,23 @@ def _driven(machine: Machine, rig: Rig, drive: Drive, ride: bool) -> dict[str, F
     run(machine, torque, out[1:], start=drive.origin, reference=reference, ridden=ridden)
     out[0, 2] = out[1, 2]
     channels = [n for n in drive.at if rig.measures(n)]
-    since = {n: drive.origin + drive.step * drive.at[n] for n in channels}
-    at = {n: drive.at[n] + rig.clock(n, since[n]) / drive.step for n in channels}
-    kinks = drive.kinks
-    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], kinks) for n in channels}
-    return {n: y + _kick(machine, n) * drive.impulse[n] for n, y in sampled.items()}
+    at = {n: _instants(rig, drive, n) for n in channels}
+    sampled = {n: sample(n, out[:, OUTPUTS.index(n)], at[n], drive.kinks) for n in channels}
+    for n in drive.impulsive.intersection(channels):
+        sampled[n] += _kick(machine, n) * drive.impulse[n]
+    return sampled
+
+
+def _instants(rig: Rig, drive: Drive, channel: str) -> FloatArray:
+    """Return when a channel is read, in steps since the start of the drive."""
+    at = drive.at[channel]
+    if rig.is_on_time(channel):
+        return at
+    return np.asarray(at + rig.clock(channel, drive.origin + drive.step * at) / drive.step)
 
 
 def _kick(machine: Machine, channel: str) -> float:
-    """Return what an impulse of the command does to a channel at once, its unit per N m s."""
+    """Return the immediate response of a channel to an impulse of the command, its unit per N m s."""
     if channel == "motor_torque" or machine.table[st.TARGETED] != 0.0:
         return 0.0
     row = ("position", "velocity", "ft", "deflection").index(channel)
@@ -196,7 +204,7 @@ def _calls(
 
 
 def _sensed(rig: Rig) -> list[str]:
-    """Return what a bench logs: a joint in a position loop and a spring's encoder only what is listed."""
+    """Return the channels that a bench logs: of a position loop and a spring's encoder only listed ones."""
     listed = [n for n in OUTPUTS if n in rig.sensors]
     if rig.loop is not None and listed:
         return listed
@@ -235,7 +243,7 @@ def _check_bounded(rig: Rig, true: Mapping[str, FloatArray]) -> None:
 
 
 def measure(rig: Rig, channel: str, value: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return what the rig's sensor makes of true values: noise added, rounded to its quantum."""
+    """Return the readings of the rig's sensor for true values: noise added, rounded to its quantum."""
     sensor = rig.sensors.get(channel)
     if sensor is None:
         return value
@@ -260,7 +268,7 @@ class Plant:
     def __init__(
         self, rig: Rig, rate: float, *, seed: int = 0, noise: bool = True, duration: float = 60.0
     ) -> None:
-        """rate: samples a second. duration: over which drifts come to their full size, s."""
+        """rate: samples a second. duration: over which drifts reach their full size, s."""
         self._rig, self._noise, self._duration = rig, noise, duration
         self._count = steps_per_sample(1.0 / rate)
         self._step = 1.0 / rate / self._count

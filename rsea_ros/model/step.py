@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numba.cpython.unsafe.tuple import tuple_setitem
 
 from rsea_ros.compiler import njit
 from rsea_ros.effects import signal_table as st
@@ -28,11 +29,12 @@ _FORCES = 5
 
 
 class Linear(NamedTuple):
-    """Propagators of one step and what is read from the state x (order n).
+    """Propagators of one step and the rows that read the state x (order n).
 
     phi (n, n), g (n, 5); rows: signals that are read, matrix (rows, n) reads them; spans (2, n): gear
     velocity and deflection; outputs (4, n): position, velocity, the linear torque at the F/T sensor and
     deflection; gravity (4,): m g l of the ends, N m, then how far from hanging each is at angle zero, rad.
+    rest: n zeros. The step is compiled for each length of it, and keeps the state in registers.
     """
 
     phi: FloatArray
@@ -43,13 +45,14 @@ class Linear(NamedTuple):
     outputs: FloatArray
     gravity: FloatArray
     reads_load: bool
+    rest: tuple[float, ...]
 
 
 class Calls(NamedTuple):
     """The effects that are on, in the order of their ports.
 
     first[port] … first[port + 1] are those of a port; p_at and x_at say where their parameters and states
-    begin. nonlinear: whether anything adds torques at all.
+    begin. nonlinear: whether any effect adds torques.
     """
 
     first: IntArray
@@ -67,18 +70,56 @@ def call_port(port, calls, s_at, p_at, own_at):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _dot(row, x):  # type: ignore[no-untyped-def]
+def _dot(matrix, row, x):  # type: ignore[no-untyped-def]
+    """Return a row of a matrix times x; a view of the row would be counted, which costs more than this."""
     value = 0.0
     for j in range(len(x)):
-        value += row[j] * x[j]
+        value += matrix[row, j] * x[j]
     return value
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _state(x, rest):  # type: ignore[no-untyped-def]
+    """Return an array as a tuple of the length of `rest`."""
+    state = rest
+    for i in range(len(rest)):
+        state = tuple_setitem(state, i, x[i])  # type: ignore[call-arg]
+    return state
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _free(linear, u, x):  # type: ignore[no-untyped-def]
+    """Return the state after a step in which the motor torque u alone acts."""
+    end = x
+    for i in range(len(x)):
+        end = tuple_setitem(end, i, linear.g[i, 0] * u + _dot(linear.phi, i, x))  # type: ignore[call-arg]
+    return end
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _with_torques(linear, s, x):  # type: ignore[no-untyped-def]
+    """Return the state at the end of a step with the torques of the effects."""
+    for j in range(_FORCES):
+        torque = s[st.FIRST_FORCE + j]
+        if torque != 0.0:
+            for i in range(len(x)):
+                x = tuple_setitem(x, i, x[i] + linear.g[i, j] * torque)  # type: ignore[call-arg]
+    return x
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _middle(a, b):  # type: ignore[no-untyped-def]
+    middle = a
+    for i in range(len(a)):
+        middle = tuple_setitem(middle, i, 0.5 * (a[i] + b[i]))  # type: ignore[call-arg]
+    return middle
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _read(linear, x, s):  # type: ignore[no-untyped-def]
     """Put the signals that effects look at into the table, and clear the torques."""
     for r in range(len(linear.rows)):
-        s[linear.rows[r]] = _dot(linear.matrix[r], x)
+        s[linear.rows[r]] = _dot(linear.matrix, r, x)
     if linear.reads_load:
         s[st.LOAD] = s[st.K_S] * s[st.DEFLECTION] + s[st.B_S] * s[st.DEFLECTION_RATE] + s[st.SPRING_TORQUE]
     for i in range(_FORCES):
@@ -90,33 +131,24 @@ def _read(linear, x, s):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _add_torques(linear, s, a):  # type: ignore[no-untyped-def]
-    for j in range(_FORCES):
-        torque = s[st.FIRST_FORCE + j]
-        if torque != 0.0:
-            for i in range(len(a)):
-                a[i] += linear.g[i, j] * torque
-
-
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _read_outputs(linear, x, s):  # type: ignore[no-untyped-def]
-    """Put what the sensors of the nominal actuator see into the table."""
-    s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs[0], x)
-    s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs[1], x)
-    s[st.FT] = _dot(linear.outputs[2], x) + s[st.SENSED] * s[st.SPRING_TORQUE]
-    s[st.SPRING_ANGLE] = _dot(linear.outputs[3], x) + s[st.PLAY]
+    """Put the readings of the nominal actuator's sensors into the table."""
+    s[st.POSITION] = s[st.OUTPUT_ANGLE] = _dot(linear.outputs, 0, x)
+    s[st.VELOCITY] = s[st.OUTPUT_VELOCITY] = _dot(linear.outputs, 1, x)
+    s[st.FT] = _dot(linear.outputs, 2, x) + s[st.SENSED] * s[st.SPRING_TORQUE]
+    s[st.SPRING_ANGLE] = _dot(linear.outputs, 3, x) + s[st.PLAY]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  # type: ignore[no-untyped-def]
     """Run the steps of `command` (N m, held over each), in place.
 
     x, s, own: state of the mechanics, signal table, states of the effects; they go in and come out.
     reference (rad) and ridden (rad, measured rotor angle at the middle of each step) may be empty.
     out (steps, 5): OUTPUTS at the end of each step. start: s, of the first step.
+    Without numba's counted references (_nrt): a count is an atomic addition, and took half of a step.
     """
-    n, h = len(x), s[st.STEP]
-    free, end, middle = np.empty(n), np.empty(n), np.empty(n)
+    h, state = s[st.STEP], _state(x, linear.rest)
     s_at, p_at, own_at = s.ctypes.data, calls.p.ctypes.data, own.ctypes.data
     for k in range(len(command)):
         s[st.TIME], s[st.COMMAND], s[st.CURRENT] = start + k * h, command[k], command[k]
@@ -124,33 +156,29 @@ def advance(linear, calls, command, reference, ridden, start, x, s, own, out):  
             s[st.REFERENCE] = reference[k]
         call_port(_COMMAND, calls, s_at, p_at, own_at)
         call_port(_MOTOR, calls, s_at, p_at, own_at)
-        for i in range(n):
-            free[i] = end[i] = linear.g[i, 0] * s[st.COMMAND] + _dot(linear.phi[i], x)
+        free = end = _free(linear, s[st.COMMAND], state)
         if calls.nonlinear:
             s[st.TIME], s[st.COMMIT] = start + (k + 0.5) * h, 0.0
-            _add_torques(linear, s, end)
-            for i in range(n):
-                middle[i] = 0.5 * (x[i] + end[i])
-            s[st.GEAR_VELOCITY_SPAN] = _dot(linear.spans[0], end) - _dot(linear.spans[0], x)
-            s[st.DEFLECTION_SPAN] = _dot(linear.spans[1], end) - _dot(linear.spans[1], x)
-            _read(linear, middle, s)
+            end = _with_torques(linear, s, free)
+            s[st.GEAR_VELOCITY_SPAN] = _dot(linear.spans, 0, end) - _dot(linear.spans, 0, state)
+            s[st.DEFLECTION_SPAN] = _dot(linear.spans, 1, end) - _dot(linear.spans, 1, state)
+            _read(linear, _middle(state, end), s)
             if len(ridden) > 0:
                 s[st.ROTOR_ANGLE] = ridden[k]
             call_port(_GEAR, calls, s_at, p_at, own_at)
             call_port(_SPRING, calls, s_at, p_at, own_at)
-            for i in range(n):
-                end[i] = free[i]
-            _add_torques(linear, s, end)
-        for i in range(n):
-            x[i] = end[i]
+            end = _with_torques(linear, s, free)
+        state = end
         s[st.TIME] = start + (k + 1) * h
         if calls.first[_SPRING] < calls.first[_SPRING + 1]:
             held = s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE]
             s[st.COMMIT], s[st.DEFLECTION_SPAN] = 1.0, 0.0
-            _read(linear, x, s)
+            _read(linear, state, s)
             call_port(_SPRING, calls, s_at, p_at, own_at)
             s[st.GEAR_TORQUE], s[st.JOINT_TORQUE], s[st.HOUSING_TORQUE], s[st.DISTAL_TORQUE] = held
-        _read_outputs(linear, x, s)
+        _read_outputs(linear, state, s)
         call_port(_SENSOR, calls, s_at, p_at, own_at)
         out[k, 0], out[k, 1], out[k, 2] = s[st.POSITION], s[st.VELOCITY], s[st.CURRENT]
         out[k, 3], out[k, 4] = s[st.FT], s[st.SPRING_ANGLE]
+    for i in range(len(state)):
+        x[i] = state[i]

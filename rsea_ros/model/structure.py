@@ -1,4 +1,4 @@
-"""What effects change of a rig's structure."""
+"""Changes of a rig's structure by effects."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from rsea_ros.model.rig import Rig
 
 
 def structured(rig: Rig) -> Rig:
-    """Return the rig with what its effects change of its structure (a gear or a base that gives).
+    """Return the rig with the changes of structure by its effects (a compliant gear or base).
 
-    Raises ParameterError for an effect whose parameters are wrong, or that this rig cannot have.
+    Raises ParameterError for wrong parameters, and for an effect that this rig cannot have.
     """
     for setting in rig.effects:
         effect = effect_named(setting.name)

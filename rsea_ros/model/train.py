@@ -38,7 +38,7 @@ def rotor_turns(train: Train, ratio: float) -> float:
 
 
 def spin_inertia(train: Train, ratio: float, reflected: float) -> float:
-    """Return what the rotor adds to the inertia between the two ends, kg m^2: n J_r with J_r = J_m / N^2.
+    """Return the rotor's share of the inertia between the two ends, kg m^2: n J_r with J_r = J_m / N^2.
 
     reflected: J_m, kg m^2. Negative where the rotor turns against the output; J_m itself for a lumped rotor.
     """

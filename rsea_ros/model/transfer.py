@@ -81,7 +81,7 @@ def state_space(rig: Rig, output: Output, port: str = "gear") -> StateSpace:
 
 
 def read(system: propagator.StateSpace, output: Output, port: str = "gear") -> tuple[FloatArray, float]:
-    """Return C and D of an output: what it takes of the states (q, q'), and of the torque at a port."""
+    """Return C and D of an output: its row on the states (q, q'), and its factor of the torque at a port."""
     p = PORTS.index(port)
     placed, n = output.c @ system.mechanics.placement, system.mechanics.order
     c = np.concatenate([placed[0], placed[1]]) + placed[2] @ system.a[n:]
@@ -115,7 +115,7 @@ def _determinant(z: list[list[FloatArray]]) -> FloatArray:
 
 
 def _sum(terms: Iterable[FloatArray]) -> FloatArray:
-    """Add polynomials; what only rounding leaves of a coefficient becomes zero."""
+    """Add polynomials; a coefficient that is only rounding becomes zero."""
     terms = list(terms)
     table = np.zeros((len(terms), max(len(t) for t in terms)))
     for row, term in zip(table, terms, strict=True):

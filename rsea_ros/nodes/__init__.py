@@ -13,7 +13,7 @@ _told_before = sys.excepthook
 
 
 def _tell(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Tell of Ctrl-C in one line: a node's imports take a second, in which it handles no signals yet."""
+    """Report Ctrl-C in one line: a node's imports take a second, in which it handles no signals yet."""
     if issubclass(kind, KeyboardInterrupt):
         print("interrupted before it began", file=sys.stderr)  # noqa: T201
     else:

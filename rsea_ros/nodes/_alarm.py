@@ -17,7 +17,7 @@ class Alarm:
         self._react = react
         self._outlet, self._inlet = os.pipe()
         os.set_blocking(self._inlet, False)
-        self._main = threading.current_thread() is threading.main_thread()  # others may not ask for it
+        self._main = threading.current_thread() is threading.main_thread()  # not permitted to other users
         if self._main:
             self._before = signal.set_wakeup_fd(self._inlet, warn_on_full_buffer=False)
         self._thread = threading.Thread(target=self._listen, daemon=True)

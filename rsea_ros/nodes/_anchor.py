@@ -1,8 +1,8 @@
-"""Stamps out of a clock that nobody sets, and how far the system clock has left it.
+"""Stamps from a clock that nobody sets, and the difference of the system clock from it.
 
-All ages and deadlines of a node count on the monotonic clock. What it publishes and hears carries the system
-clock's time, which a network or a person may set: the difference of the two is followed while the system
-clock is trimmed, and taken anew when it has been set.
+All ages and deadlines of a node use the monotonic clock. Its messages, in and out, carry the system
+clock's time, which a network or a person may set: the difference is followed while the system
+clock is trimmed, and measured again when it has been set.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Anchor:
         return now - min(max(self._wall() - received, 0), max(now - earliest, 0))
 
     def follow(self) -> int:
-        """Follow a system clock that is trimmed; anchor anew and return the step (ns) when it was set."""
+        """Follow a system clock that is trimmed; re-anchor and return the step (ns) when it was set."""
         now = self._steady()
         most, self._followed = (now - self._followed) // TRIM, now
         off = self._wall() - now - self.offset

@@ -44,9 +44,10 @@ MOST = 100
 
 
 class Bench:
-    """Publishes readings, and puts what comes on `torque_command` into a queue.
+    """Publishes readings, and queues messages on `torque_command`.
 
-    Messages are serialised ones with the numbers put in: to make them of Python objects takes 60 us a cycle.
+    Messages are serialised templates with the numbers filled in: making them from Python objects takes 60 us
+    a cycle.
     """
 
     def __init__(
@@ -57,11 +58,11 @@ class Bench:
 
         strict: see CommandQueue; then one publisher is obeyed at a time.
 
-        every_record: ft gets all that came since the last reading, not one.
+        every_record: ft gets all records since the last reading, not one.
 
-        part: name of a bench beside others of the same node; its topics are under it.
+        part: name of a bench among others of the same node; its topics are under it.
 
-        deflects: whether readings have the spring's deflection, which is a topic then.
+        deflects: whether readings have the spring's deflection, which then has a topic.
         """
         within = f"{part}/" if part else ""
         self._node, self._every_record, self._strict = node, every_record, strict
@@ -105,7 +106,7 @@ class Bench:
         self._polled = now
 
     def publish(self, state: State, shift: int = 0) -> None:
-        """Publish one reading under its stamps, moved by so many ns."""
+        """Publish one reading under its stamps, shifted by a number of ns."""
         numbers = (state.position, state.velocity, state.motor_torque)
         self._states.publish(self._state_writer.write(state.stamp + shift, numbers))
         writer = self._ft_writers[state.inferred]
@@ -119,9 +120,9 @@ class Bench:
             self._deflections.publish(raw)
 
     def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
-        """Return the health of a bench that runs in a cycle; warnings are of what is new since the last.
+        """Return the health of a bench that runs in a cycle; warnings are of events since the last report.
 
-        more: counts besides, by what they count in words.
+        more: further counts by their name in words.
         """
         timing, commands = cycle.timing(), self.commands
         counts = {

@@ -22,15 +22,15 @@ class Waiting(NamedTuple):
 
 
 class CommandQueue:
-    """What came on `torque_command`, until it is due. One thread adds, another may take.
+    """Messages of `torque_command` until they are due. One thread adds, another may take.
 
-    Instants are ns on a clock that never jumps, and that has the system clock's time (Anchor).
-    A command takes effect at its stamp. One whose stamp is over takes effect at once (`late` counts them);
+    Instants are ns on a clock that never jumps and has the system clock's time (Anchor).
+    A command takes effect at its stamp. One whose stamp is past takes effect at once (`late` counts them);
     one without a stamp, or further than 0.3 s from now, when it arrives (`unstamped`, of these `off` by
-    their stamp). What takes effect at once overtakes what came before it and waits. Not-a-number is
+    their stamp). A command that takes effect at once overtakes earlier waiting ones. Not-a-number is
     dropped (`refused`). 50 ms after the last command the torque is zero (`expired` counts how often).
     strict, as in front of a real machine: a stamp further than 0.3 s from now is `refused` too, unless there
-    is none, and the last torque stays in force: to end it is the work of the machine's limits.
+    is none, and the last torque stays in force: the machine's limits end it.
     """
 
     def __init__(self, *, strict: bool = False) -> None:
@@ -65,7 +65,7 @@ class CommandQueue:
             self._waiting.sort(key=lambda waiting: waiting.when)  # of one instant, the last that came counts
 
     def refuse(self) -> None:
-        """Count a command that is none."""
+        """Count an invalid command."""
         self.refused += 1
 
     def take(self, until: int) -> list[tuple[int, float]]:
@@ -84,21 +84,21 @@ class CommandQueue:
             return changes
 
     def age(self, now: int) -> float | None:
-        """Return how long the command in force has been so, s; None when there is none.
+        """Return how long the present command has been in force, s; None without one.
 
-        It counts from its arrival, or from its stamp where it came ahead of that.
+        Counted from its arrival, or from its stamp if it came ahead of it.
         """
         return None if self._newest is None else (now - self._newest) / SECOND
 
     def shift(self, by: int) -> None:
-        """Move all instants by so many ns: the clock that they belong to was anchored anew."""
+        """Shift all instants by a number of ns, after their clock was re-anchored."""
         with self._lock:
             self._waiting = [w._replace(when=w.when + by, arrival=w.arrival + by) for w in self._waiting]
             self._taken_until, self._from = self._taken_until + by, self._from + by
             self._newest = None if self._newest is None else self._newest + by
 
     def clear(self, since: int = 0) -> None:
-        """Forget all commands; the torque is zero. since: what came before, ns, is dropped also later."""
+        """Drop all commands; the torque is zero. since: ns; commands from before are dropped also later."""
         with self._lock:
             self._waiting, self._newest, self.torque = [], None, 0.0
             self._from = max(self._from, since)

@@ -1,4 +1,4 @@
-"""Parameters of the controller node, and what becomes of them: loads, gains, controller."""
+"""Parameters of the controller node, and the loads, gains and controller made from them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ TABLE = (
 
 
 def design_of(values: Values) -> Design:
-    """Return the design that is asked for. Raises ParameterError where it is unstable with a load."""
+    """Return the requested design. Raises ParameterError where it is unstable with a load."""
     rig = load_rig(values["rig"])
     loads = load_range(rig, lightest(rig, values["free"]))
     stated = [values[name] for name in GAINS]
@@ -64,7 +64,7 @@ def design_of(values: Values) -> Design:
 
 
 def controller_of(values: Values, found: Design) -> TorqueController:
-    """Return the controller that the parameters ask for."""
+    """Return the controller for the parameters."""
     limits = Limits(values["torque_limit"], values["slew_limit"], values["ramp"])
     options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
     return TorqueController(

@@ -19,7 +19,7 @@ LONGEST_CATCH_UP = SECOND
 
 @dataclass(frozen=True)
 class Timing:
-    """What a cycle did since the last report: periods in s, and all cycles missed since its start."""
+    """Timing of a cycle since the last report: periods in s, and all cycles missed since its start."""
 
     mean: float
     p99: float
@@ -39,11 +39,11 @@ class Timing:
 class Cycle:
     """Call `work(stamp)` at start + k / rate, stamp being that instant in ns since the epoch.
 
-    A cycle is missed when the next one was due before it began. catch_up: missed cycles are worked off late,
-    each with its own stamp (no more than a second of them); else they are left out.
+    A cycle is missed when the next one was due before it began. catch_up: missed cycles run late,
+    each with its own stamp (no more than a second of them); otherwise they are left out.
     `left_out` counts those that never run.
-    anchor: what makes stamps out of deadlines. Without one that the work lets follow, the system clock is
-    read once, at the start: stamps are even whatever is done to it later.
+    anchor: makes stamps from deadlines. Without one that the work lets follow, the system clock is
+    read once, at the start: stamps stay even whatever happens to it later.
     """
 
     def __init__(
@@ -71,12 +71,12 @@ class Cycle:
             self.thread.join()
 
     def rest(self) -> None:
-        """Return when the work of a cycle is over: what another thread does then holds up none."""
+        """Return when the work of a cycle is over, so that another thread's work delays no cycle."""
         self._over.clear()
         self._over.wait(2.0 / self._rate)
 
     def running(self) -> bool:
-        """Return whether it is still at it. Raises what `work` has raised."""
+        """Return whether it still runs. Raises the error of `work`."""
         if self.error is not None:
             raise self.error
         return self.thread.is_alive()

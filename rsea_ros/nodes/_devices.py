@@ -1,4 +1,4 @@
-"""What the driver can drive: parameters to a device and its limits."""
+"""Devices of the driver: parameters to a device and its limits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Values = Mapping[str, Any]
 def limits_of(values: Values) -> Limits:
     """Return the limits that the parameters set. Raises ParameterError for one that cannot be applied.
 
-    The drive's angle is the spring's between clamped ends; with a free end what ft measures is.
+    The drive's angle is the spring's between clamped ends; with a free end the F/T torque limits the spring.
     """
     rig = load_rig(values["rig"])
     _check_applicable(values, rig)
@@ -69,7 +69,7 @@ def spring_of(values: Values) -> Spring | None:
 
 
 def device_of(values: Values, known: Mapping[str, Callable[[Values], Device]]) -> Device:
-    """Return the device that the parameters ask for, of the package or of RSEA_DEVICES, not open.
+    """Return the requested device, of the package or of RSEA_DEVICES, not open.
 
     Raises ParameterError for one that does not exist or cannot be made.
     """
@@ -94,7 +94,7 @@ def _feels(values: Values, rig: Rig) -> bool:
 
 
 def _check_applicable(values: Values, rig: Rig) -> None:
-    """Raise ParameterError for a limit of what this bench does not measure."""
+    """Raise ParameterError for a limit of a quantity that this bench does not measure."""
     feels = _feels(values, rig)
     clamped = rig.clamped == set(END_NAMES)
     why = "its spring is rigid" if rig.rigid_spring else "ft_host is empty: no F/T sensor measures it"
@@ -142,7 +142,7 @@ def dynamixel_netft(values: Values, line: Line | None = None) -> Device:
 
 
 def latency_of(values: Values) -> float:
-    """Return what a reply may be late, s."""
+    """Return the allowed lateness of a reply, s."""
     return float(values["latency"] or usual_latency(values["rate"]))
 
 

@@ -1,4 +1,4 @@
-"""A diagnosis in a thread of its own, while the node goes on."""
+"""A diagnosis in a separate thread, while the node goes on."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Diagnosing:
         return self._work is not None and not self._work.done()
 
     def begin(self, record: Record) -> Waiting:
-        """Start on a record and return what a coroutine can await.
+        """Start on a record and return an awaitable.
 
         Raises RseaError for a record that cannot be diagnosed, and while a diagnosis is under way.
         """
@@ -49,7 +49,7 @@ class Diagnosing:
         return Waiting(self._work)
 
     def report(self) -> Report | None:
-        """Return what /diagnostics shall say: the step, then the verdict; None before the first diagnosis."""
+        """Return the status for /diagnostics: the step, then the verdict; None before the first diagnosis."""
         if self._work is None:
             return None
         if not self._work.done():
@@ -85,7 +85,7 @@ class Waiting:
         self._work = work
 
     def __await__(self) -> Generator[None, None, Diagnosis]:
-        """Rest a little, and let the executor do whatever else is there, until the thread is done."""
+        """Pause repeatedly and let the executor work until the thread is done."""
         while not self._work.done():
             wait([self._work], _POLL)
             yield

@@ -1,4 +1,4 @@
-"""What the driver does in a cycle, without ROS: clock, commands, device."""
+"""The driver's cycle without ROS: clock, commands, device."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CLOCK_STEP, STOPPED = "clock_step", "stopped"
 
 
 class Source(Protocol):
-    """Where commands come from. commands: what has been polled."""
+    """The source of commands. commands: the polled ones."""
 
     commands: CommandQueue
 
@@ -27,7 +27,7 @@ class Source(Protocol):
 
 
 class Drive:
-    """A guarded device, driven by what a source has. rate: Hz. anchor: the clock of stamps and ages.
+    """A guarded device, driven by a source's commands. rate: Hz. anchor: the clock of stamps and ages.
 
     lock: held while a cycle takes a command and the device gets it.
     """
@@ -41,7 +41,7 @@ class Drive:
     def wanted(self, stamp: int, by: int) -> tuple[float, float | None]:
         """Return the torque (N m) that is in force from this cycle on (its stamp rounded), and its age (s).
 
-        stamp: the cycle's, ns since the epoch. One that was held up takes what is due by now.
+        stamp: the cycle's, ns since the epoch. A delayed cycle takes the command due by now.
         by: ns by which the clock was set since the last cycle.
         """
         self._see_to_the_clock(by)

@@ -22,7 +22,7 @@ Row = tuple[str, bytes, str, Mapping[str, object]]
 
 
 class FindingsPublisher:
-    """Publishes a status for every code once a second. stamp: gives ns for the seconds of a finding."""
+    """Publishes a status for every code once a second. stamp: converts the seconds of a finding to ns."""
 
     def __init__(
         self, node: Node, joint: str, findings: Callable[[], Sequence[Finding]], stamp: Callable[[float], int]

@@ -20,14 +20,14 @@ class Flags:
         self._publish()
 
     def show(self, stamp: int, up: bool) -> None:
-        """Publish what is true from a sample (its stamp in ns) on, where that has changed."""
+        """Publish the flag from a sample (its stamp in ns) on, if it has changed."""
         self._stamp = stamp
         if up != self._up:
             self._up = up
             self._publish()
 
     def lower(self) -> None:
-        """Lower it, and wait until everybody knows."""
+        """Lower the flag, and wait until all subscribers have it."""
         self._up = False
         self._publish()
         for publisher in (self._bare, self._stamped):

@@ -12,7 +12,7 @@ SAMPLES, TIME = 10, 50_000_000
 class Frozen:
     """One topic's values. A sensor at rest may show the same counts; then something else must have moved.
 
-    least: by how much what is felt beside it must have moved meanwhile; 0: nothing must, its noise is enough.
+    least: motion of the other sensor that proves a freeze; 0: none needed, this sensor's noise suffices.
     """
 
     def __init__(self, least: float = 0.0) -> None:
@@ -23,7 +23,7 @@ class Frozen:
         self.frozen = False
 
     def take(self, stamp: int, values: Sequence[float]) -> bool:
-        """Take in a sample (stamp in ns); return whether the sensor has stopped."""
+        """Process a sample (stamp in ns); return whether the sensor has stopped."""
         if values != self._last or stamp < self._since:
             self._last, self._since, self._count, self.frozen = values, stamp, 0, False
             self._low, self._high = math.inf, -math.inf
@@ -33,5 +33,5 @@ class Frozen:
         return self.frozen
 
     def beside(self, value: float) -> None:
-        """Take in what another sensor feels."""
+        """Process a sample of another sensor."""
         self._low, self._high = min(self._low, value), max(self._high, value)

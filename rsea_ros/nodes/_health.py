@@ -28,7 +28,7 @@ class Report(NamedTuple):
 
 
 class Health:
-    """Publish what `assess` returns. hardware: what it is about. part: of a node that has several."""
+    """Publishes the status from `assess`. hardware: its subject. part: of a node that has several."""
 
     def __init__(
         self, node: Node, assess: Callable[[], Report], hardware: str = "", part: str = ""

@@ -1,4 +1,4 @@
-"""What the health node hears: all topics together, sorted by stamp, once they are complete."""
+"""Inputs of the health node: all topics together, sorted by stamp, once they are complete."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Inputs:
         self._fts = mailbox("ft", WRENCH, ("wrench", along))
 
     def take(self) -> Events:
-        """Return what has come and is complete: t (s since the first stamp), kind and values of a Look."""
+        """Return the complete events: t (s since the first stamp), kind and values of a Look."""
         states = [(t, STATE, q, u) for t, (q, u), _ in self._states.take()]
         fts = [(t, FT, self._sign * y, math.nan) for t, (y,), _ in self._fts.take()]
         commands = [(t, COMMAND, u, math.nan) for t, (u,), _ in self._commands.take()]
@@ -62,7 +62,7 @@ class Inputs:
         return self._ready()
 
     def _ready(self) -> Events:
-        """Return what is old enough, and keep the rest waiting."""
+        """Return the events that are old enough, and keep the others."""
         limit = self._newest - LAG
         ready = [row for row in self._waiting if row[0] <= limit]
         self._waiting = self._waiting[len(ready) :]

@@ -1,7 +1,7 @@
-"""To wait for work at little cost: rclpy's executor spends half a millisecond of Python on each wait.
+"""Waiting for work at little cost: rclpy's executor spends half a millisecond of Python on each wait.
 
-All threads of a node share one interpreter lock, so what the executor spends ten times a second to find that
-there is nothing to do, a cycle at 1 kHz is late.
+All threads of a node share one interpreter lock, so the time that the executor spends ten times a second to
+find nothing to do makes a cycle at 1 kHz late.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ TICK = 0.02
 
 
 class Jobs:
-    """Threads of a node's services. group: of these services, which wait beside everything else."""
+    """Threads of a node's services. group: the callback group of these services."""
 
     def __init__(self, node: Node) -> None:
         self.group = ReentrantCallbackGroup()
@@ -25,7 +25,7 @@ class Jobs:
         self._threads: set[threading.Thread] = set()
 
     async def do(self, work: Callable[[], str]) -> str:
-        """Return what the work returns, and raise what it raises; the executor goes on meanwhile."""
+        """Return the result of the work or raise its error; the executor goes on meanwhile."""
         future: Future[str] = Future()
         thread = threading.Thread(target=_fulfil, args=(future, work), daemon=True)
         self._threads.add(thread)

@@ -25,9 +25,10 @@ Work = Callable[[], str]
 
 
 class Joint:
-    """values: parameters of this joint. part: its name beside others, under which all that it has is.
+    """values: parameters of this joint.
 
-    jobs: threads of services. drive, bench: there while the device is open.
+    part: its name among others, the namespace of its topics and services.
+    jobs: threads of services. drive, bench: present while the device is open.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Joint:
         self.bench.publish(state, self.drive.anchor.shift)
 
     def follow(self) -> None:
-        """Log and publish what has changed: a fault, commands that were cut down."""
+        """Log and publish changes: a fault, commands that were cut."""
         fault, limited = now = self.guarded.fault, self.guarded.guard.limited
         before, self._told = self._told, now
         if fault is not None and fault != before[0]:
@@ -94,12 +95,12 @@ class Joint:
             self._node.get_logger().warning(self.named(text), throttle_duration_sec=1.0)
 
     def fail(self, error: Exception) -> None:
-        """Log and keep what has ended it."""
+        """Log and keep the error that ended it."""
         self._ended = " ".join(str(error).split())
         self._node.get_logger().error(self.named(self._ended))
 
     def named(self, text: str) -> str:
-        """Return a line of the log that says which joint it is about, where that is to be said."""
+        """Return a line of the log with the name of the joint if there are several."""
         return f"{self.part}: {text}" if self.part else text
 
     def clear_fault(self) -> str:
@@ -177,7 +178,7 @@ def offer(node: Node, jobs: Jobs, name: str, work: Work, after: Callable[[], Non
 
 
 def _hardware(values: Mapping[str, Any], health: Mapping[str, object]) -> str:
-    """Return what diagnostics are about: which motor where, or which simulation."""
+    """Return the subject of diagnostics: motor and port, or simulation."""
     if "motor" not in health:
         return f"{values['device']} {values['rig']}"
     sensor = f", F/T sensor at {values['ft_host']}" if values["ft_host"] else ""

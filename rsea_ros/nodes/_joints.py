@@ -18,9 +18,9 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def joint_table(table: Sequence[Parameter], given: Mapping[str, Any]) -> list[Parameter]:
-    """Return the parameters JOINT.NAME of each joint; what is not given for a joint is as for the node.
+    """Return the parameters JOINT.NAME of each joint; one not given for a joint is that of the node.
 
-    given: parameters of the node by name. Raises ParameterError for joints that cannot be.
+    given: parameters of the node by name. Raises ParameterError for impossible joints.
     """
     if JOINTS not in table:
         return []

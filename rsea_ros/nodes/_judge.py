@@ -23,14 +23,14 @@ class Judge:
         self._patience = max(1, round(OBEYED * values["rate"]))
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Restart."""
         self.lateness.clear()
         self._off = self._idle = 0
 
     def idle(self, commanded: float, made: float) -> bool:
         """Return whether the motor makes no torque although one is commanded (N m): its driver has a fault.
 
-        What is commanded then must not be there when the driver's fault is cleared.
+        The torque commanded meanwhile must not act when the driver's fault is cleared.
         """
         self._idle = self._idle + 1 if abs(commanded) > SEEN and abs(made) < 0.2 * SEEN else 0
         if self._idle < self._patience:
@@ -39,9 +39,10 @@ class Judge:
         return True
 
     def fault(self, ft: float, desired: float) -> str:
-        """Return what must end the torque, in words; empty for nothing. ft, desired: N m, of this sample.
+        """Return the fault that must end the torque, in words; empty without one.
 
-        A sample whose error is small takes back one whose error was large: a sine in it does not hide it.
+        ft, desired: N m, of this sample.
+        A sample with a small error cancels one with a large error, so a sine does not hide the error.
         """
         error = abs(ft - desired)
         self._off = max(0, self._off + (1 if error > self._error_limit else -1))

@@ -1,4 +1,4 @@
-"""The last minutes in memory, and bags of them: what came before a change and what came after, apart."""
+"""The last minutes in memory, and bags of them: one before a change and one after it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Message(NamedTuple):
 
 
 class Ring:
-    """The newest messages. seconds, megabytes: bounds of what is kept."""
+    """The newest messages, bounded by seconds and megabytes."""
 
     def __init__(self, seconds: float, megabytes: float) -> None:
         self._span, self._most = round(seconds * SECOND), round(megabytes * 1e6)
@@ -32,7 +32,7 @@ class Ring:
         self.size = 0
 
     def add(self, topic: str, msgtype: str, at: int, raw: bytes) -> None:
-        """Keep a message, and forget what is too old or too much."""
+        """Keep a message, and drop those too old or too many."""
         self._messages.append(Message(topic, msgtype, at, raw))
         self.size += len(raw)
         first = self._messages[0]
@@ -43,7 +43,7 @@ class Ring:
             first = self._messages[0]
 
     def messages(self) -> list[Message]:
-        """Return what is kept."""
+        """Return the kept messages."""
         return list(self._messages)
 
 
@@ -59,12 +59,12 @@ class Keeper:
         self.trouble = ""
 
     def ask(self, code: str, since: int) -> None:
-        """Ask for a bag of what is in memory `after` seconds from now. since: ns, of the change."""
+        """Request a bag of the memory `after` seconds from now. since: ns, of the change."""
         if self._due is None:
             self._due = (time.monotonic() + self._after, code, since)
 
     def poll(self) -> Path | None:
-        """Begin what is due; return the folder of a bag that has just been completed."""
+        """Begin bags that are due; return the folder of one just completed."""
         if self._writing is not None and self._writing.done():
             done, self._writing = self._writing, None
             if error := done.exception():
@@ -77,7 +77,7 @@ class Keeper:
         return None
 
     def close(self) -> None:
-        """Write what was asked for, and end."""
+        """Write requested bags, and end."""
         if self._due is not None and self._writing is None:
             self._begin()
         self._pool.shutdown()

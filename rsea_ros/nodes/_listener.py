@@ -1,49 +1,31 @@
-"""A node that only listens: which topics there are, how fast they come, what they say."""
+"""A node that only listens: topics, their rates, their messages."""
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from itertools import pairwise
-from types import TracebackType
 from typing import Any
 
-import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
 
 from msg_adapters.ros import message_text, message_type
 from rsea_ros.errors import ParameterError
-from rsea_ros.nodes._run import LOCAL, NAMESPACE
+from rsea_ros.nodes._visitor import DISCOVERY, POLL, absolute, spin
 from rsea_ros.wording import did_you_mean
 
-_DISCOVERY = 3.0
-"""s in which a topic that there is has been seen."""
-_POLL = 0.05
 _OWN = ("/rosout", "/parameter_events")
 
 
 class Listener:
-    """Hears any topic; publishes nothing."""
+    """Subscribes to any topic; publishes nothing. node: the visitor through which it does."""
 
-    def __enter__(self) -> Listener:
-        os.environ.setdefault(*LOCAL)
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node(
-            "rsea_topics", namespace=NAMESPACE, enable_rosout=False, start_parameter_services=False
-        )
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._node.destroy_node()
-        rclpy.try_shutdown()
+    def __init__(self, node: Node) -> None:
+        self._node = node
 
     def topics(self, seconds: float) -> list[tuple[str, str, str, str]]:
-        """Return name, type, number of publishers and of subscribers of what is found within some seconds."""
+        """Return name, type, numbers of publishers and subscribers of topics found within some seconds."""
         time.sleep(seconds)
         return [
             (name, ", ".join(types), *self._counts(name))
@@ -55,7 +37,7 @@ class Listener:
         """Return a line: messages a second over some seconds, and the longest time between two."""
         arrivals: list[float] = []
         name = self._subscribe(topic, lambda raw: arrivals.append(time.monotonic()), raw=True)
-        self._spin(seconds, lambda: False)
+        spin(self._node, seconds, lambda: False)
         if len(arrivals) < 2:
             return f"{name}: {len(arrivals)} messages in {seconds:g} s"
         span = arrivals[-1] - arrivals[0]
@@ -70,14 +52,14 @@ class Listener:
         waiting: list[Any] = []
         name = self._subscribe(topic, waiting.append, raw=False)
         for number in range(count):
-            self._spin(seconds, lambda: bool(waiting))
+            spin(self._node, seconds, lambda: bool(waiting))
             if not waiting:
                 raise ParameterError(f"{name}: {number} messages within {seconds:g} s, expected {count}")
             yield message_text(waiting.pop(0))
 
     def _subscribe(self, topic: str, hear: Any, *, raw: bool) -> str:
-        """Hear a topic with the durability of its publisher; return its full name."""
-        name = topic if topic.startswith("/") else f"/{NAMESPACE}/{topic}"
+        """Subscribe to a topic with the durability of its publisher; return its full name."""
+        name = absolute(topic)
         kind = self._type_of(name)
         publishers = self._node.get_publishers_info_by_topic(name)
         is_latched = any(p.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in publishers)
@@ -91,20 +73,15 @@ class Listener:
 
     def _type_of(self, name: str) -> str:
         """Return the type of a topic. Raises ParameterError when nobody publishes it."""
-        deadline = time.monotonic() + _DISCOVERY
+        deadline = time.monotonic() + DISCOVERY
         known: dict[str, list[str]] = {}
         while time.monotonic() < deadline:
             known = dict(self._node.get_topic_names_and_types())
             if known.get(name) and self._node.count_publishers(name):
                 return known[name][0]
-            time.sleep(_POLL)
+            time.sleep(POLL)
         near = did_you_mean(name, known)
         raise ParameterError(f"topic {name}: nobody publishes it{near} (rsea topics lists what there is)")
-
-    def _spin(self, seconds: float, is_done: Any) -> None:
-        deadline = time.monotonic() + seconds
-        while not is_done() and (left := deadline - time.monotonic()) > 0.0:
-            rclpy.spin_once(self._node, timeout_sec=min(left, _POLL))
 
     def _counts(self, name: str) -> tuple[str, str]:
         return str(self._node.count_publishers(name)), str(self._node.count_subscribers(name))

@@ -17,7 +17,7 @@ from rsea_ros.nodes._qos import OVERRIDES
 
 
 class Polled(CallbackGroup):
-    """Subscriptions that no executor serves: a cycle takes what has arrived when it needs it."""
+    """Subscriptions that no executor serves: a cycle takes the arrived messages when it needs them."""
 
     def can_execute(self, entity: object) -> bool:
         """Return False: never by an executor."""
@@ -32,9 +32,9 @@ class Polled(CallbackGroup):
 
 
 class Mailbox:
-    """A subscription that is asked. refuse: hears of each message that cannot be read.
+    """A polled subscription. refuse: called for each message that cannot be read.
 
-    admit: tells of a publisher's identity whether its messages count; None: all.
+    admit: decides by a publisher's identity whether its messages count; None: all.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class Mailbox:
         *fields: tuple[str, int], joint: str = "", most: int = 1,
         admit: Callable[[object], bool] | None = None, keep: Callable[[int, bytes], None] | None = None,
     ) -> None:  # fmt: skip
-        """fields: name and index of each number; one that a message does not have is nan.
+        """fields: name and index of each number; nan for one that a message lacks.
 
         joint: name that a message with names must have; empty: any. most: names that it may have.
         keep: gets arrival (ns), bytes of what is read.
@@ -58,7 +58,7 @@ class Mailbox:
     def take(self, most: int = sys.maxsize) -> Iterator[tuple[int, Sequence[float], int]]:
         """Yield stamp (ns), numbers and instant of arrival (ns) of each message that waits.
 
-        most: what is taken at once; of more the middleware keeps the newest.
+        most: messages taken at once; of more the middleware keeps the newest.
         """
         handle = self.subscription.handle
         with handle:

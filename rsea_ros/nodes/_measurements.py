@@ -1,4 +1,4 @@
-"""What the controller node hears: each state with the torque that belongs to it, and desired torques."""
+"""Inputs of the controller node: each state with its torque, and desired torques."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST = 100
 
 
 class Measurements:
-    """Pairs of joint_states and ft. period: ns. desired: what came on desired_torque.
+    """Pairs of joint_states and ft. period: ns. desired: messages of desired_torque.
 
     unusable: readings that were not finite, and messages of several joints.
     """
@@ -66,7 +66,7 @@ class Measurements:
                 self._refuse()
 
     def hear_desired(self, anchor: Anchor) -> None:
-        """Put all desired torques that have arrived into their queue."""
+        """Queue all desired torques that have arrived."""
         now = anchor.now()
         for stamp, (torque,), received in self._desired.take(MOST):
             self.desired.add(stamp, torque, anchor.arrived(received, self._heard))

@@ -1,4 +1,4 @@
-"""What the model node says on /diagnostics: band and errors, doubt, consistency, and whether ft is there."""
+"""Status of the model node on /diagnostics: band and errors, doubt, consistency, and presence of ft."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ModelHealth:
         self.count = 0
 
     def tell(self, estimate: Estimate) -> None:
-        """Take in the newest estimate; the flag learns the noise once that has settled or has changed."""
+        """Process the newest estimate; the flag learns the noise once that has settled or changed."""
         self.estimate = estimate
         self.count += 1
         if self.count % EVERY == 0:

@@ -1,4 +1,4 @@
-"""What the model node hears: commands, states and wrenches, taken together, worked off by stamp."""
+"""Inputs of the model node: commands, states and wrenches, processed in the order of their stamps."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Inputs:
         )
 
     def take(self) -> Iterator[tuple[int, Estimate]]:
-        """Work off what has come; yield the estimate at each wrench, at each state while ft is silent."""
+        """Process new messages; yield the estimate at each wrench, or at each state while ft is silent."""
         for stamp, (torque,), _ in self._commands.take():
             self._command(stamp, torque)
         samples = [(t, q, u, _STATE) for t, (q, u), _ in self._states.take()]

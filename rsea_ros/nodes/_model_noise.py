@@ -1,4 +1,4 @@
-"""The noise that the observer believes: as an identification measured it, or as the rig says."""
+"""The noise for the observer: measured by an identification, or stated by the rig."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 def noise_from(rig: Rig, path: str) -> Noise:
     """Return the noise of a rig, measured where an identification.json is named.
 
-    Raises ParameterError for a file that is none.
+    Raises ParameterError for a file of another kind.
     """
     if not path:
         return noise_of(rig)

@@ -1,4 +1,4 @@
-"""Parameters of a node: a table with description, unit and range; what does not fit it is refused."""
+"""Parameters of a node: a table with description, unit and range; other values are refused."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _ROS_OWN = ("use_sim_time", "start_type_description_service")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter. Its type is the default's; a whole number does for a float.
+    """One parameter. Its type is the default's; an integer is accepted for a float.
 
-    low, high: inclusive range of a number. choices: what a text may be. whole: of the node, where the others
+    low, high: inclusive range of a number. choices: allowed texts. whole: of the node, where the others
     may be given for each of several joints.
     """
 
@@ -36,7 +36,7 @@ class Parameter:
     whole: bool = False
 
     def expected(self) -> str:
-        """Return what a value must be, in words."""
+        """Return the requirement on a value, in words."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
         kind = {bool: "true or false", int: "a whole number", float: "a number", str: "a text",
@@ -80,10 +80,10 @@ def declare(
     table: Sequence[Parameter],
     more: Callable[[Mapping[str, Any]], Sequence[Parameter]] = lambda given: (),
 ) -> dict[str, Any]:
-    """Declare a table on a node and return the values. more: parameters besides, by what was given.
+    """Declare a table on a node and return the values. more: further parameters, from the given ones.
 
-    The node was made with `automatically_declare_parameters_from_overrides`, so it has what was given.
-    Raises ParameterError for a value that does not fit, and for a name that the table does not have.
+    The node was made with `automatically_declare_parameters_from_overrides`, so it has the given values.
+    Raises ParameterError for a wrong value, and for a name that is not in the table.
     """
     given = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
     table = [*table, *more(given)]

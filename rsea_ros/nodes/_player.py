@@ -61,11 +61,11 @@ class Player:
 
     @property
     def stopped(self) -> bool:
-        """Whether it was asked to stop."""
+        """Whether a stop was requested."""
         return self._stopped_at >= 0
 
     def over(self) -> bool:
-        """Return whether all is out. Raises what has gone wrong in the thread."""
+        """Return whether everything is published. Raises the error of the thread."""
         if self.started:
             self.cycle.running()
         soft = self._stopped_at + round(SOFT * self.rate) if self.stopped else len(self.command)
@@ -92,7 +92,7 @@ class Player:
             time.sleep(0.005)
 
     def _begin(self, message: JointState) -> None:
-        """Start at a whole number of periods after a measurement, once everybody listens."""
+        """Start at a whole number of periods after a measurement, once all subscribers listen."""
         if self.started or self.stopped or self.subscriptions < self._wanted:
             return
         self.started = True
@@ -117,7 +117,7 @@ class Player:
             self._publisher.publish(torque_command_message(self._stamp, torque, self._joint))
 
     def _torque(self, k: int) -> float:
-        """Return the command of cycle k: as planned, after a stop ever less of the last one, then zero."""
+        """Return the command of cycle k: as planned; after a stop the last one, decreasing to zero."""
         if not self.stopped:
             self._last = float(self.command[k]) if k < len(self.command) else 0.0
             return self._last

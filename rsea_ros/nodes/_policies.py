@@ -1,7 +1,9 @@
 """SROS 2 policies of the nodes, read from the nodes themselves: python -m rsea_ros.nodes._policies > FILE.
 
-Each node is made in this process with its defaults and asked for its topics and services. `operator` stands
-for a person, who may listen to everything, call every service, and publish nothing.
+With names of joints, `_policies hip knee`, they are those of one driver of these joints and of the other
+nodes in the namespace of each joint. Each node is made in this process with its defaults, and its topics
+and services are listed. `operator` stands for a person, who may listen to everything, call every service, and
+publish nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ import importlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 from unittest.mock import patch
 from xml.etree import ElementTree as XML
@@ -34,19 +36,23 @@ PARAMETERS: Mapping[str, Mapping[str, object]] = {
     "watch": {"port": 0},
 }
 """What a node needs so that it has all its topics."""
+OF_A_JOINT = ("controller", "excite", "experiment", "health", "identify", "model", "record", "watch")
+"""What runs in the namespace of a joint."""
 OPERATOR = "operator"
 Interfaces = dict[tuple[str, str], set[str]]
 """Names by what is done with them: topics publish or subscribe, services reply or request."""
+Profiles = Mapping[tuple[str, str], Interfaces]
+"""By namespace and name of the node."""
 
 
 def main() -> int:
     """Print the policies."""
-    sys.stdout.write(policies())
+    sys.stdout.write(policies(sys.argv[1:]))
     return 0
 
 
-def policies() -> str:
-    """Return the XML of the policies of all nodes and of the operator."""
+def policies(joints: Sequence[str] = ()) -> str:
+    """Return the XML of the policies of all nodes and of the operator. joints: of one driver; none: one."""
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -54,22 +60,42 @@ def policies() -> str:
             with BagWriter("every topic") as bag:
                 for name, kind in TOPICS.items():
                     bag.write(name if name.startswith("/") else f"/{NAMESPACE}/{name}", kind, 1, bytes(8))
-            nodes = {name: interfaces(name) for name in NODES}
+            nodes = _joints(joints) if joints else {(NAMESPACE, name): interfaces(name) for name in NODES}
         finally:
             os.chdir(before)
     heard = {name for each in nodes.values() for name in each["topics", "publish"]}
     served = {name for each in nodes.values() for name in each["services", "reply"]}
     person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
-    return document({**nodes, OPERATOR: person})
+    return document({**nodes, (NAMESPACE, OPERATOR): person})
 
 
-def interfaces(name: str) -> Interfaces:
+def _joints(joints: Sequence[str]) -> Profiles:
+    """Return those of a driver of several joints, and of the other nodes once for each joint."""
+    profiles = {(NAMESPACE, "driver"): interfaces("driver", joints=f"[{', '.join(joints)}]")}
+    for name in OF_A_JOINT:
+        each = interfaces(name)
+        for joint in joints:
+            profiles[f"{NAMESPACE}/{joint}", name] = _within(each, f"/{NAMESPACE}/{joint}/")
+    return profiles
+
+
+def _within(interfaces: Interfaces, namespace: str) -> Interfaces:
+    """Return what a node has in another namespace: its names are relative, but for those of all nodes."""
+    usual = f"/{NAMESPACE}/"
+    return {
+        kind: {namespace + n.removeprefix(usual) if n.startswith(usual) else n for n in names}
+        for kind, names in interfaces.items()
+    }
+
+
+def interfaces(name: str, **parameters: object) -> Interfaces:
     """Make a node and return the full names of its topics and services."""
     module = importlib.import_module(f"rsea_ros.nodes.{name}")
     with patch.object(module, "run_node") as run:
         module.main()
     (_, table, make), options = run.call_args
-    words = [w for key, value in PARAMETERS.get(name, {}).items() for w in ("-p", f"{key}:={value}")]
+    given = {**PARAMETERS.get(name, {}), **parameters}
+    words = [w for key, value in given.items() for w in ("-p", f"{key}:={value}")]
     with rclpy.init(args=["--ros-args", *words]):
         kind = options.get("kind", Node)
         node = kind(name, namespace=NAMESPACE, automatically_declare_parameters_from_overrides=True)
@@ -81,14 +107,14 @@ def interfaces(name: str) -> Interfaces:
             node.destroy_node()
 
 
-def document(profiles: Mapping[str, Interfaces]) -> str:
+def document(profiles: Profiles) -> str:
     """Return the XML (version 0.2.0 of the schema of sros2) with an enclave for each profile."""
     policy = XML.Element("policy", version="0.2.0")
     enclaves = XML.SubElement(policy, "enclaves")
-    for name, each in profiles.items():
-        enclave = XML.SubElement(enclaves, "enclave", path=f"/{NAMESPACE}/{name}")
+    for (namespace, name), each in profiles.items():
+        enclave = XML.SubElement(enclaves, "enclave", path=f"/{namespace}/{name}")
         profile = XML.SubElement(
-            XML.SubElement(enclave, "profiles"), "profile", ns=f"/{NAMESPACE}", node=name
+            XML.SubElement(enclave, "profiles"), "profile", ns=f"/{namespace}", node=name
         )
         for (plural, verb), names in each.items():
             _list(profile, plural, verb, names)

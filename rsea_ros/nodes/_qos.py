@@ -28,8 +28,8 @@ ARRIVAL = Duration(seconds=1)
 
 
 def await_arrival(publisher: Publisher[Any]) -> None:
-    """Wait until every reliable subscriber has what was published.
+    """Wait until every reliable subscriber has received the messages.
 
-    The last message of a node that goes at once is lost to one of four subscribers on a busy machine.
+    On a busy machine one of four subscribers loses the last message of a node that exits at once.
     """
     publisher.wait_for_all_acked(ARRIVAL)

@@ -27,7 +27,7 @@ REALTIME = Parameter(
 
 
 class Worker(Protocol):
-    """What has a thread of its own."""
+    """The owner of a thread."""
 
     thread: threading.Thread
 
@@ -36,17 +36,17 @@ class Worker(Protocol):
 
 
 def keep_time(node: Node, worker: Worker, priority: int) -> None:
-    """Start a worker whose thread keeps time, with the priority that a user asks for (0: as any)."""
+    """Start a worker with a timed thread, at the requested priority (0: normal)."""
     _let_in_at_once()
     worker.start()
     _hurry(node, worker.thread, priority)
 
 
 def _let_in_at_once() -> None:
-    """Make threads that keep time wait little for those that do not, nor for a look at all objects.
+    """Shorten the waits of timed threads for other threads and for garbage collection.
 
-    Python's own interval of 5 ms is longer than a cycle, and so is a collection of garbage in what a node has
-    loaded until now.
+    Python's switch interval of 5 ms is longer than a cycle, and so is a garbage collection over everything
+    that a node has loaded.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.collect()
@@ -54,7 +54,7 @@ def _let_in_at_once() -> None:
 
 
 def _hurry(node: Node, first: threading.Thread, priority: int) -> None:
-    """Give a thread that keeps time the priority that a user asks for; warn where it is not permitted."""
+    """Give a timed thread the requested priority; warn where it is not permitted."""
     if priority:
         try:
             raise_priority(first, priority)
@@ -65,8 +65,8 @@ def _hurry(node: Node, first: threading.Thread, priority: int) -> None:
 def raise_priority(first: threading.Thread, priority: int) -> None:
     """Let a thread run at SCHED_FIFO `priority`, and every other thread of this process one below it.
 
-    They share the interpreter's lock and those of the middleware, through which a message arrives as well:
-    one that holds a lock and does not get the processor holds up all. Children begin without. Raises
+    They share the locks of the interpreter and of the middleware, through which messages arrive:
+    one that holds a lock without the processor delays all. Children begin at normal priority. Raises
     ParameterError where the system does not permit it.
     """
     for thread in _threads():

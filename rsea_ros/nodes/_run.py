@@ -32,16 +32,16 @@ TICK = 0.1
 
 
 class Program(Protocol):
-    """What a node's file makes: its work beside the callbacks."""
+    """The work of a node beside its callbacks."""
 
     def finished(self) -> bool:
-        """Return whether the work is done; raises what has gone wrong in a thread."""
+        """Return whether the work is done; raises the error of a thread."""
 
     def conclude(self) -> None:
-        """Do what is left once the work is done or was stopped; Ctrl-C interrupts this one."""
+        """Finish after the work is done or was stopped; Ctrl-C interrupts this."""
 
     def close(self) -> None:
-        """Leave nothing behind: torque zero, threads joined, files closed. On every way out."""
+        """Clean up on every way out: torque zero, threads joined, files closed."""
 
 
 def run_node(
@@ -56,9 +56,9 @@ def run_node(
 ) -> int:
     """Run one node in this process and return the exit status.
 
-    endless: to be stopped is the regular end; else it is an interruption (status 128 and the signal).
-    more: parameters besides those of the table, by what was given. waits_for_nobody: see _sockets.py.
-    Whatever the user can put right is one line in the log and status 2.
+    endless: a stop is the regular end; otherwise it is an interruption (status 128 plus the signal).
+    more: parameters beside those of the table, from the given ones. waits_for_nobody: see _sockets.py.
+    An error that the user can correct is one line in the log and status 2.
     """
     arguments = remove_ros_args(sys.argv)[1:]
     if "--help" in arguments or "-h" in arguments:
@@ -82,7 +82,7 @@ def run_node(
 
 
 class _Stop:
-    """Signals only ask: the node publishes its zeros before it goes."""
+    """A signal is only a request: the node publishes its zeros before it exits."""
 
     def __init__(self) -> None:
         self.status = 0
@@ -91,7 +91,7 @@ class _Stop:
 
     @property
     def asked(self) -> bool:
-        """Whether a signal has come."""
+        """Whether a signal has arrived."""
         return self.status > 0
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
@@ -129,7 +129,7 @@ def _make(kind: type[Node], name: str) -> Node:
 
 
 def _work(node: Node, program: Program, stop: _Stop) -> bool:
-    """Spin until the program has finished or a signal asks to stop; return whether it had finished."""
+    """Spin until the program has finished or a signal requests a stop; return whether it had finished."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:

@@ -14,7 +14,7 @@ from rclpy.subscription import Subscription
 class Tap:
     """Give every message of a topic, serialised, to `store(received_ns, raw)`.
 
-    count: messages so far. lost: messages that the middleware says it lost.
+    count: messages so far. lost: messages that the middleware reports as lost.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""One run on the live graph: played, heard, and worth something only if nothing broke."""
+"""One run on the live graph: played, recorded, and valid only without a failure."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _TAIL = 0.5
 
 
 class Ears:
-    """What a node hears of its bench for as long as it lives: a record anew for each run."""
+    """The topics of a node's bench while it lives, with a new record for each run."""
 
     def __init__(self, node: Node, axis: str) -> None:
         self._axis = axis
@@ -43,11 +43,11 @@ class Ears:
         self._health = node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, COMMAND)
 
     def begin(self, alarm: Callable[[str], None]) -> None:
-        """Forget what was heard before. alarm: called when a node of the bench has failed."""
+        """Start a new record. alarm: called when a node of the bench has failed."""
         self._contents, self._alarm, self.last = Contents(), alarm, time.monotonic()
 
     def record(self) -> Record:
-        """Return what was heard since. Raises RseaError where no record can be made of it."""
+        """Return the record since then. Raises RseaError where none can be made."""
         topics = TopicMap(**self._names, axis=self._axis)
         return record_from(self._contents, self._names["torque_command"], topics, strict=False)
 
@@ -66,7 +66,7 @@ class Ears:
         sink.raw.append(raw)
 
     def _on_health(self, message: DiagnosticArray) -> None:
-        """Give the alarm for what fails after the run began, not for what had failed before."""
+        """Raise the alarm for failures after the beginning of the run only."""
         for status in message.status:
             if status.level != ERROR:
                 self._failed.discard(status.name)
@@ -76,7 +76,7 @@ class Ears:
 
 
 class Trial:
-    """Plays a proposal while its bench is heard; nothing is learnt from a run that broke."""
+    """Plays a proposal while its bench is recorded; a run that broke off is discarded."""
 
     def __init__(self, ears: Ears, player: Player) -> None:
         self._ears, self._player = ears, player
@@ -90,7 +90,7 @@ class Trial:
         self._player.stop()
 
     def over(self) -> bool:
-        """Return whether the run is over and its end is heard; stops it where the bench fell silent."""
+        """Return whether the run and its recording are over; stops it where the bench falls silent."""
         silent = time.monotonic() - self._ears.last
         if self._player.started and silent > SILENT:
             self.stop(f"no measurement for {silent:.2f} s")
@@ -104,7 +104,7 @@ class Trial:
         self._player.close()
 
     def record(self) -> Record:
-        """Return what was heard. Raises DeviceError for a run that broke: nothing may be learnt from it."""
+        """Return the record. Raises DeviceError for a run that broke off."""
         if self._why:
             raise DeviceError(self._why)
         try:
@@ -120,7 +120,7 @@ class Trial:
         return record
 
     def _failed(self, why: str) -> None:
-        """Stop where a node of the bench says that it has failed."""
+        """Stop when a node of the bench reports a failure."""
         if self._player.started:
             self.stop(why)
 

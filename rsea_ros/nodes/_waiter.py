@@ -41,7 +41,7 @@ class Waiter:
             self.thread.join()
 
     def running(self) -> bool:
-        """Return whether it is still at it. Raises what `work` has raised."""
+        """Return whether it still runs. Raises the error of `work`."""
         if self.error is not None:
             raise self.error
         return self.thread.is_alive()

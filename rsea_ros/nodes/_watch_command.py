@@ -48,7 +48,7 @@ class WatchCommand:
         self._due = 0.0
 
     def look(self) -> None:
-        """See who is there, and start or end the cycle. Raises what went wrong in it."""
+        """Check the publishers, and start or end the cycle. Raises its error."""
         if time.monotonic() >= self._due:
             self._due = time.monotonic() + LOOK
             self._see_to_the_limits()
@@ -63,7 +63,7 @@ class WatchCommand:
             self._cycle.start(self._first() - LEAD)
 
     def close(self) -> None:
-        """End with zeros that have arrived, whoever holds the command."""
+        """End with zeros that have arrived, whichever page holds the command."""
         if self.commander.holder is not None:
             self.commander.release(self.commander.holder)
         deadline = time.monotonic() + 1.0
@@ -87,7 +87,7 @@ class WatchCommand:
         return self._source.newest + round(periods * SECOND / self._rate)
 
     def _see_to_the_limits(self) -> None:
-        """Ask whoever publishes joint_states for the limits, once."""
+        """Request the limits from the publisher of joint_states, once."""
         bench = ", ".join(sorted(self._publishers("joint_states")))
         if bench != self._bench:
             self._bench, self._client, self._asked, self.commander.bounds = bench, None, False, None

@@ -1,4 +1,4 @@
-"""What the live view shows: the newest samples of each topic, taken when the page wants them, and the health.
+"""The data of the live view: the newest samples of each topic, taken on request of the page, and the health.
 
 All subscriptions to measurements are best effort and hold a bounded queue: a publisher neither waits for this
 node nor repeats anything for it.
@@ -61,7 +61,7 @@ class WatchSource:
         node.create_subscription(DiagnosticArray, "/diagnostics", self._on_health, MEASUREMENT)
 
     def take(self) -> Mapping[str, Sequence[tuple[float, float]]]:
-        """Return what has come since the last call: s since the first stamp, SI."""
+        """Return the samples since the last call: s since the first stamp, SI."""
         rows: Rows = {}
         for stamp, (angle, effort) in self._of("joint_states"):
             self.newest = max(self.newest, stamp)

@@ -48,7 +48,7 @@ class Controller:
         self._desired = self._inputs.desired
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._judge = Judge(values)
-        self._last, self._heard, self._watched, self._torque = 0, 0, 0, 0.0
+        self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._steps = self._missed = self._limited = self._late = self._told = self._restarts = 0
         self._squares: list[float] = []
@@ -97,14 +97,18 @@ class Controller:
 
     def _command(self, stamp: int, reading: Reading, missed: int, together: int) -> None:
         self._inputs.hear_desired(self._anchor)
-        ahead = (2.5 if self._values["preview"] else 0.5) * self._period
-        self._desired.take(round(self._grid.at + ahead))
+        off = self._take_desired()
         if not self._last or self._judge.idle(self._torque, reading.motor_torque):
             self._controller.start(reading, self._desired.torque)
         late = (self._anchor.now() - stamp) / self._period - 1.0 if together else 0.0
         trust = self._judge.lateness.take(max(late, missed), max(together, int(missed > 0)))
         torque = self._controller.step(
-            reading, self._desired.torque, missed, trust=trust, offset=self._grid.offset
+            reading,
+            self._desired.torque,
+            missed,
+            trust=trust,
+            offset=self._grid.offset,
+            desired_offset=off,
         )
         if fault := self._judge.fault(reading.ft, self._desired.torque):
             return self._latch(fault)
@@ -115,6 +119,18 @@ class Controller:
         self._limited += self._controller.share.limited
         self._late += late > self._judge.lateness.tolerance.late
         self._squares.append((reading.ft - self._desired.torque) ** 2)
+
+    def _take_desired(self) -> float:
+        """Take the desired torque nearest to this sample; return by how many samples it is for later.
+
+        One that came too late for its own sample, and one that still holds, are taken for one of this sample.
+        """
+        place = self._grid.at + (round(2.0 * self._period) if self._values["preview"] else 0)
+        before, self._until = self._until, round(place + 0.5 * self._period)
+        taken = self._desired.take(self._until)
+        if not taken or taken[-1][0] <= before:
+            return 0.0
+        return float(max((taken[-1][0] - place) / self._period, -0.5))
 
     def _latch(self, fault: str) -> None:
         self._fault, self._release = fault, (time.monotonic_ns(), self._torque)
@@ -136,7 +152,7 @@ class Controller:
         self._commands.publish(self._writer.write(stamp, (self._torque,)))
 
     def _clear(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Begin anew, at zero torque, with the next measurement."""
+        """Restart at zero torque with the next measurement."""
         with self._lock:
             self._fault, self._last, self._torque = "", 0, 0.0
             self._grid.forget()

@@ -22,6 +22,7 @@ from rsea_ros.nodes._alarm import Alarm
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._bench import NAMES, SPRING_FRAME
 from rsea_ros.nodes._buses import devices_of
+from rsea_ros.nodes._combined import Combined
 from rsea_ros.nodes._cycle import Cycle
 from rsea_ros.nodes._device_parameters import LIMITS, MOTOR, SAFETY, SENSOR
 from rsea_ros.nodes._devices import DEVICES
@@ -77,12 +78,13 @@ class Driver(ManagedEntity):
             for service, work in (("stop", self._stop), ("clear_fault", self._clear_faults)):
                 offer(node, self._jobs, service, work, lambda: None)
         self._cycle: Cycle | None = None
+        self._combined: Combined | None = None
         node.add_managed_entity(self)
         if values["autostart"] and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
             node.trigger_activate()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Open the devices and begin to publish what they measure."""
+        """Open the devices and begin to publish their measurements."""
         anchor = Anchor()
         for joint in self.joints:
             try:
@@ -92,6 +94,8 @@ class Driver(ManagedEntity):
                 self._close_devices()
                 self._take_topics_away()
                 return TransitionCallbackReturn.FAILURE
+        if self.joints[0].part:
+            self._combined = Combined(self._node, [joint.part for joint in self.joints])
         self._cycle = Cycle(self._values["rate"], self._step, catch_up=False, anchor=anchor)
         for joint in self.joints:
             joint.runs_in(self._cycle)
@@ -122,9 +126,9 @@ class Driver(ManagedEntity):
     on_shutdown = on_error = on_cleanup
 
     def finished(self) -> bool:
-        """Tell of faults; go back to unconfigured when the cycle has ended with an exception.
+        """Report faults; return to unconfigured when the cycle has ended with an exception.
 
-        What the executor does next begins between two cycles.
+        The executor's next work begins between two cycles.
         """
         for joint in self.joints:
             joint.follow()
@@ -143,7 +147,7 @@ class Driver(ManagedEntity):
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Zero torque, devices closed, topics gone; also when there are none."""
+        """Zero torque, devices closed, topics removed; also without any."""
         for joint in self.joints:
             joint.guarded.enabled = False
         self._jobs.join(PATIENCE)
@@ -161,10 +165,12 @@ class Driver(ManagedEntity):
     def _take_topics_away(self) -> None:
         for joint in self.joints:
             joint.close()
-        self._cycle = None
+        if self._combined is not None:
+            self._combined.close()
+        self._cycle = self._combined = None
 
     def _close_devices(self) -> None:
-        """Close every device, whatever one raises; all are zero before one is closed, which takes long."""
+        """Close every device whatever one raises; all torques are zero before the first, slow, close."""
         with ExitStack() as kept:
             for joint in self.joints:
                 kept.callback(joint.guarded.device.close)
@@ -179,7 +185,7 @@ class Driver(ManagedEntity):
             bus.send()
 
     def _disable(self, joints: Sequence[Joint]) -> None:
-        """Zero torque, switched off, whatever one of them answers."""
+        """Zero torque and switch off, whatever one of them answers."""
         for joint in joints:
             try:
                 joint.guarded.disable()
@@ -187,17 +193,20 @@ class Driver(ManagedEntity):
                 self._node.get_logger().error(joint.named(f"while deactivating: {error}"))
 
     def _halt(self) -> None:
-        """End the torque with the next cycle: the process was asked to end."""
+        """End the torque with the next cycle, since the process is to end."""
         for joint in self.joints:
             joint.guarded.guard.halted = True
 
     def _step(self, stamp: int) -> None:
-        """Do a cycle of the devices and publish what was read."""
+        """Run a cycle of the devices and publish the readings."""
         drives = [joint.drive for joint in self.joints if joint.drive is not None]
         try:
-            for joint, state in zip(self.joints, step(drives, stamp, self._buses), strict=True):
+            states = step(drives, stamp, self._buses)
+            for joint, state in zip(self.joints, states, strict=True):
                 if state is not None:
                     joint.publish(state)
+            if self._combined is not None:
+                self._combined.publish(states, drives[0].anchor.shift)
         except Exception:
             self._close_devices()
             raise
@@ -209,7 +218,7 @@ class Driver(ManagedEntity):
         return "torque of all joints zero until clear_fault"
 
     def _clear_faults(self) -> str:
-        """Clear every joint's fault; one that cannot be cleared keeps no other from it."""
+        """Clear every joint's fault; one that cannot be cleared does not affect the others."""
         self._check_configured()
         done, failed = [], []
         for joint in self.joints:

@@ -1,4 +1,4 @@
-"""excite: plays an excitation as torque commands, and ends with zeros whatever happens."""
+"""excite: plays an excitation as torque commands, and always ends with zeros."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """experiment: separates the possible causes of a bench, run by run, each with a person's consent.
 
-It begins with what was recorded before (`bag`). ~/approve plays the run that is proposed,
-~/decline ends the session, ~/cancel stops a run softly at any sample. What is known stands in /diagnostics.
+It begins with earlier recordings (`bag`). ~/approve plays the proposed run,
+~/decline ends the session, ~/cancel stops a run softly at any sample. The results are on /diagnostics.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ TABLE = (
 
 
 class Experiment:
-    """The loop in a thread of its own; this one plays and hears."""
+    """The loop in a separate thread; the executor's thread plays and records."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
@@ -106,7 +106,7 @@ class Experiment:
         )
 
     def _play(self, proposal: Proposal) -> Record | None:
-        """From the loop's thread: ask, have it played, return its record; None where the answer was no."""
+        """In the loop's thread: request approval, play the run, return its record; None if declined."""
         with self._changed:
             self._proposal, self._answer = proposal, None if self._values["ask"] else True
             self._changed.wait_for(lambda: self._answer is not None or self._cancelled)
@@ -122,7 +122,7 @@ class Experiment:
         return record
 
     def _look(self) -> None:
-        """From the executor: begin a run that was approved, end one that is over."""
+        """In the executor: begin an approved run, end one that is over."""
         with self._changed:
             if self._proposal is None or not self._answer:
                 return
@@ -174,7 +174,7 @@ class Experiment:
         return self._work.done()
 
     def conclude(self) -> None:
-        """Write what is known, where the loop has ended by itself."""
+        """Write the results, if the loop has ended by itself."""
         if not self._work.done():
             return
         outcome = self._work.result()

@@ -1,4 +1,4 @@
-"""health: watches a joint at work, says what changed, keeps the last minutes as a bag. It only listens."""
+"""health: watches a joint at work, reports changes, keeps the last minutes as a bag. It only listens."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class HealthNode:
             self._health.publish()
 
     def _judge(self, events: Events) -> None:
-        """Give what came to the monitor, and its fits to the thread."""
+        """Pass new events to the monitor, and its fits to the thread."""
         self._monitor.take(*events)
         if self._fit is None and self._monitor.job is not None:
             self._fit = self._pool.submit(self._monitor.job)
@@ -100,7 +100,7 @@ class HealthNode:
                 self._told(self._monitor.conclude(answer))
 
     def _told(self, finding: Finding | None) -> None:
-        """Say what is new, and keep a bag of it."""
+        """Report new findings, and keep a bag of them."""
         if finding is None:
             return
         since = self._inputs.stamp(finding.since)
@@ -147,7 +147,7 @@ class HealthNode:
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Leave nothing behind: a bag that was asked for is written."""
+        """Clean up; a requested bag is written."""
         self._pool.shutdown(cancel_futures=True)
         self._keeper.close()
 

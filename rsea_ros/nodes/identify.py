@@ -1,6 +1,6 @@
-"""identify: gathers a record from the topics and identifies the actuator, as `rsea identify` does.
+"""identify: records the topics and identifies the actuator, as `rsea identify` does.
 
-~/diagnose does with what was heard what `rsea diagnose` does with a bag.
+~/diagnose treats the recording as `rsea diagnose` treats a bag.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ TABLE = (
 
 
 class Identify:
-    """Taps into the contract's topics; the identification begins when the commands are over.
+    """Records the contract's topics; the identification begins when the commands are over.
 
     They are over when some have come, none has for `quiet` seconds, and torque_command has no publisher any
     more (the replay or the excitation has ended), or when ~/finish is called; with `stay` only then. A
-    diagnosis that is under way is waited for.
+    running diagnosis is completed first.
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -137,7 +137,7 @@ class Identify:
         log.info(f"report: {report}")
 
     def _record(self, strict: bool = True) -> Record:
-        """Return what was heard. Raises BagError where no record can be made of it."""
+        """Return the record. Raises BagError where none can be made."""
         source = self._topics.topic("torque_command")
         return record_from(self._contents, source, self._topics, strict=strict)
 

@@ -62,7 +62,7 @@ TICK = 0.02
 
 
 class Model:
-    """Wakes at each ft and takes what has come with it; while ft is silent it looks every 20 ms."""
+    """Wakes at each ft and processes the messages that came with it; while ft is silent, every 20 ms."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         rig = load_rig(values["rig"])

@@ -31,8 +31,8 @@ STALL, PAUSE = SECOND // 50, 0.005
 class Plant:
     """Simulates up to each deadline with the commands that took effect until then, and publishes.
 
-    The simulation ends at the instant that the stamp names; a command with a stamp in between acts from that
-    stamp on, so a bag of these topics tells what has happened, without a delay of its own.
+    The simulation ends at the instant of the stamp; a command with a stamp in between acts from that
+    stamp on, so a bag of these topics shows what happened, without an added delay.
     """
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
@@ -66,7 +66,7 @@ class Plant:
         self._bench.publish(self._device.read())
 
     def _let_commands_in(self, behind: int) -> None:
-        """Pause once after a stall (ns): what was sent meanwhile is still on its way."""
+        """Pause once after a stall (ns): commands sent meanwhile are still on their way."""
         if behind > STALL >= self._behind:
             time.sleep(PAUSE)
         self._behind = behind

@@ -1,4 +1,4 @@
-"""record: writes what is published under the contract's topics into a bag."""
+"""record: writes the messages on the contract's topics into a bag."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ TABLE = (
 
 
 class Record:
-    """Taps on every topic, one bag. Log times are when a message was received."""
+    """Subscriptions to every topic, one bag. Log times are those of reception."""
 
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node = node
@@ -79,7 +79,7 @@ class Record:
         return ceased or (self._begin > 0.0 and now - self._begin > self._duration > 0.0)
 
     def conclude(self) -> None:
-        """Say what was recorded."""
+        """Report the recorded messages."""
         self._tell()
 
     def close(self) -> None:

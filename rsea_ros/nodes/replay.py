@@ -104,11 +104,11 @@ class Replay:
         self._done.set()
 
     def finished(self) -> bool:
-        """Return whether everything is out and has arrived."""
+        """Return whether all messages are published and have arrived."""
         return self._done.is_set()
 
     def conclude(self) -> None:
-        """Say how much was played."""
+        """Report the played messages."""
         self._tell()
 
     def close(self) -> None:

@@ -62,7 +62,7 @@ class Watch:
         """Leave nothing to do."""
 
     def close(self) -> None:
-        """Zero torque; no page, no recording and no evaluation goes on."""
+        """Zero torque; end pages, recordings and evaluations."""
         if self._command is not None:
             self._command.close()
         self._server.stop()

@@ -1,1 +1,4 @@
-"""What the paper says, recomputed: claims, findings, and the formulas as printed. Nothing else needs it."""
+"""The paper's statements recomputed: claims, findings, and the formulas as printed.
+
+No other layer needs it.
+"""

@@ -1,4 +1,4 @@
-"""What the paper prints as numbers, each beside the same number recomputed here.
+"""The numbers that the paper prints, each beside the same number recomputed here.
 
 A claim keeps the text as printed, so that agreement means: equal to the last printed digit. Only numbers that
 follow from others of the paper count (`found`); the rest need one that it does not print (`silent`), or one
@@ -52,7 +52,7 @@ Status = Literal["found", "silent", "unclear"]
 
 @dataclass(frozen=True)
 class Claim:
-    """where: section or equation. printed: the paper's digits. ours: same unit. how: what ours comes from.
+    """where: section or equation. printed: the paper's digits. ours: same unit. how: the derivation of ours.
 
     status: found, where the paper's numbers alone make ours; silent, where one is missing; unclear otherwise.
     """
@@ -89,7 +89,7 @@ def table_2(name: str) -> float:
 
 
 def claims() -> tuple[Claim, ...]:
-    """Return every printed number that others bear on, those that the paper's numbers alone make first."""
+    """Return every printed number that others determine, those from the paper's numbers alone first."""
     return (*_recomputed(), *_from_the_springs(), *_from_the_parts())
 
 

@@ -1,4 +1,4 @@
-"""What can be said of the paper's tests and of its prototype, sections 3.2 and 4."""
+"""Findings on the paper's tests and its prototype, sections 3.2 and 4."""
 
 from __future__ import annotations
 

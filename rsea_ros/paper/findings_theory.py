@@ -1,4 +1,4 @@
-"""What can be said of the paper's circuit and equations, sections 2 and 3.1."""
+"""Findings on the paper's circuit and equations, sections 2 and 3.1."""
 
 from __future__ import annotations
 

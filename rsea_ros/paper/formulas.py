@@ -3,7 +3,7 @@
 Eq. (7) is in `model/bandwidth.py`: the design method needs it too.
 
 k_s: N m/rad; j_*: kg m^2; b_*: N m s/rad, at the gear output, but for `*_rotor`, which are at the rotor
-(times N^2 at the output). What the paper leaves out of Eqs. (5) to (7) is in docs/physics.md.
+(times N^2 at the output). The term that Eqs. (5) to (7) leave out is in docs/physics.md.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The bench's free values differ from the rig's by draws from the rig's own spread; the command is the paper's
 white noise of 30 N m, half of it for the fit and half held out. The lumped model is fitted with loose
-priors, so that nothing but its structure holds it back.
+priors, so that only its structure limits it.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def moving_output(
 ) -> MovingOutput:
     """Run the test on the bench of a rig, with a sensor at each end where the rig has a proximal spring.
 
-    channels: what the fit sees beside the command; the paper had the F/T sensor alone.
+    channels: used by the fit beside the command; the paper had the F/T sensor alone.
     """
     bench = drawn(rig, seed)
     values = excitation("white_noise", Settings(rate=RATE, duration=duration, amplitude=NOISE, seed=seed))

@@ -18,8 +18,8 @@ class Judged:
     """A rival on one held-out record.
 
     sensor: which end its F/T sensor is on. explained: share of the variance of its torque,
-    1 - var(error) / var(measured), negative where the model is worse than none. fit_percent: %.
-    rms_error, rms: of the error and of what was measured, N m.
+    1 - var(error) / var(measured), negative where no model would be better. fit_percent: %.
+    rms_error, rms: of the error and of the measurement, N m.
     """
 
     sensor: str
@@ -41,7 +41,7 @@ class Rival:
 def compare(
     rivals: Mapping[str, Rig], train: Record, holdout: Sequence[tuple[str, Record]]
 ) -> tuple[Rival, ...]:
-    """Fit every rig to `train` and judge it on held-out records, each with the end its sensor is on.
+    """Fit every rig to `train` and test it on held-out records, each with the end of its sensor.
 
     Nothing is fitted to the held-out records: a second sensor tests what the first one identified.
     """

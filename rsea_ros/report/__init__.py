@@ -1,4 +1,4 @@
-"""From results to pages, tables and files: values go in, text comes out, for show only.
+"""From results to pages, tables and files: values in, text out.
 
 A folder for each result: check, identification, diagnosis, law, experiment, campaign, design, control,
 paper, fleet. There page.py is its HTML, json.py its file for programs, words.py its sentences, terminal.py

@@ -1,4 +1,4 @@
-"""What result files share: numbers that JSON can hold, faults of the data, where a result comes from."""
+"""Shared by result files: numbers that JSON can hold, faults of the data, provenance."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def json_text(contents: Mapping[str, Any]) -> str:
 
 
 def fault_json(fault: Fault) -> dict[str, Any]:
-    """Return a fault of the data as it stands in the result files."""
+    """Return a fault of the data for the result files."""
     size = {} if fault.size is None else {"size": finite(fault.size), "unit": fault.unit}
     detail = {"detail": fault.detail} if fault.detail else {}
     return {"kind": fault.kind, "channel": fault.channel, "share": finite(fault.share), **size, **detail}
@@ -34,7 +34,7 @@ def numbers(values: Mapping[str, float | None]) -> dict[str, float | None]:
 
 
 def strict(value: Any) -> Any:
-    """Return what JSON can hold: None for each number that is infinite or NaN, however deep."""
+    """Return the values for JSON: None for each infinite number or NaN, at any depth."""
     if isinstance(value, Mapping):
         return {key: strict(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

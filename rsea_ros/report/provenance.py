@@ -32,7 +32,7 @@ class Provenance:
 
     @property
     def json(self) -> dict[str, object]:
-        """What stands in a result file."""
+        """The entry in a result file."""
         return {
             "version": self.version,
             "date": self.date,
@@ -42,7 +42,7 @@ class Provenance:
 
 
 def provenance_of(command: Sequence[str], files: Iterable[str | Path]) -> Provenance:
-    """Return the provenance of what is made now by a command line from some files or bags.
+    """Return the provenance of a result made now by a command line from some files or bags.
 
     Raises OSError for a file that cannot be read.
     """

@@ -1,4 +1,4 @@
-"""The remarks of a fit or a diagnosis in words: what data cannot determine, what a reader must know."""
+"""The remarks of a fit or a diagnosis in words."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def remark_sentences(remarks: Iterable[Remark]) -> tuple[str, ...]:
 
 
 def coloured_noise(channels: Iterable[str]) -> str:
-    """Return what was taken for coloured noise of sensors, and why."""
+    """Return the residuals that were taken for coloured noise of sensors, and why."""
     return (
         f"The noise of the {listed([words.channel(n) for n in channels])} is coloured: its level was taken "
         "from the residual, which is steady, falls with frequency, and agrees with neither command nor "
@@ -109,6 +109,16 @@ def _coherence_lost(remark: Remark) -> str:
     )
 
 
+def _off_rig(remark: Remark) -> str:
+    stated, value, low, high, spreads = remark.values
+    fitted, doubt = words.with_doubt(value, low, high)
+    unit = words.unit(remark.unit)
+    return (
+        f"{remark.names[0]} differs from the rig: the rig states {words.number(stated, 4)} {unit}, the fit "
+        f"gives {fitted}{doubt} {unit} (95 %), {words.number(spreads, 2)} of the stated spreads away."
+    )
+
+
 _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "even_clocks": _even_clocks,
     "clocks_taken_as_right": _clocks_taken_as_right,
@@ -124,4 +134,5 @@ _WORDS: Mapping[Code, Callable[[Remark], str]] = {
     "coherence_lost": _coherence_lost,
     "on_measured_angle": lambda remark: _ON_MEASURED_ANGLE,
     "coloured_noise": lambda remark: coloured_noise(remark.names),
+    "off_rig": _off_rig,
 }

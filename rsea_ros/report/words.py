@@ -72,7 +72,7 @@ def minus(text: str) -> str:
 
 
 def signed(value: float, digits: int) -> str:
-    """Return a value with its sign and so many decimal places."""
+    """Return a value with its sign and a number of decimal places."""
     return minus(f"{value:+.{digits}f}")
 
 
@@ -82,7 +82,7 @@ def hertz(value: float) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a value with so many significant digits, without an exponent where it can be helped."""
+    """Return a value with a number of significant digits, without an exponent if possible."""
     if not math.isfinite(value):
         return "∞" if value > 0.0 else "−∞" if value < 0.0 else "–"
     if value == 0.0:
@@ -101,12 +101,25 @@ def quantity(value: float, of: str, digits: int = 3) -> str:
 
 
 def scaled(value: float, of: str) -> tuple[float, str]:
-    """Return by what a value is to be multiplied to be read, and its unit then: 6.1e-6 rad is 1e6, `µrad`."""
+    """Return the factor that makes a value readable, and its unit then: 6.1e-6 rad gives 1e6, `µrad`."""
     simple = of and " " not in of.split("/")[0] and of != "1"
     if not simple or value == 0.0 or not math.isfinite(value) or abs(value) >= 0.1:
         return 1.0, unit(of)
     factor, prefix = next((p for p in _PREFIXES if abs(value) >= 0.999 * p[0]), _PREFIXES[-1])
     return 1.0 / factor, f"{prefix}{unit(of)}"
+
+
+def span(low: float, high: float, of: str) -> str:
+    """Return a range with its unit, both ends to two digits of its width: `0 to 0.041 N·m`."""
+    factor, prefixed = scaled(max(abs(low), abs(high)), of)
+    low, high = low * factor, high * factor
+    width = high - low
+    if not (math.isfinite(width) and width > 0.0):
+        return f"{number(low)} to {number(high)} {prefixed}".rstrip()
+    decimals = 1 - math.floor(math.log10(width))
+    ends = (round(end, decimals) for end in (low, high))
+    low_text, high_text = (minus(f"{end:.{max(0, decimals)}f}") if end else "0" for end in ends)
+    return f"{low_text} to {high_text} {prefixed}".rstrip()
 
 
 LOPSIDED = 1.5

@@ -1,4 +1,4 @@
-"""The course of a fleet's joints over months: fleet_trends.py is the door, alarms.py what to act on."""
+"""The course of a fleet's joints over months: fleet_trends.py is the entry, alarms.py has the findings."""
 
 from rsea_ros.trends.alarms import Alarm, alarms, alarms_of
 from rsea_ros.trends.fleet_trends import fleet_trends

@@ -1,4 +1,4 @@
-"""Alarms: what somebody should look at, each with a key that stays the same from look to look."""
+"""Alarms: findings that need attention, each with a key that stays the same from look to look."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Kind = Literal["change", "trend", "outlier", "cause", "fault"]
 class Alarm:
     """A finding of a joint.
 
-    key: the same at every look at a growing history, for as long as it is the same thing. about: parameter,
+    key: the same at every look at a growing history while the finding lasts. about: parameter,
     cause or fault. since_s: POSIX s, with earliest_s and latest_s; NaN for an outlier. size: in `unit`,
     change from before or the cause's size now, with its 95 % interval; None for a fault. relative: size over
     the level before, NaN where none. confidence: 1 less the false discovery rate. recording, artefacts: of
@@ -52,7 +52,7 @@ def alarms(history: Table, recordings: Table, settings: TrendSettings = DEFAULT)
 
 
 def alarms_of(fleet: FleetTrends, recordings: Table) -> tuple[Alarm, ...]:
-    """Return the alarms of what is known of a fleet's course."""
+    """Return the alarms of a fleet's trends."""
     appeared = {(a.joint, a.about) for a in fleet.appearances if a.kind == "cause"}
     made = [_of_appearance(a, recordings) for a in fleet.appearances]
     for trend in fleet.trends.values():

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 from rsea_ros.trends.causes import Naming
 from rsea_ros.trends.result import Appearance, Interval
@@ -38,7 +39,7 @@ class Scan:
 
 
 def appearances(every: Sequence[Naming], joints: int, settings: TrendSettings) -> tuple[Appearance, ...]:
-    """Return what appeared, or was in one joint from the first and not in the fleet.
+    """Return causes and faults that appeared, or that one joint but not the fleet has from the first day.
 
     joints: how many the fleet has. p values are bounded by the number of days times exp(-ratio).
     """
@@ -79,7 +80,7 @@ def _scan(n: Naming, usual: float, settings: TrendSettings) -> Scan:
 
 
 def _always(named: FloatArray, usual: float) -> float:
-    """Return the log likelihood ratio of a joint that has what its fleet has not, 0 if not clear."""
+    """Return the log likelihood ratio of a joint with a cause that its fleet lacks, 0 if not clear."""
     share = float(np.mean(named))
     if share < _MOSTLY or usual > _RARELY:
         return 0.0
@@ -142,5 +143,5 @@ def _size_now(n: Naming, last: int = 9) -> Interval | None:
     size, sd = n.size[usable], n.sd[usable]
     middle = float(np.median(size))
     spread = 1.4826 * float(np.median(np.abs(size - middle)))
-    half = 1.96 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
+    half = Z95 * 1.25 * float(np.hypot(spread, np.median(sd))) / np.sqrt(len(usable))
     return Interval(middle, middle - half, middle + half)

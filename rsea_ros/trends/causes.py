@@ -26,7 +26,7 @@ _LEAST_GAIN = 0.1
 
 @dataclass(frozen=True)
 class Naming:
-    """What a joint's recordings say of a cause or a fault, sorted by time, each array of shape (n,).
+    """A cause or fault in a joint's recordings, sorted by time, each array of shape (n,).
 
     row: places in the table of recordings. named: which name it. limit: size below which it would not have
     been named, NaN where unknown. parameter, unit, size: of the cause's main parameter; empty for a fault.
@@ -47,7 +47,7 @@ class Naming:
 
 
 def namings(recordings: Table) -> Iterator[Naming]:
-    """Yield what each joint's recordings say of every cause and fault that they name at least once."""
+    """Yield for each joint every cause and fault that its recordings name at least once."""
     joint = np.asarray(recordings["joint"], str)
     time_s = np.asarray(recordings["time_s"], float)
     done = np.asarray(recordings["outcome"], str) == "done"
@@ -121,7 +121,8 @@ def _limit(size: FloatArray, gain: FloatArray) -> float:
     """Return the detection limit: the size that would have had the least gain that is named.
 
     A cause of size s leaves a residual of sqrt(noise² + (k s)²) where it is not modelled; k from its gain, in
-    the recordings that show it best: beside other causes a gain says less. No larger than what was named.
+    the recordings that show it best, since a gain beside other causes means less. At most the least named
+    size.
     """
     usable = np.isfinite(size) & (gain > _LEAST_GAIN) & (gain < 1.0)
     if not np.any(usable):

@@ -55,7 +55,7 @@ class Course:
         return int(self.base.x.shape[1])
 
     def at_mean_temperature(self) -> FloatArray:
-        """Return the days' means without what the temperature does, in units of the scale, shape (n,)."""
+        """Return the days' means without the effect of temperature, in units of the scale, shape (n,)."""
         r = self.regression()
         values: FloatArray = self.base.y - r.x[:, 1 : self.at] @ r.coefficients[1 : self.at]
         return values

@@ -31,7 +31,7 @@ class DayEffect:
 def day_effect(days: Days, settings: TrendSettings, taken: FloatArray | float = 0.0) -> DayEffect:
     """Return the day effect from the scatter within blocks of days, so that a change counts little.
 
-    taken: what is known of the course over time, subtracted first, in units of the scale, shape (n,).
+    taken: known course over time, subtracted first, in units of the scale, shape (n,).
     Restricted likelihood (Patterson and Thompson 1971) with a level for each block and a temperature slope.
     """
     n = len(days.t)

@@ -1,4 +1,4 @@
-"""The course of every parameter of every joint, and what of it is more than noise."""
+"""The course of every parameter of every joint, with its significant changes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Key = tuple[str, str]
 
 
 def fleet_trends(history: Table, recordings: Table, settings: TrendSettings = DEFAULT) -> FleetTrends:
-    """Return what is known of a fleet's course.
+    """Return the trends of a fleet.
 
     history: a row for each joint, recording and parameter, columns series.HISTORY; recordings: a row for each
     joint and recording, columns series.RECORDINGS. Raises ParameterError for a table without its columns.

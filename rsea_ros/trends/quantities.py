@@ -36,7 +36,7 @@ class Dated:
 
 
 def dated(course: Course, doubt: float) -> Dated:
-    """Return a course with what its dates may be. doubt: fall of twice the log likelihood."""
+    """Return a course with the ranges of its dates. doubt: fall of twice the log likelihood."""
     ranges = tuple(date_range(course, i, doubt) for i in range(len(course.terms)))
     moved = tuple(
         (_moved(course, i, first), _moved(course, i, last)) for i, (first, last) in enumerate(ranges)
@@ -94,7 +94,7 @@ def step_size(i: int) -> Quantity:
 
 
 def ramp_size(last: int) -> Quantity:
-    """Return the quantity that is what a ramp adds until the next one, or the end; -1: the first slope."""
+    """Return the change that a ramp adds until the next one or the end; -1: the first slope."""
 
     def size(course: Course) -> Interval:
         begin = course.t[course.terms[last].index] if last >= 0 else 0.0

@@ -1,4 +1,4 @@
-"""Weighted least squares with priors, and what one more term at any day would gain."""
+"""Weighted least squares with priors, and the gain of one more term at any day."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def term(kind: Kind, t: FloatArray, at: float) -> FloatArray:
 
 
 def scan(base: Regression, t: FloatArray, kind: Kind) -> FloatArray:
-    """Return the z score of a term that begins at each day, beside what `base` has, shape (n,); t rises.
+    """Return the z score of a term that begins at each day, beside those of `base`, shape (n,); t rises.
 
-    Its square is what twice the log likelihood gains. O(n): sums from each day to the last.
+    Its square is the gain in twice the log likelihood. O(n): sums from each day to the last.
     """
 
     def after(values: FloatArray) -> FloatArray:

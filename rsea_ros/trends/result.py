@@ -1,4 +1,4 @@
-"""What is known of a joint's parameter over time, as values; pages and alarms are made from these."""
+"""The trend of a joint's parameter over time as values, for pages and alarms."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Curve:
-    """What the parameter did, without temperature and day effects: POSIX s and the unit, each shape (n,)."""
+    """The course of the parameter without temperature and day effects: POSIX s, its unit; each shape (n,)."""
 
     time_s: FloatArray
     value: FloatArray
@@ -63,7 +63,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Trend:
-    """A series and what is known of its course. All values in the parameter's unit.
+    """A series and its course. All values in the parameter's unit.
 
     first, now: level at the first and the last day, at the mean temperature. per_year: slope of the last
     piece. per_kelvin: of the temperature, relative to the level, per K; None where it is not logged. day_sd:

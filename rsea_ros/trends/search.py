@@ -40,7 +40,7 @@ def tested(days: Days, effect: DayEffect, prior: tuple[float, float], settings: 
 def described(test: Tested, settings: TrendSettings) -> Course:
     """Return the course of a series that is more than noise: the cheapest of several descriptions.
 
-    Each piece costs what noise alone gains in one of 1/false_discovery series.
+    Each piece costs the gain that noise alone reaches in one of 1/false_discovery series.
     """
     days = test.course.days
     rate = settings.false_discovery

@@ -13,17 +13,18 @@ YEAR = 365.25
 
 @dataclass(frozen=True)
 class TrendSettings:
-    """What counts as determined, as a change and as an alarm.
+    """Limits for a determined series, a change and an alarm.
 
     false_discovery: share of the findings of one look that may be false, over all joints and parameters
         (Benjamini and Hochberg 1995). 0.01: the weekly looks of a year then bring less than one in two.
-    fewest_days: days with an estimate below which a series says nothing. 8: a scatter of days is known to a
+    fewest_days: days with an estimate below which a series is undetermined. 8: a scatter of days is known to
+    a
         quarter then.
     fewest_beside: days on either side of a change. 3: a day and a repeated day are no change.
     block_days: days with data whose scatter about their mean is noise. 12: a fortnight and more, slower than
         the effect of a day, faster than wear.
     date_doubt: fall of twice the log likelihood within which a date may lie, 95 % (chi-squared, 1).
-    widest: least step that could be seen, as a share of the level, above which a series says nothing.
+    widest: least detectable step, as a share of the level, above which a series is undetermined.
     outlier_days: scaled distance of a recording from its neighbours' median above which it is left out. 6:
         one in 10^9 of normal ones.
     outlier_joint: robust score above which a joint is unlike its fleet. 4.5: one in 10^5.

@@ -34,7 +34,7 @@ _POINTS = 24
 
 
 def trend_of(series: Series, test: Tested, course: Course, q: float, settings: TrendSettings) -> Trend:
-    """Return what a course says. course: the one without a change for a series that is noise."""
+    """Return the trend of a course. course: the one without a change for a series that is noise."""
     scale, whole = course.days.scale, dated(course, settings.date_doubt)
     detectable = scale * _detectable(course, test.effect.freedom, settings)
     first, now = (whole.interval(level_at(float(t))).times(scale) for t in (course.t[0], course.t[-1]))
@@ -81,7 +81,7 @@ def _detectable(course: Course, freedom: int, settings: TrendSettings) -> float:
 
 
 def _changes(series: Series, whole: Dated) -> Iterator[Change]:
-    """Yield the steps, and the ramps from where they begin; the end of a ramp is no change of its own."""
+    """Yield the steps, and the ramps from their beginning; the end of a ramp is not a separate change."""
     course, scale = whole.course, whole.course.days.scale
     if course.slope and is_sure(whole.interval(slope_after(-1))):
         t = float(course.days.t[0]) * DAY
@@ -119,7 +119,7 @@ def _by_day(course: Course) -> Curve:
 
 
 def _with_limit(trend: Trend, whole: Dated, settings: TrendSettings) -> Trend:
-    """Return the trend with its limit on the side where it goes, and when it gets there."""
+    """Return the trend with its limit in the direction of its slope, and the date of reaching it."""
     assert trend.first is not None and trend.per_year is not None
     side = abs(trend.first.value) * settings.limit
     usual = (trend.first.value - side, trend.first.value + side)

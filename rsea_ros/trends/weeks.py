@@ -29,7 +29,7 @@ class Steps:
 
     @property
     def name(self) -> str:
-        """Return what a step is called."""
+        """Return the name of a step."""
         weeks = round(self.days / _WEEK)
         return "day" if self.days < _WEEK else "week" if weeks == 1 else f"{weeks} weeks"
 

@@ -1,4 +1,4 @@
-"""Who may see the page: whoever has the token of this start, from the page itself; nobody from elsewhere."""
+"""Access to the page: clients with the token of this start, from the page itself."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Access:
     token: str = field(default_factory=lambda: secrets.token_urlsafe(_BYTES))
 
     def is_token(self, given: str | None) -> bool:
-        """Return whether something given is the token, in a time that says nothing of it."""
+        """Return whether a text is the token, in constant time."""
         return hmac.compare_digest((given or "").encode(), self.token.encode())
 
 
 def same_origin(origin: str | None, host: str) -> bool:
-    """Return whether a request comes from a page of this server. host: what the request was sent to."""
+    """Return whether a request comes from a page of this server. host: addressee of the request."""
     if not origin:
         return False
     parts = urlsplit(origin)

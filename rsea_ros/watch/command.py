@@ -1,4 +1,4 @@
-"""Torque that a page commands: soft start, a limit, and zero as soon as nobody holds it.
+"""Torque commanded by a page: soft start, a limit, and zero when no page holds it.
 
 torque(t) = envelope(t) · shape(t), |shape| ≤ 1. The envelope grows and shrinks by at most `growth` and
 falls to zero within RELEASE when the hold ends. Another shape begins when that of the one before is zero.
@@ -26,7 +26,7 @@ HIGHEST = 60.0
 
 @dataclass(frozen=True)
 class Bounds:
-    """What may be commanded: torque N m, slew N m/s; growth of the envelope N m/s."""
+    """Bounds of a command: torque N m, slew N m/s; growth of the envelope N m/s."""
 
     torque: float
     slew: float = math.inf
@@ -35,7 +35,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Wish:
-    """What a page asks for. amplitude: N m, also negative. frequency: Hz, of a chirp the highest."""
+    """A page's request. amplitude: N m, also negative. frequency: Hz, of a chirp the highest."""
 
     kind: str = "constant"
     amplitude: float = 0.0
@@ -43,7 +43,7 @@ class Wish:
 
     @property
     def shape(self) -> tuple[str, float]:
-        """What the envelope is multiplied by; the sign of a constant belongs to its envelope."""
+        """The factor of the envelope; the sign of a constant belongs to its envelope."""
         return (self.kind, self.frequency if self.kind != "constant" else 0.0)
 
 
@@ -87,9 +87,10 @@ class Commander:
         return self._active
 
     def hold(self, who: object, wish: Wish, now: float) -> bool:
-        """Hold the command, or go on to; return whether it is theirs. A page repeats this as its heartbeat.
+        """Hold the command or continue to; return whether the page has it.
 
-        Raises ParameterError for what may not be commanded.
+        A page repeats this as its heartbeat.
+        Raises ParameterError for a forbidden command.
         """
         if self.bounds is None:
             raise ParameterError("the limits of the bench are not known yet")
@@ -104,7 +105,7 @@ class Commander:
             return True
 
     def release(self, who: object) -> None:
-        """Let go, if it is theirs."""
+        """Release the command if the page has it."""
         with self._lock:
             if self.holder == who:
                 self._let_go()
@@ -131,7 +132,7 @@ class Commander:
         self.holder, self._fall = None, abs(self._envelope) / RELEASE
 
     def _move(self, step: float, now: float) -> None:
-        """Move the envelope towards what is wished, or to zero."""
+        """Move the envelope towards the request, or to zero."""
         if self.holder is None or self.bounds is None:
             aim, most = 0.0, self._fall * step
         else:

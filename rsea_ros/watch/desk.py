@@ -1,4 +1,4 @@
-"""What pages ask for and get: commands, recordings, evaluations; frames and the state of everything."""
+"""The requests of pages (commands, recordings, evaluations), and the frames and state sent to them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Page(Protocol):
 
 
 class Desk:
-    """The pages that are open, and what they may do. commander: None where pages may only look."""
+    """The open pages and their rights. commander: None where pages may only look."""
 
     def __init__(self, commander: Commander | None, runs: Runs) -> None:
         self._commander, self._runs = commander, runs
@@ -48,14 +48,14 @@ class Desk:
         return len(self._pages)
 
     def enter(self, page: Page) -> bool:
-        """Take in a page; return whether there is room for it."""
+        """Register a page; return whether there is room for it."""
         if len(self._pages) >= MOST_PAGES:
             return False
         self._pages.add(page)
         return True
 
     def leave(self, page: Page) -> None:
-        """Forget a page: what it held is let go."""
+        """Forget a page and release its command."""
         self._release(page)
         self._pages.discard(page)
 
@@ -75,7 +75,7 @@ class Desk:
             page.send(json.dumps({"error": " ".join(str(error).split())}))
 
     def state(self, more: Mapping[str, Any]) -> str:
-        """Return the state of everything as JSON; more: what the source knows."""
+        """Return the state as JSON; more: the state of the source."""
         held = self._commander is not None and self._commander.holder is not None
         bounds = self._commander.bounds if self._commander is not None else None
         command = None if self._commander is None else {

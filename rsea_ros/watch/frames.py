@@ -1,4 +1,4 @@
-"""What goes over the wire: a frame for each batch of samples."""
+"""Frames sent to the pages: one for each batch of samples."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHANNELS = ("command", "motor", "ft", "proximal", "distal", "disturbance", "defl
 
 
 class Source(Protocol):
-    """Where the page's numbers come from; asked by one thread, never waited for.
+    """The source of the page's numbers; called by one thread, and never blocks.
 
     flag: whether the actuator is a pure torque source, None: unknown.
     """
@@ -24,7 +24,7 @@ class Source(Protocol):
         """Return the samples of CHANNELS that have come since the last call: s since the start, value."""
 
     def state(self) -> Mapping[str, Any]:
-        """Return what changes seldom: flag, health, rates, limits."""
+        """Return the slow state: flag, health, rates, limits."""
 
 
 def frame(batch: Mapping[str, Samples], flag: bool | None) -> str | None:

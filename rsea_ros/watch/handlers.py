@@ -1,4 +1,4 @@
-"""The addresses of the server: the page, its parts, its socket, and the reports. Each asks for the token."""
+"""The addresses of the server: the page, its parts, its socket, and the reports. Each requires the token."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KINDS = {"watch.css": "text/css", "watch.js": "text/javascript", "plot.js": "tex
 
 
 def routes(access: Access, desk: Desk, runs: Runs) -> Sequence[Any]:
-    """Return what an Application serves."""
+    """Return the routes of the Application."""
     return [
         (r"/", Front, {"access": access}),
         (r"/(watch\.css|watch\.js|plot\.js)", Part, {"access": access}),
@@ -32,7 +32,7 @@ class Guarded(RequestHandler):
     """Answers only who has the token, by cookie."""
 
     def initialize(self, access: Access, **more: Any) -> None:
-        """Keep what routes() gives."""
+        """Keep the arguments from routes()."""
         self.access = access
         for name, value in more.items():
             setattr(self, name, value)
@@ -99,7 +99,7 @@ class Report(Guarded):
 
 
 class Socket(Guarded, WebSocketHandler):
-    """The socket of a page: frames and state out, wishes in. When it closes, what the page held is let go."""
+    """The socket of a page: frames and state out, requests in. Closing it releases the page's command."""
 
     desk: Desk
     waiting = 0
@@ -115,7 +115,7 @@ class Socket(Guarded, WebSocketHandler):
             self.close(1013, "too many pages are open")
 
     def on_message(self, message: str | bytes) -> None:
-        """Do what the page asks for."""
+        """Execute the page's request."""
         self.desk.act(self, message)
 
     def on_close(self) -> None:

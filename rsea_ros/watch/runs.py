@@ -1,4 +1,4 @@
-"""Recordings that the page starts and stops, and what is made of them: each in a process of its own."""
+"""Recordings that the page starts and stops, and their evaluations, each in a child process."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Job:
     words: str = ""
 
     def look(self) -> None:
-        """See whether it has ended, and what it said."""
+        """Check whether it has ended, and read its output."""
         if self.state != "running":
             return
         status = self.process.poll()
@@ -98,12 +98,12 @@ class Runs:
         each.jobs[verb] = Job(verb, folder, *_python(words))
 
     def report(self, name: str, verb: str) -> Path | None:
-        """Return the page that was made of a recording, None where there is none."""
+        """Return the report of a recording, or None."""
         job = self._recordings[name].jobs.get(verb) if name in self._recordings else None
         return job.folder / REPORT if job is not None and job.state == "done" else None
 
     def look(self) -> Sequence[Mapping[str, Any]]:
-        """See what has ended, and return all recordings for the page, the newest first."""
+        """Update the states, and return all recordings for the page, the newest first."""
         for each in self._recordings.values():
             _see_to(each)
             for job in each.jobs.values():
@@ -111,7 +111,7 @@ class Runs:
         return [_shown(name, each) for name, each in reversed(self._recordings.items())]
 
     def close(self) -> None:
-        """Complete the recording that runs, and end what evaluates."""
+        """Complete the present recording, and end evaluations."""
         self.stop()
         jobs = [job.process for r in self._recordings.values() for job in r.jobs.values()]
         stop([*jobs, *(r.process for r in self._recordings.values() if r.process is not None)])

@@ -33,7 +33,7 @@ _SETTINGS: Mapping[str, Any] = {
 
 
 class Server:
-    """Serves the page from `start` to `stop`. access: the token. addresses: what to open.
+    """Serves the page from `start` to `stop`. access: the token. addresses: to open in a browser.
 
     Raises RseaError when nothing can listen there.
     """
@@ -67,7 +67,7 @@ class Server:
         self._runs.close()
 
     def running(self) -> bool:
-        """Return whether it serves. Raises what went wrong."""
+        """Return whether it serves. Raises the error that ended it."""
         if self.error is not None:
             raise self.error
         return self.thread.is_alive()
@@ -95,7 +95,7 @@ class Server:
         await http.close_all_connections()
 
     def _tick(self) -> None:
-        """Send what has come to who looks at it."""
+        """Send new samples to the open pages."""
         if not self.desk.count:
             return
         state, now = None, time.monotonic()

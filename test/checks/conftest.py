@@ -1,4 +1,4 @@
-"""Makes `independent`, the second bench, importable."""
+"""Make `independent`, the second bench, importable."""
 
 import sys
 from pathlib import Path

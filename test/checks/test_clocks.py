@@ -18,7 +18,7 @@ RIG = load_rig("paper_high_impedance")
 
 
 def late(record, offset, drift, *names):
-    """Stamp some channels so much later (s), and more and more (s/s)."""
+    """Delay the stamps of some channels by an offset (s) and a drift (s/s)."""
     return record.with_channels(
         **{n: Channel(record[n].t + offset + drift * record[n].t, record[n].y) for n in names}
     )
@@ -48,7 +48,7 @@ def test_a_large_offset_of_one_sensor_is_a_fault():
     assert "clock_offset" in {f.kind for f in findings.faults}
 
 
-def test_what_all_sensors_share_is_a_delay_as_well():
+def test_an_offset_that_all_sensors_share_may_be_a_delay_as_well():
     record = record_run(drawn_bench(np.random.default_rng(1)), 1, duration=15.0)
     findings = check_record(late(record, 2e-3, 0.0, "ft", "position", "velocity"), RIG)
     assert clock(findings, "clock_offset", "ft").value == pytest.approx(2000.0, abs=60.0)
@@ -58,7 +58,7 @@ def test_what_all_sensors_share_is_a_delay_as_well():
 
 @pytest.mark.parametrize(("sd", "shown"), [(20e-6, True), (2e-3, True), (94e-3, False)])
 def test_a_clock_that_the_data_leave_wide_open_gets_no_number(sd, shown):
-    """Short runs of a hobby servo in its loop: an offset of -22535.4 ± 93966 µs was reported, in green."""
+    """For short runs of a hobby servo in its loop an offset of -22535.4 ± 93966 µs was reported in green."""
     duration = 100.0
     linear = SimpleNamespace(
         settled=True,

@@ -11,6 +11,8 @@ from independent.excitations import chirp_noise
 from independent.hidden import hide
 
 from rsea_ros.checks.check import check_record
+from rsea_ros.checks.dead import dead_channels
+from rsea_ros.checks.expected import Side
 from rsea_ros.checks.usable import check_diagnosable
 from rsea_ros.errors import IdentificationError
 from rsea_ros.model.rig_file import load_rig
@@ -56,8 +58,21 @@ def test_a_dead_sensor_is_named(name):
 @pytest.mark.parametrize(
     ("channel", "noise"), [("position", 1e-5), ("velocity", 2e-4), ("motor_torque", 0.05)]
 )
-def test_so_is_every_other_dead_channel(channel, noise):
+def test_every_other_dead_channel_is_named_too(channel, noise):
     assert ("dead_channel", channel) in kinds(having(channel, noise * RNG.normal(size=N)))
+
+
+def test_a_speed_that_is_the_rate_of_the_measured_position_is_alive():
+    """A joint that stuck where its rig moved: the speed had nothing of the simulation's, and was left out."""
+    t = np.arange(N) / 280.0
+    position = Channel(t, 0.5 * np.sin(2.0 * t) + 1e-4 * RNG.normal(size=N))
+    velocity = Channel(t, np.cos(2.0 * t) + 0.02 * RNG.normal(size=N))
+    record = good().with_channels(position=position, velocity=velocity)
+    elsewhere = {"velocity": Side(t, velocity.y, np.sin(2.0 * np.pi * 20.0 * t) + RNG.normal(size=N))}
+    assert dead_channels(record, elsewhere, RIG) == []
+    noise = record.with_channels(velocity=Channel(t, 0.02 * RNG.normal(size=N)))
+    apart = {"velocity": Side(t, noise["velocity"].y, elsewhere["velocity"].p)}
+    assert [f.channel for f in dead_channels(noise, apart, RIG)] == ["velocity"]
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5])

@@ -1,4 +1,4 @@
-"""Sign and scale: what was put in is reported with its remedy; benches with an effect raise no alarm."""
+"""Sign and scale: an error is reported with its remedy; benches with an effect raise no alarm."""
 
 from __future__ import annotations
 
@@ -65,13 +65,13 @@ def test_the_remedy_of_a_turned_sensor_is_the_option():
     assert found.remedy == "--axis torque.z"
 
 
-def test_drive_values_of_the_motors_side_go_together():
+def test_drive_values_on_the_motor_side_are_reported_together():
     findings = check_record(scaled(good(), command=1 / 502, motor_torque=1 / 502), RIG)
     assert told(findings, "scale") == {("scale", "command"), ("scale", "motor_torque")}
 
 
 @pytest.mark.parametrize("effect", [None, *CATALOGUE])
-def test_an_effect_is_no_matter_of_units_or_of_another_rig(effect):
+def test_an_effect_is_not_taken_for_a_wrong_unit_or_rig(effect):
     rng = np.random.default_rng(1)
     bench = drawn_bench(rng)
     bench = hide(bench, effect, drawn_parameters(effect, "strong", rng)) if effect else bench
@@ -80,13 +80,13 @@ def test_an_effect_is_no_matter_of_units_or_of_another_rig(effect):
     assert not {f.kind for f in findings.faults} & {"sign", "scale", "wrong_rig", "dead_channel"}
 
 
-def test_a_drive_that_saturates_early_is_not_one_of_other_units():
+def test_an_early_saturation_is_not_taken_for_a_wrong_unit():
     bench = hide(drawn_bench(np.random.default_rng(1)), "torque_saturation", {"limit": 15.0})
     findings = check_record(record_run(bench, 3, "white_noise", 10.0), RIG)
     assert told(findings, "scale", "sign") == set()
 
 
-def test_a_wrong_inertia_is_no_scale():
+def test_a_wrong_inertia_is_not_taken_for_a_scale():
     rig = RIG.with_values({"rotor.reflected_inertia": 2.0 * RIG["rotor.reflected_inertia"]})
     findings = check_record(good(), rig)
     assert findings.light != "red"
@@ -103,7 +103,7 @@ def test_another_rig_is_asked_about(name):
 
 @pytest.mark.parametrize("samples", [5, 9])
 def test_a_moving_average_is_named_with_its_length(samples):
-    """It was `177 times the noise`."""
+    """It was reported as `177 times the noise`."""
     y = np.convolve(good()["ft"].y, np.ones(samples) / samples)[: len(good()["ft"])]
     findings = check_record(good().with_channels(ft=Channel(good()["ft"].t, y)), RIG)
     (found,) = findings.of("smoothing")
@@ -116,7 +116,7 @@ def test_a_moving_average_is_named_with_its_length(samples):
     ("effect", "parameters"),
     [("ft_sensor_lag", {"time_constant": 5e-3}), ("command_delay", {"delay": 8e-3}), (None, {})],
 )
-def test_a_lag_of_the_sensor_or_of_the_drive_is_no_average(effect, parameters):
+def test_a_lag_of_sensor_or_drive_is_not_taken_for_a_moving_average(effect, parameters):
     bench = drawn_bench(np.random.default_rng(1))
     bench = hide(bench, effect, parameters) if effect else bench
     assert check_record(record_run(bench, 3, duration=8.0), RIG).of("smoothing") == ()

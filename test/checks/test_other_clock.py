@@ -33,27 +33,27 @@ def off(findings):
 
 
 @pytest.mark.parametrize("seconds", [-0.5, 1.7])
-def test_commands_on_another_clock_are_no_other_rig(seconds):
-    """They were called a wrong rig without a word on clocks."""
+def test_commands_on_another_clock_are_not_taken_for_another_rig(seconds):
+    """They were called a wrong rig; clocks were not mentioned."""
     findings = check_record(moved(seconds, "command"), RIG)
     assert off(findings) == {"command": pytest.approx(seconds, abs=0.005)}
     assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
     assert "clock_offset" in {f.kind for f in findings.faults}
 
 
-def test_one_sensor_on_another_clock_is_neither_dead_nor_of_another_rig():
+def test_a_sensor_on_another_clock_is_not_taken_for_dead_or_for_another_rig():
     findings = check_record(moved(-1.8, "ft"), RIG)
     assert off(findings) == {"ft": pytest.approx(-1.8, abs=0.01)}
     assert {f.kind for f in findings.findings if f.light == "red"} == {"clock_offset"}
 
 
-def test_a_sine_has_many_lags_and_shows_none():
+def test_a_lag_is_not_read_from_a_sine_that_fits_many():
     t = good()["command"].t
     sine = Channel(t, 20.0 * np.sin(2.0 * np.pi * 3.0 * t))
     assert off(check_record(good().with_channels(command=sine), RIG)) == {}
 
 
-def test_the_option_of_the_remedy_mends_it(tmp_path, capsys):
+def test_the_suggested_option_corrects_the_clock(tmp_path, capsys):
     bag = str(tmp_path / "bag.mcap")
     write_record(moved(-0.5, "command"), bag)
     assert main(["check", bag, "--json", "--fail-on", "red"]) == 1

@@ -1,6 +1,8 @@
-"""A rig without a spring on a machine that has one, or another inertia, is asked about in red."""
+"""A rig without the machine's spring, or with another inertia, is questioned in red."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,8 +27,8 @@ def asked(findings):
 
 
 @pytest.mark.parametrize("rig", ["bare_drive", "pendulum"])
-def test_a_spring_bench_is_no_machine_without_a_spring(rig):
-    """The check was green."""
+def test_a_rig_without_a_spring_is_questioned_on_a_bench_with_one(rig):
+    """This check was green."""
     record = record_run(drawn_bench(np.random.default_rng(2)), 4, duration=10.0)
     findings = check_record(record, load_rig(rig))
     assert asked(findings) == {"spring_end.stiffness": "red"}
@@ -35,13 +37,13 @@ def test_a_spring_bench_is_no_machine_without_a_spring(rig):
     assert found.remedy == RIGHT_RIG
 
 
-def test_nor_is_a_light_pendulum_a_heavy_drive():
+def test_a_rig_of_a_heavy_drive_is_questioned_on_a_light_pendulum():
     findings = check_record(run_of("pendulum", 1.0), load_rig("bare_drive"))
     assert asked(findings)["spring_end.inertia"] == "red"
 
 
-def test_nor_a_pendulum_that_swings_far():
-    """Its torque follows sin(q), which no response shows; that of a real one was amber."""
+def test_a_rig_without_gravity_is_questioned_on_a_pendulum_that_swings_far():
+    """Its torque follows sin(q), which no frequency response shows; a real pendulum was rated amber."""
     t = np.arange(0.0, 20.0, 1.0 / RATE)
     q = 2.0 * np.sin(1.7 * t) * np.sin(0.31 * t)
     v = np.gradient(q, t)
@@ -52,5 +54,26 @@ def test_nor_a_pendulum_that_swings_far():
 
 
 @pytest.mark.parametrize(("name", "amplitude"), [("bare_drive", 15.0), ("pendulum", 1.0)])
-def test_the_right_rig_is_not_asked_about(name, amplitude):
+def test_the_right_rig_is_not_questioned(name, amplitude):
     assert asked(check_record(run_of(name, amplitude), load_rig(name))) == {}
+
+
+def test_a_value_that_identify_leaves_to_the_prior_is_undetermined():
+    """Without encoder three values have no unique size: the check called them determined."""
+    run = run_of("paper_high_impedance", 15.0)
+    run = replace(run, channels={n: run[n] for n in ("command", "ft")})
+    fit = rsea.identify(run, "paper_high_impedance")
+    left = {p.name for p in fit.result.parameters if p.determined == "no" and not p.name.startswith("clock")}
+    found = rsea.check(run, "paper_high_impedance").result.of("identifiability")
+    assert {f.channel for f in found if f.light == "amber"} == left
+    assert {"rotor.reflected_inertia", "rotor.reflected_damping", "spring.damping"} <= left
+
+
+def test_a_value_far_from_the_rigs_is_amber_with_both_numbers():
+    """A spring 30 % off was green."""
+    bench = load_rig("paper_high_impedance").with_values({"spring.stiffness": 1.3 * 1530.456})
+    run = rsea.simulate(bench, 15.0 * np.random.default_rng(4).standard_normal(2800), RATE, seed=4)
+    (found,) = rsea.check(run, "paper_high_impedance").result.of("rig_value")
+    assert (found.light, found.channel, found.expected) == ("amber", "spring.stiffness", "1530, to 15 %")
+    assert found.low < 1.3 * 1530.456 < found.high
+    assert rsea.check(run, bench).result.of("rig_value") == ()

@@ -1,4 +1,4 @@
-"""Records that are hardly ones: few samples, none, a command of next to nothing."""
+"""Unusual records: few samples, none, a tiny command."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_commands_of_next_to_nothing_and_of_too_much_have_a_light(name):
+def test_tiny_and_excessive_commands_are_rated(name):
     command, light = COMMANDS[name]
     assert [f.light for f in checked(command).findings if f.kind == "excitation"] == [light]
 
@@ -57,3 +57,14 @@ def test_a_sensor_of_too_few_samples_is_left_out_of_the_clocks():
     rig = load_rig("cycloidal")
     shape = SimpleNamespace(values={}, delay={})
     assert set(linear_of(record, {}, rig, shape).offset) == {"ft"}
+
+
+def test_another_axis_is_tried_on_stamps_put_right():
+    """Stamps that come twice have a median interval of zero, and the grid between them had no end."""
+    command = Channel(T, np.random.default_rng(3).normal(size=len(T)))
+    twice = np.repeat(T[::2], 2)
+    dead, alive = Channel(twice, np.zeros(len(T))), Channel(twice, np.roll(command.y, 2))
+    position = Channel(T, np.cumsum(command.y))
+    record = Record({"command": command, "position": position, "ft": dead})
+    said = check_record(record, RIG, wrench=lambda: {"torque.x": alive})
+    assert {f.kind for f in said.findings if f.channel == "ft"} >= {"dead_channel", "duplicate_stamps"}

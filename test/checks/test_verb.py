@@ -1,4 +1,4 @@
-"""The verb: a table, JSON, statuses, windows; and the same checks before identify and diagnose."""
+"""`rsea check`: a table, JSON, statuses, windows; and the same checks before identify and diagnose."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_good_bag_is_green_and_says_its_rig(bag, capsys):
     printed, errors = capsys.readouterr()
     assert errors == ""
     assert "red" not in printed.split("checked against")[0]
-    assert "checked against rig paper_high_impedance: 0 red, 0 amber" in printed
+    assert "checked against default rig paper_high_impedance: 0 red, 0 amber" in printed
 
 
 def test_several_bags_as_json_and_a_status(bag, good, capsys):
@@ -53,11 +53,11 @@ def test_several_bags_as_json_and_a_status(bag, good, capsys):
     assert sign["remedy"] == "--axis -torque.z"
 
 
-def test_the_axis_that_the_remedy_names_mends_it(bag, good, capsys):
+def test_the_suggested_axis_corrects_the_bag(bag, good, capsys):
     assert main(["check", bag(ft=turned(good)), "--axis=-torque.z", "--fail-on", "red"]) == 0
 
 
-def test_a_dead_axis_names_the_one_that_follows(bag, capsys):
+def test_for_a_dead_axis_the_one_that_follows_the_command_is_suggested(bag, capsys):
     assert main(["check", bag(), "--axis", "torque.x", "--fail-on", "red"]) == 1
     assert "--axis torque.z" in capsys.readouterr().out
 
@@ -97,7 +97,7 @@ def test_identify_says_first_what_is_wrong_and_leaves_a_dead_channel_out(bag, go
     assert (said["verdict"], said["next"]) == ("misfit", None)
 
 
-def test_identify_asks_whether_it_is_the_right_rig(bag, tmp_path, capsys):
+def test_identify_questions_the_rig(bag, tmp_path, capsys):
     assert main(["identify", bag(), "--rig", "prototype_knee", "--out", str(tmp_path / "out")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "compared with rig prototype_knee:"

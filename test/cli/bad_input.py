@@ -1,4 +1,4 @@
-"""What tests of bad input share: a verb run as a person runs it, what a refusal must be, damaged records."""
+"""Shared by the tests of bad input: run a verb as a person does, check a refusal, damage a record."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def rsea(*arguments: str | Path, before: Callable[[], None] | None = None):
-    """Run a verb: here, or in a process of its own where something is to be done to that first."""
+    """Run a verb in this process, or in a child where `before` must change the process first."""
     command = [str(argument) for argument in arguments]
     if before is not None:
         return subprocess.run(
@@ -29,7 +29,7 @@ def rsea(*arguments: str | Path, before: Callable[[], None] | None = None):
 
 
 def refused(done: subprocess.CompletedProcess[str], *words: str | Path) -> None:
-    """Hold the outcome to the contract: status 2 and one line with all that a person needs."""
+    """Check that the outcome is status 2 and one line with everything that a person needs."""
     assert (done.returncode, done.stdout) == (2, ""), done.stderr
     assert done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith("rsea ")

@@ -1,4 +1,4 @@
-"""What tests of the command line share: `foreign`, bags written without this project, and a short record."""
+"""Shared by the tests of the command line: `foreign` (bags written without our code) and a short record."""
 
 import sys
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ def record() -> Record:
 
 @pytest.fixture
 def out(tmp_path: Path) -> Iterator[Path]:
-    """Give a directory for results in which nothing may be left."""
+    """Yield a directory for results that must be empty after the test."""
     yield tmp_path / "results"
     left = list((tmp_path / "results").glob("*"))
     assert not left, left

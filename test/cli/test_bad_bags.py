@@ -1,4 +1,4 @@
-"""Bags that cannot be used, as a person meets them: one line of what and where, status 2, nothing left."""
+"""Bags that cannot be used: one line that says what is wrong and where, status 2, no files left behind."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from msg_adapters.writing import BagWriter
 from rsea_ros.cli.main import main
 
 
-def test_a_missing_topic(record, tmp_path, out):
+def test_a_missing_topic_is_refused_by_name(record, tmp_path, out):
     write_record(without(record, "command"), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
     refused(done, tmp_path / "bag", "no message on /rsea/torque_command", "the bag holds /rsea/ft")
 
 
-def test_a_wrong_type(record, tmp_path, out):
+def test_a_topic_of_the_wrong_type_is_refused(record, tmp_path, out):
     write_record(without(record, "ft"), tmp_path / "bag")
     stated = ["--topic", "ft=/rsea/joint_states", "--topic", "joint_states=/rsea/nothing"]
     done = rsea("identify", tmp_path / "bag", "--out", out, *stated)
@@ -29,18 +29,18 @@ def test_a_wrong_type(record, tmp_path, out):
     )
 
 
-def test_an_empty_bag(tmp_path, out):
+def test_an_empty_bag_is_refused(tmp_path, out):
     with BagWriter(tmp_path / "bag", "mcap"):
         pass
     refused(rsea("identify", tmp_path / "bag", "--out", out), tmp_path / "bag", "holds no topic at all")
 
 
-def test_an_empty_file(tmp_path, out):
+def test_an_empty_file_is_refused(tmp_path, out):
     (tmp_path / "bag.mcap").touch()
     refused(rsea("identify", tmp_path / "bag.mcap", "--out", out), tmp_path / "bag.mcap", "empty file")
 
 
-def test_a_truncated_mcap_opens_up_to_its_last_chunk(record, tmp_path):
+def test_a_truncated_mcap_is_read_up_to_its_last_chunk(record, tmp_path):
     write_record(record, tmp_path / "whole.mcap")
     data = (tmp_path / "whole.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: int(0.7 * len(data))])
@@ -49,14 +49,14 @@ def test_a_truncated_mcap_opens_up_to_its_last_chunk(record, tmp_path):
     assert "cut off" in done.stdout
 
 
-def test_a_truncated_mcap_with_nothing_in_it(record, tmp_path, out):
+def test_a_truncated_mcap_without_a_chunk_is_refused(record, tmp_path, out):
     write_record(record, tmp_path / "whole.mcap")
     (tmp_path / "cut.mcap").write_bytes((tmp_path / "whole.mcap").read_bytes()[:60])
     refused(rsea("identify", tmp_path / "cut.mcap", "--out", out), tmp_path / "cut.mcap", "cut off")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_no_number(record, tmp_path, out, value):
+def test_a_value_that_is_not_finite_is_refused(record, tmp_path, out, value):
     write_record(changed(record, "ft", 7, y=value), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--out", out)
     refused(done, tmp_path / "bag", f"/rsea/ft wrench[7] is {value}", "expected a finite number")
@@ -66,15 +66,15 @@ def test_a_value_that_is_no_number(record, tmp_path, out, value):
     ("sample", "stamp", "kinds"),
     [(9, 3.3 / 280, ["stray_stamps", "dropped_samples"]), (11, 13.5 / 280, ["out_of_order"])],
 )
-def test_a_stamp_that_goes_back_is_told_and_the_rest_used(record, tmp_path, sample, stamp, kinds):
+def test_a_stamp_that_goes_back_is_reported_and_the_rest_is_used(record, tmp_path, sample, stamp, kinds):
     write_record(changed(record, "ft", sample, t=stamp), tmp_path / "bag")
     assert main(["identify", str(tmp_path / "bag"), "--out", str(tmp_path / "found")]) == 0
     faults = json.loads((tmp_path / "found" / "identification.json").read_text())["data"]["faults"]
     assert [(f["kind"], f["channel"], f["size"]) for f in faults] == [(kind, "ft", 1) for kind in kinds]
 
 
-def test_two_joints(tmp_path, out):
-    """A command for one joint, states of two: which is meant must be said."""
+def test_a_bag_of_two_joints_needs_the_joint_to_be_named(tmp_path, out):
+    """The command is for one joint and the states are of two."""
     two = joint_state(EPOCH, ["hip", "knee"], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0])
     rows = [
         ("/rsea/torque_command", EPOCH, joint_state(EPOCH, effort=[1.0])),
@@ -86,5 +86,5 @@ def test_two_joints(tmp_path, out):
     refused(rsea("identify", bag, "--out", out, "--joint", "ankle"), bag, "no joint 'ankle'")
 
 
-def test_a_bag_that_is_not_there(tmp_path, out):
+def test_a_bag_that_does_not_exist_is_refused(tmp_path, out):
     refused(rsea("identify", tmp_path / "nothing", "--out", out), tmp_path / "nothing", "no such bag")

@@ -1,4 +1,4 @@
-"""Disks that are full and folders without permission: one line, status 2, nothing half there."""
+"""Full disks and folders without permission: one line, status 2, no partial files."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ def small_files() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))
 
 
-def test_a_disk_that_fills_up_under_the_results(record, tmp_path):
+def test_a_disk_that_fills_up_under_the_results_leaves_none(record, tmp_path):
     write_record(record, tmp_path / "bag")
-    assert rsea("identify", tmp_path / "bag", "--out", tmp_path / "roomy").returncode == 0  # compiles it all
+    assert rsea("identify", tmp_path / "bag", "--out", tmp_path / "roomy").returncode == 0  # compiles all
     done = rsea("identify", tmp_path / "bag", "--out", tmp_path / "results", before=small_files)
     refused(done, tmp_path / "results" / "report.html", "File too large")
     assert not (tmp_path / "results").exists()
 
 
-def test_a_disk_that_fills_up_under_a_bag(tmp_path, tmp_path_factory):
+def test_a_disk_that_fills_up_under_a_bag_leaves_none(tmp_path, tmp_path_factory):
     roomy = tmp_path_factory.mktemp("roomy") / "bag"  # compiles all that runs with small files
     assert rsea("simulate", "paper_high_impedance", "--out", roomy).returncode == 0
     done = rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", before=small_files)
@@ -37,14 +37,14 @@ def test_a_disk_that_fills_up_under_a_bag(tmp_path, tmp_path_factory):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_disk_that_is_full(record, tmp_path):
+def test_a_full_disk_is_one_line(record, tmp_path):
     write_record(record, tmp_path / "bag")
     done = rsea("predict", "paper_high_impedance", tmp_path / "bag", "--out", "/dev/full/x.csv")
     refused(done, "/dev/full")
 
 
 def as_nobody(*arguments: str | Path, once: tuple[str | Path, ...] = ()) -> subprocess.CompletedProcess[str]:
-    """Run a verb without root's rights. once: with root's, before, so that all that it imports is there."""
+    """Run a verb without root's rights. once: run it as root before, so that its imports are compiled."""
     code = (
         "import contextlib, io, os, sys, msg_adapters, rsea_ros.cli.identify, rsea_ros.model.rig_file\n"
         "from rsea_ros.cli.main import main\n"
@@ -61,7 +61,7 @@ def reachable(folder: Path) -> None:
         one.chmod(0o755)
 
 
-def test_a_reader_without_permission(record, tmp_path):
+def test_a_file_without_read_permission_is_refused(record, tmp_path):
     for name in ("open.mcap", "locked.mcap"):
         write_record(record, tmp_path / name)
     (tmp_path / "locked.mcap").chmod(0)
@@ -71,7 +71,7 @@ def test_a_reader_without_permission(record, tmp_path):
     refused(done, tmp_path / "locked.mcap", "no permission to read it")
 
 
-def test_a_folder_that_this_user_may_not_write_to(record, tmp_path):
+def test_a_folder_without_write_permission_is_refused(record, tmp_path):
     write_record(record, tmp_path / "bag.mcap")
     (tmp_path / "locked").mkdir(mode=0o555)
     reachable(tmp_path)

@@ -1,4 +1,4 @@
-"""Rigs, effects and numbers that make no sense: one line of what and where, status 2, nothing half there."""
+"""Senseless rigs, effects and numbers: one line that says what and where, status 2, no partial files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ RIG = (ROOT / "config/rigs/paper_high_impedance.yaml").read_text(encoding="utf-8
         ),
     ],
 )
-def test_a_rig_that_makes_no_sense(record, tmp_path, out, old, new, words):
+def test_a_senseless_rig_is_refused_in_one_line(record, tmp_path, out, old, new, words):
     write_record(record, tmp_path / "bag")
     assert old in RIG
     (tmp_path / "rig.yaml").write_text(RIG.replace(old, new, 1), encoding="utf-8")
@@ -44,13 +44,13 @@ def test_a_rig_that_makes_no_sense(record, tmp_path, out, old, new, words):
     )
 
 
-def test_a_rig_that_is_not_there(record, tmp_path, out):
+def test_a_rig_that_does_not_exist_is_refused(record, tmp_path, out):
     write_record(record, tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--rig", "papper", "--out", out)
     refused(done, "rig 'papper' not found", "paper_high_impedance")
 
 
-def test_a_rig_that_the_data_contradict(record, tmp_path, out):
+def test_a_rig_that_the_data_contradict_is_refused(record, tmp_path, out):
     write_record(without(record, "position"), tmp_path / "bag")
     done = rsea("identify", tmp_path / "bag", "--rig", "bare_drive", "--out", out)
     refused(done, tmp_path / "bag", "no position channel, expected one")
@@ -67,6 +67,6 @@ def test_a_rig_that_the_data_contradict(record, tmp_path, out):
         (["--amplitude", "1e6"], ("100",)),
     ],
 )
-def test_simulations_that_make_no_sense(tmp_path, arguments, words):
+def test_a_senseless_simulation_is_refused(tmp_path, arguments, words):
     refused(rsea("simulate", "paper_high_impedance", "--out", tmp_path / "bag", *arguments), *words)
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""`rsea bench` as a program: it says where it is, does what it is told, and leaves nothing behind."""
+"""`rsea bench` as a program: it prints its addresses, obeys requests, and leaves nothing behind."""
 
 import json
 import signal
@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rsea_ros.cli._graph import node_calls
 from rsea_ros.cli.main import main
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.peer import motor
@@ -22,18 +23,23 @@ def start(*words):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def test_it_says_where_it_is_and_sigterm_takes_the_port_away(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_it_prints_its_addresses_and_a_signal_removes_the_port(tmp_path, number):
+    """To be stopped is its regular end."""
     process = start("--port", tmp_path / "tty", "--model", 2020)
     place = json.loads(process.stdout.readline())
     assert place["port"] == str(tmp_path / "tty") and place["model"] == 2020
     assert (tmp_path / "tty").is_char_device() and place["ft_port"] != place["page_port"]
-    process.send_signal(signal.SIGTERM)
+    words = place["launch"].split()
+    driver = node_calls(words[2], words[3:])[0]
+    assert words[:2] == ["rsea", "launch"] and driver.parameters["ft_page_port"] == str(place["page_port"])
+    process.send_signal(number)
     _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
     assert not (tmp_path / "tty").is_symlink()
 
 
-def test_a_request_that_it_does_not_know_is_answered_and_changes_nothing(tmp_path):
+def test_an_unknown_request_is_answered_and_changes_nothing(tmp_path):
     with RemoteBench(tmp_path / "tty") as bench:
         for name, values in {"explode": {}, "misbehave": {"dropp": 1.0}, "set": {"colour": 3}}.items():
             with pytest.raises(DeviceError, match="expected one of misbehave, set, alert"):
@@ -48,12 +54,12 @@ def test_a_request_that_it_does_not_know_is_answered_and_changes_nothing(tmp_pat
         (("--return-delay", 300), "rsea bench: --return-delay 300, expected 0 to 254 (unit 2 µs)\n"),
     ],
 )
-def test_what_no_bench_can_have_is_refused(words, message, capsys):
+def test_impossible_options_are_refused(words, message, capsys):
     assert main(["bench", *map(str, words)]) == 2
     assert capsys.readouterr() == ("", message)
 
 
-def test_a_file_in_the_place_of_the_port_stays(tmp_path, capsys):
+def test_a_file_with_the_name_of_the_port_is_not_removed(tmp_path, capsys):
     (tmp_path / "thesis.tex").write_text("precious")
     assert main(["bench", "--port", str(tmp_path / "thesis.tex")]) == 2
     errors = capsys.readouterr().err
@@ -62,10 +68,9 @@ def test_a_file_in_the_place_of_the_port_stays(tmp_path, capsys):
     assert (tmp_path / "thesis.tex").read_text() == "precious"
 
 
-def test_what_it_keeps_for_requests_is_bounded(monkeypatch):
-    """It grew by 3.7 MB a minute."""
-    monkeypatch.setattr(motor, "KEPT", 50)
-    made = motor.Motor(54024, SimpleNamespace(write=lambda torque: None))
+def test_the_memory_for_requests_is_bounded():
+    """The memory grew by 3.7 MB a minute."""
+    made = motor.Motor(54024, SimpleNamespace(write=lambda torque: None), kept=50)
     goal = made.model.registers["goal"]
     for k in range(200):
         made.write(k, goal.address, (k % 100).to_bytes(goal.size, "little"))

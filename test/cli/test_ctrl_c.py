@@ -1,4 +1,4 @@
-"""A verb that is interrupted while it works."""
+"""A verb interrupted during its work."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("verb", ["identify", "simulate", "predict"])
-def test_ctrl_c(verb, long_bag, tmp_path):
-    """Interrupted while it works: one line, status 130, nothing under the final name."""
+def test_ctrl_c_ends_a_verb_in_one_line_and_leaves_no_result(verb, long_bag, tmp_path):
+    """One line, status 130, nothing under the final name."""
     out = tmp_path / "results"
     arguments = {
         "simulate": [*LONG, out],

@@ -1,4 +1,4 @@
-"""The main job, as a newcomer runs it: real processes, real topics, true values found."""
+"""The demo as a newcomer runs it: real processes, real topics, the true values recovered."""
 
 import os
 import re
@@ -32,7 +32,7 @@ def _demo(out):
 
 
 def _left_running(out):
-    """Node processes that name the demo's directory on their command line."""
+    """Return the node processes that name the demo's directory on their command line."""
     lines = [
         p.read_bytes() for p in Path("/proc").glob("[0-9]*/cmdline") if p.parent.name != str(os.getpid())
     ]
@@ -40,7 +40,7 @@ def _left_running(out):
 
 
 def _played(tmp_path):
-    """Play the demo until the plant did not stall in it, thrice at most; return where, and its output."""
+    """Play the demo until the plant does not stall, three times at most; return its directory and output."""
     for k in range(3):
         out = tmp_path / f"demo{k}"
         process = _demo(out)
@@ -86,7 +86,7 @@ def test_a_signal_leaves_no_process_and_no_half_written_bag(tmp_path, number, li
     assert not list(out.glob("*.partial*"))
 
 
-def test_a_node_that_fails_is_told_in_one_line_with_its_log(tmp_path):
+def test_a_node_that_fails_is_named_in_one_line_with_its_log(tmp_path):
     with Processes(tmp_path, DOMAIN) as nodes:
         nodes.start("replay", {"bag": "no/such/bag"})
         with pytest.raises(
@@ -95,7 +95,7 @@ def test_a_node_that_fails_is_told_in_one_line_with_its_log(tmp_path):
             nodes.wait("replay", 60.0)
 
 
-def test_a_node_that_fails_beside_the_awaited_one_is_told_too(tmp_path):
+def test_a_node_that_fails_while_another_is_awaited_is_named_too(tmp_path):
     with Processes(tmp_path, DOMAIN) as nodes:
         nodes.start("plant", {"rate": 1})
         nodes.start("record", {"out": tmp_path / "bag"})

@@ -15,7 +15,7 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_design_without_arguments_is_the_papers_example(here, capsys):
+def test_design_without_arguments_computes_the_papers_example(here, capsys):
     assert main(["design", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["asked"]["bandwidth_eq_7_hz"] == pytest.approx(55.83, abs=5e-3)
@@ -28,7 +28,7 @@ def test_design_without_arguments_is_the_papers_example(here, capsys):
         assert said in page
 
 
-def test_design_tells_by_status_when_it_is_asked_to(here):
+def test_fail_on_makes_the_result_of_a_design_an_exit_status(here):
     assert main(["design", "--fail-on", "unmet"]) == 1
     assert main(["design", "--fail-on", "unmet", "--stiffness", "4000"]) == 0
 

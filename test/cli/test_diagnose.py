@@ -1,4 +1,4 @@
-"""The verb: files, ten lines, statuses, and one line for what cannot be diagnosed."""
+"""`rsea diagnose`: files, ten lines, statuses, and one line for a run that cannot be diagnosed."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def bag(record, tmp_path):
 
 
 class Played(NamedTuple):
-    """A call of the verb, and what the engine told it."""
+    """A call of the verb, and the diagnosis that it received."""
 
     status: int
     printed: str
@@ -60,7 +60,7 @@ class Played(NamedTuple):
 
 @pytest.fixture(scope="module")
 def played(record, tmp_path_factory):
-    """The verb with the engine as it is, once."""
+    """Run the verb once with the real diagnosis."""
     place, told = tmp_path_factory.mktemp("played"), []
     write_record(record, place / "run.mcap")
     printed, errors, diagnose = StringIO(), StringIO(), engine.diagnose
@@ -72,13 +72,13 @@ def played(record, tmp_path_factory):
 
 @pytest.fixture
 def known(played):
-    """What the engine says of the run."""
+    """Return the diagnosis of the run."""
     return played.diagnosis
 
 
 @pytest.fixture
 def quick(known, monkeypatch):
-    """The verb with an engine that has its answer ready; returns what it was asked."""
+    """Give the verb a diagnosis that is ready at once; return the arguments of its calls."""
     asked = []
 
     def answer(records, rig, holdout, tell, without):
@@ -117,7 +117,7 @@ def test_json_prints_the_file_and_nothing_else(quick, bag, tmp_path, capsys):
         (["unexplained", "--fail-on", "explained"], 1),
     ],
 )
-def test_the_status_is_1_for_a_verdict_that_was_asked_for(quick, bag, tmp_path, verdicts, status):
+def test_the_status_is_1_for_a_verdict_that_fail_on_names(quick, bag, tmp_path, verdicts, status):
     assert main(["diagnose", bag(), "--out", str(tmp_path / "out"), "--fail-on", *verdicts]) == status
     assert (tmp_path / "out" / "report.html").exists()
 
@@ -134,7 +134,7 @@ def test_bags_rig_and_holdout_reach_the_engine(quick, bag, record, tmp_path):
     assert rig.name == "pendulum"
 
 
-def test_faults_are_findings_not_refusals(quick, bag, record, tmp_path):
+def test_faults_of_the_data_are_findings_and_no_refusals(quick, bag, record, tmp_path):
     y = record["ft"].y.copy()
     y[100:120] = np.nan
     assert main(["diagnose", bag(record.with_channels(ft=Channel(record["ft"].t.copy(), y))),
@@ -180,7 +180,7 @@ def test_a_run_that_cannot_be_diagnosed_is_refused_in_one_line(bag, record, tmp_
 @pytest.mark.parametrize(
     ("content", "line"), [(None, "no such bag"), (b"", "empty file"), (b"hello" * 99, "no MCAP file")]
 )
-def test_what_is_no_bag_is_refused_in_one_line(tmp_path, capsys, content, line):
+def test_a_file_that_is_not_a_bag_is_refused_in_one_line(tmp_path, capsys, content, line):
     path = tmp_path / "bad.mcap"
     if content is not None:
         path.write_bytes(content)

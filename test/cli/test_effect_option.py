@@ -1,4 +1,4 @@
-"""`rsea simulate --effect`: what an effect cannot be is refused in one line, with value, bounds and unit."""
+"""`rsea simulate --effect`: an impossible effect is refused in one line, with value, bounds and unit."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BOUNDS = "expected NAME:param=value with a number in SI (gap: 0 to 0.1 rad)"
         (["backlash:width=1"], "effect backlash: unknown parameter 'width', expected gap"),
     ],
 )
-def test_nonsense_is_one_line(effects, message, capsys, tmp_path):
+def test_a_senseless_effect_is_refused_in_one_line(effects, message, capsys, tmp_path):
     options = [part for effect in effects for part in ("--effect", effect)]
     rig = "paper_high_impedance"
     assert main(["simulate", rig, "--duration", "1", "--out", str(tmp_path / "x.mcap"), *options]) == 2
@@ -35,7 +35,7 @@ def test_nonsense_is_one_line(effects, message, capsys, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_effect_of_the_rig_is_not_given_again(capsys, tmp_path):
+def test_an_effect_that_the_rig_states_cannot_be_given_again(capsys, tmp_path):
     options = ["--effect", "coulomb_friction", "--duration", "1", "--out", str(tmp_path / "x.mcap")]
     assert main(["simulate", "emps", *options]) == 2
     assert "effect coulomb_friction is given twice, expected once" in capsys.readouterr().err

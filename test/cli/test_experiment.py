@@ -1,4 +1,4 @@
-"""rsea experiment: a run that the excite node plays, or in one line why it cannot be."""
+"""`rsea experiment`: a run that the excite node plays, or one line that says why there cannot be one."""
 
 import json
 
@@ -41,7 +41,7 @@ def test_the_run_keeps_its_limits_and_can_be_played(models, tmp_path, capsys):
         (["--limits", "torque=5", "--longest", "0"], "expected a number > 0"),
     ],
 )
-def test_what_cannot_be_is_one_line(models, words, message, capsys):
+def test_an_impossible_run_is_refused_in_one_line(models, words, message, capsys):
     try:
         status = main(["experiment", *models, *words])
     except SystemExit as error:
@@ -50,7 +50,7 @@ def test_what_cannot_be_is_one_line(models, words, message, capsys):
     assert status == 2 and message in shown and len(shown.splitlines()) == 1
 
 
-def test_a_diagnosis_gives_its_doubtful_cause_and_the_alternatives():
+def test_a_diagnosis_file_supplies_the_doubtful_cause_and_its_alternatives():
     extended = RIG.with_effect("coulomb_friction", torque=1.0).with_effect("ft_gain_error", gain=1.1)
     interval = {"value": 1.1, "unit": "1", "ci95": [1.05, 1.15]}
     document = {

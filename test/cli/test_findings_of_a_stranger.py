@@ -1,4 +1,4 @@
-"""What a stranger found by using the verbs: each a command that misled or broke."""
+"""Commands that misled a new user or failed, each once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def frozen(record):
     return record.with_channels(ft=Channel(record["ft"].t, y))
 
 
-def test_identify_tells_of_frozen_samples(record, tmp_path, capsys):
+def test_identify_reports_frozen_samples(record, tmp_path, capsys):
     write_record(frozen(record), tmp_path / "bag.mcap")
     main(["identify", str(tmp_path / "bag.mcap"), "--out", str(tmp_path / "out"), "--json"])
     faults = json.loads(capsys.readouterr().out)["data"]["faults"]
@@ -42,7 +42,7 @@ def test_a_fit_in_python_opens_with_its_verdict_and_the_faults(record):
     assert "frozen samples in F/T torque" in summary
 
 
-def test_a_bag_counts_once(record, tmp_path, capsys):
+def test_a_bag_given_twice_counts_once(record, tmp_path, capsys):
     bag = str(tmp_path / "bag.mcap")
     write_record(record, bag)
     for verb in ("identify", "diagnose"):
@@ -58,7 +58,7 @@ def test_effects_in_python_keep_their_bounds():
 
 
 @pytest.mark.parametrize("value", ["1e-20", "1e308", "1e-300"])
-def test_values_of_no_machine_are_refused(value, tmp_path, capsys):
+def test_values_that_no_machine_has_are_refused(value, tmp_path, capsys):
     text = rig_path(RIG).read_text(encoding="utf-8")
     (tmp_path / "rig.yaml").write_text(text.replace("value: 0.953,", f"value: {value},", 1))
     assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2

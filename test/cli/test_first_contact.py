@@ -1,4 +1,4 @@
-"""What a newcomer types: names that are nearly right, lists of what there is, a rig of one's own."""
+"""What a newcomer types: names that are nearly right, requests for lists, a new rig."""
 
 from __future__ import annotations
 
@@ -12,6 +12,20 @@ import pytest
 from rsea_ros.cli import main as cli
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_names
+
+
+def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, capsys):
+    (tmp_path / "run.csv").write_text("t,u\n0,1\n")
+    assert cli.main(["diagnose", str(tmp_path / "run.csv")]) == 2
+    assert f"rsea import {tmp_path}/run.csv --map MAP" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["identify x", "diagnose x", "export --mjcf x", "watch"])
+def test_an_empty_name_is_no_folder(words, capsys):
+    """It was the working directory, where the results were written."""
+    with pytest.raises(SystemExit) as end:
+        cli.main([*words.split(), "--out", ""])
+    assert end.value.code == 2 and "'', expected a name" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -46,7 +60,7 @@ def test_a_rig_file_with_a_mistyped_key_is_answered_too(tmp_path, capsys):
     assert "did you mean spring?" in capsys.readouterr().err
 
 
-def test_the_version_is_the_packages(capsys):
+def test_the_version_is_that_of_the_package(capsys):
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("rsea_ros 0.")
 
@@ -67,13 +81,13 @@ def test_a_verbs_help_ends_with_an_example_that_its_parser_takes(name, capsys):
 
 
 @pytest.mark.parametrize(("verb", "names"), [("rigs", rig_names()), ("effects", list(catalogue()))])
-def test_what_there_is_stands_in_a_list(verb, names, capsys):
+def test_every_rig_and_effect_is_listed(verb, names, capsys):
     assert cli.main([verb]) == 0
     first_words = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line]
     assert set(names) <= set(first_words)
 
 
-def test_every_map_stands_in_the_list(capsys):
+def test_every_import_map_is_listed(capsys):
     assert cli.main(["maps"]) == 0
     shown = capsys.readouterr().out
     maps = Path(cli.__file__).parents[2] / "config" / "imports"
@@ -86,7 +100,7 @@ def test_an_effect_is_shown_with_equation_parameters_unit_and_source(capsys):
     assert "gap (rad): typical 0.004" in shown and "gap / 2" in shown and "Source: Nordin" in shown
 
 
-def test_a_new_rig_is_right_as_it_stands_and_replaces_nothing(tmp_path, monkeypatch, capsys):
+def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["rig", "new", "left_knee"]) == 0
     assert load_rig("left_knee.yaml").name == "left_knee"
@@ -98,6 +112,6 @@ def test_a_new_rig_is_right_as_it_stands_and_replaces_nothing(tmp_path, monkeypa
     assert "spring.stiffness" in shown and "N m/rad" in shown and "identify fits: " in shown
 
 
-def test_an_axis_that_is_turned_around_is_taken_as_typed(capsys):
+def test_an_axis_with_a_minus_sign_is_accepted_as_typed(capsys):
     assert cli.main(["check", "no_such_bag", "--axis", "-torque.z"]) == 2
     assert "no such bag" in capsys.readouterr().err

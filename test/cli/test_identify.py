@@ -1,4 +1,4 @@
-"""simulate, identify and predict as a person plays them one after another."""
+"""simulate, identify and predict as a person runs them one after another."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def test_identify_leaves_three_files_and_nothing_else(results):
 
 
 def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
-    """The verdict leads on the terminal, and --fail-on makes it an exit status."""
+    """The verdict comes first on the terminal, and --fail-on makes it an exit status."""
     arguments = ["identify", str(bag), "--out", str(tmp_path / "out"), "--fail-on", "misfit"]
     assert main(arguments) == 0
     assert re.match(
-        r"The model fits: .* times the noise \(rig paper_high_impedance\)\n", capsys.readouterr().out
+        r"The model fits: .* times the noise \(default rig paper_high_impedance\)\n", capsys.readouterr().out
     )
     misfitting = tmp_path / "misfitting"
     effect = ["--effect", "torque_constant_error:gain=1.1"]
@@ -62,9 +62,9 @@ def test_identify_opens_with_whether_the_model_fits(bag, tmp_path, capsys):
     capsys.readouterr()
     arguments = ["identify", str(misfitting), "--out", str(tmp_path / "bad")]
     assert main(arguments) == 0
-    first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("The model does not fit: F/T torque ")
-    assert first.endswith(f"; next: rsea diagnose {misfitting} --rig paper_high_impedance")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("The model does not fit: F/T torque ")
+    assert f"next: rsea diagnose {misfitting} --rig paper_high_impedance" in lines
     written = json.loads((tmp_path / "bad" / "identification.json").read_text(encoding="utf-8"))
     assert written["verdict"] == "misfit"
     assert written["times_noise"]["ft"] > 5.0
@@ -104,7 +104,7 @@ def test_the_table_is_whole_in_a_pipe(bag, tmp_path, capsys):
     assert err == ""
 
 
-def test_predict_is_at_the_noise_and_writes_every_channel(bag, results, tmp_path, capsys):
+def test_predict_leaves_only_noise_and_writes_every_channel(bag, results, tmp_path, capsys):
     table = tmp_path / "predicted.csv"
     assert main(["predict", str(results / "model.yaml"), str(bag), "--out", str(table)]) == 0
     channels = json.loads(capsys.readouterr().out)["channels"]
@@ -119,7 +119,7 @@ def test_predict_is_at_the_noise_and_writes_every_channel(bag, results, tmp_path
     assert float(np.std(error)) == pytest.approx(channels["ft"]["rms_error"], rel=0.05)
 
 
-def test_predict_a_bag_that_the_fit_has_not_seen(results, tmp_path, capsys):
+def test_predict_leaves_only_noise_in_a_bag_that_the_fit_has_not_seen(results, tmp_path, capsys):
     other = tmp_path / "other"
     assert main(["simulate", RIG, "--duration", "10", "--seed", "6", "--out", str(other)]) == 0
     capsys.readouterr()

@@ -30,7 +30,7 @@ def inputs(tmp_path: Path) -> tuple[str, str, Path]:
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_a_bag_with_the_measurement(inputs, capsys, storage):
+def test_a_table_becomes_a_bag_with_its_measurement(inputs, capsys, storage):
     file, mapping, out = inputs
     assert (
         main(
@@ -63,7 +63,7 @@ def test_a_bag_with_the_measurement(inputs, capsys, storage):
         (("map.yaml", "position", "angle"), "map.yaml: line 5: channels: unknown key 'angle'"),
     ],
 )
-def test_mistakes_are_one_line_and_status_2(inputs, capsys, change, text):
+def test_mistakes_in_a_map_are_one_line_and_status_2(inputs, capsys, change, text):
     file, mapping, out = inputs
     name, old, new = change
     path = out.parent / name
@@ -91,7 +91,7 @@ def test_mistakes_are_one_line_and_status_2(inputs, capsys, change, text):
         ),
     ],
 )
-def test_paths_and_options_that_make_no_sense(inputs, capsys, arguments, text):
+def test_senseless_paths_and_options_are_refused(inputs, capsys, arguments, text):
     names = dict(zip(("{file}", "{map}", "{out}"), map(str, inputs), strict=True))
     assert main(["import", *(names.get(argument, argument) for argument in arguments)]) == 2
     error = capsys.readouterr().err
@@ -110,7 +110,7 @@ def test_the_module_runs_as_a_program(inputs):
     assert again.stderr == f"rsea import: {out}: exists already, expected a new name or --force\n"
 
 
-def test_what_is_missing_is_on_the_terminal_and_in_the_bag(inputs, capsys):
+def test_missing_values_are_reported_on_the_terminal_and_in_the_bag(inputs, capsys):
     file, mapping, out = inputs
     Path(file).write_text(Path(file).read_text().replace("7,3.5,14", "7,,14"))
     assert main(["import", file, "--map", mapping, "--out", str(out)]) == 0
@@ -120,8 +120,8 @@ def test_what_is_missing_is_on_the_terminal_and_in_the_bag(inputs, capsys):
 
 
 @pytest.mark.parametrize("name", ["bag", "bag.mcap", "bag.db3"])
-def test_what_is_missing_is_a_fault_of_the_bag(name, inputs, tmp_path):
-    """A single file kept no count of it."""
+def test_missing_values_are_a_fault_of_the_bag(name, inputs, tmp_path):
+    """A bag of a single file did not keep the count."""
     file, mapping, _ = inputs
     Path(file).write_text(Path(file).read_text().replace("7,3.5,14", "7,,14"))
     assert main(["import", file, "--map", mapping, "--out", str(tmp_path / name)]) == 0
@@ -135,5 +135,5 @@ def test_what_is_missing_is_a_fault_of_the_bag(name, inputs, tmp_path):
 @pytest.mark.parametrize(
     "text", ["[[[", "7", '[["clipping", "ft", 0.1, "x"]]', '[["missing_values", 1]]', "[" * 9999]
 )
-def test_remarks_of_another_are_passed_by(text):
+def test_remarks_of_another_program_in_a_bag_are_ignored(text):
     assert remarks_of({FAULTS: text}).faults == []

@@ -1,4 +1,4 @@
-"""Several joints, runs and files at once: a bag each, all of them or none."""
+"""Several joints, runs and files at once: one bag for each, all of them or none."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def episodes(tmp_path):
     return tmp_path
 
 
-def test_a_bag_for_each_joint_of_each_episode(episodes, capsys):
+def test_each_joint_of_each_episode_gets_a_bag(episodes, capsys):
     out = episodes / "bags"
     file, mapping = str(episodes / "file-000.parquet"), str(episodes / "map.yaml")
     assert main(["import", file, "--map", mapping, "--out", str(out), "--index", "0-1"]) == 0
@@ -70,7 +70,7 @@ def test_mistakes_leave_nothing_behind(episodes, capsys, options, text):
     assert sorted(path.name for path in episodes.iterdir()) == ["file-000.parquet", "map.yaml"]
 
 
-def test_the_second_of_two_files_is_bad_and_none_is_written(tmp_path, capsys):
+def test_no_bag_is_written_where_the_second_of_two_files_is_bad(tmp_path, capsys):
     (tmp_path / "map.yaml").write_text("time: {rate: 100}\nchannels: {position: {column: x, unit: rad}}\n")
     (tmp_path / "a.csv").write_text("x\n1\n2\n")
     (tmp_path / "b.csv").write_text("x\n1\nlots\n")
@@ -83,13 +83,13 @@ def test_the_second_of_two_files_is_bad_and_none_is_written(tmp_path, capsys):
     assert sorted(path.name for path in out.iterdir()) == ["a", "b"]
 
 
-def test_the_ready_map_of_a_lerobot_data_set(episodes):
+def test_the_shipped_map_imports_a_lerobot_data_set(episodes):
     file, out = str(episodes / "file-000.parquet"), episodes / "bags"
     assert main(["import", file, "--map", "lerobot", "--index", "1", "--out", str(out)]) == 0
     assert len(list(out.iterdir())) == 2
 
 
-def test_the_ready_maps_of_pace_and_of_echoed_joint_states(tmp_path):
+def test_the_shipped_maps_import_pace_and_echoed_joint_states(tmp_path):
     q = np.arange(20.0).reshape(10, 2)
     np.savez(tmp_path / "chirp_data.npz", time=np.arange(10) / 400, dof_pos=q, des_dof_pos=q + 1)
     out = str(tmp_path / "pace")

@@ -30,7 +30,7 @@ def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def verb(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
-    """Return a function that runs `rsea fake …`, where the verb does what it is given."""
+    """Return a function that runs `rsea fake …`, a verb that calls the given function."""
 
     def run(action: Callable[[argparse.Namespace], int], *arguments: str) -> int:
         module = types.ModuleType("rsea_ros.cli.fake")
@@ -165,7 +165,7 @@ def test_a_full_disk_under_stdout_is_one_line():
     assert (done.returncode, done.stderr) == (2, "rsea: No space left on device\n")
 
 
-def test_code_from_outside_is_announced(verb, capsys, monkeypatch):
+def test_code_from_outside_the_package_is_announced(verb, capsys, monkeypatch):
     monkeypatch.setenv("RSEA_EFFECTS", "/mine")
     assert verb(lambda args: 0) == 0
     line = "rsea fake: RSEA_EFFECTS=/mine: code from there runs as part of this program\n"
@@ -184,7 +184,7 @@ def test_wrong_arguments_exit_with_2(verb, capsys, arguments):
     assert arguments[-1] in capsys.readouterr().err
 
 
-def test_an_unknown_verb_is_named_beside_the_known(capsys):
+def test_an_unknown_verb_is_named_with_the_known_ones(capsys):
     assert cli.main(["dance"]) == 2
     error = capsys.readouterr().err
     assert error.startswith("rsea: no verb 'dance', expected one of: ")
@@ -248,3 +248,11 @@ def test_the_test_verb_hands_its_arguments_to_pytest():
 
 def test_the_test_verb_returns_the_status_of_pytest():
     assert run_python("-m", "rsea_ros", "test", "-n", "0", "test/cli/no_such_file.py").returncode == 4
+
+
+@pytest.mark.parametrize("name", ["stdin", "stdout", "stderr"])
+def test_a_standard_stream_that_the_parent_closed_is_the_null_device(name, monkeypatch):
+    monkeypatch.setattr(sys, name, None)
+    assert cli.main(["maps"]) == 0
+    with getattr(sys, name) as stream:
+        assert stream.name == os.devnull

@@ -1,12 +1,12 @@
-"""Whatever fails while results are written, at whatever step: old files stay, and nothing is half there."""
+"""Whatever fails while results are written, at whatever step: old files stay, and no file is partial."""
 
 from __future__ import annotations
 
 import errno
 import os
 import signal
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,18 @@ import rsea_ros.replaced as replaced
 from msg_adapters import read_record, write_record
 from rsea_ros.checks import usable
 from rsea_ros.checks.finding import Findings
-from rsea_ros.cli import _checks, paper
+from rsea_ros.cli import _checks, experiment, paper
 from rsea_ros.cli.main import main
 from rsea_ros.control import study
 from rsea_ros.design import judge, margins
 from rsea_ros.diagnosis import diagnose
 from rsea_ros.errors import OutputError
+from rsea_ros.experiment import advice, run_file
+from rsea_ros.fleet import columns
 from rsea_ros.identification import identify
 from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.laws import learn
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.report import file_names
@@ -33,7 +37,11 @@ from rsea_ros.report.control import page as control_page
 from rsea_ros.report.design import json as design_json
 from rsea_ros.report.design import page as design_page
 from rsea_ros.report.diagnosis import files as diagnosis_files
+from rsea_ros.report.experiment import json as experiment_json
+from rsea_ros.report.experiment import page as experiment_page
+from rsea_ros.report.fleet import files as fleet_files
 from rsea_ros.report.identification import files as results
+from rsea_ros.report.law import files as law_files
 from rsea_ros.report.paper import json as paper_json
 from rsea_ros.report.paper import page as paper_page
 from rsea_ros.signals import Channel, Record
@@ -45,7 +53,7 @@ OLD, JSON = b"old", {"all": 1}
 
 
 class Disk:
-    """The calls of the system with which files.py writes; the n-th of them misfires."""
+    """The system calls with which files.py writes; the n-th of them fails."""
 
     def __init__(self, n: int, misfire: Callable[[str], None]) -> None:
         self.left, self._misfire = n, misfire
@@ -74,7 +82,7 @@ def stop(name: str) -> None:
 
 @dataclass(frozen=True)
 class Found:
-    """What the verbs ask of any result."""
+    """The interface of a result that the verbs use."""
 
     rig: None = None
     extended_rig: None = None
@@ -82,7 +90,20 @@ class Found:
     verdict: str = ""
     feasible: bool = True
     faults: tuple[()] = ()
-    rig_option: str = ""
+    remarks: tuple[()] = ()
+    rig_choice: RigChoice = field(default_factory=RigChoice)
+    base_rig: None = None
+    laws: tuple[()] = ()
+    at_floor: bool = False
+    joints: tuple[str, ...] = ("knee",)
+    command: tuple[()] = ()
+    rate: float = 280.0
+    excluded: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def proposal(self) -> Found:
+        """The run of an experiment."""
+        return self
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +114,7 @@ def record() -> Record:
 
 @pytest.fixture
 def folder(record, tmp_path, monkeypatch) -> Path:
-    """Return a working directory with inputs, where what verbs compute is there at once."""
+    """Return a working directory with inputs, in which verbs have their results without computing."""
     write_record(record, tmp_path / "run.mcap")
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / "run.csv").write_text("t,u\n0,1\n1,2\n2,3\n")
@@ -110,6 +131,12 @@ def folder(record, tmp_path, monkeypatch) -> Path:
         (control_json, "control_json", JSON), (control_page, "control_report", "page"),
         (design_json, "design_json", JSON), (design_page, "design_report", "page"),
         (paper_json, "paper_json", JSON), (paper_page, "paper_report", "page"),
+        (learn, "learn", found), (law_files, "law_json", JSON), (law_files, "law_report", "page"),
+        (law_files, "rig_text", "rig"), (experiment, "_possible", ((), {}, {})), (advice, "advise", found),
+        (run_file, "run_text", "t,u"), (experiment_json, "advice_json", JSON),
+        (experiment_page, "advice_page", "page"), (columns, "history", {}), (columns, "recordings", {}),
+        (fleet_files, "fleet_trends", found), (fleet_files, "alarms_of", []), (fleet_files, "_steps", None),
+        (fleet_files, "joint_page", "page"), (fleet_files, "fleet_page", "page"),
     ):  # fmt: skip
         monkeypatch.setattr(module, names, lambda *words, value=value, **named: value)
     monkeypatch.setattr(paper, "_tests", lambda args, new, tell: write_record(record, new.staged("one.mcap")))
@@ -122,6 +149,13 @@ WRITERS = {
     "import": (["import", "run.csv", "--map", "map.yaml", "--out", "out/new.mcap"], ["new.mcap"]),
     "predict": (["predict", RIG, "run.mcap", "--out", "out/new.csv"], ["new.csv"]),
     "export": (["export", "--mjcf", RIG, "--no-play", "--out", "out/new.xml"], ["new.xml"]),
+    "export of another kind": (["export", "--urdf", RIG, "--out", "out/new.urdf"], ["new.urdf"]),
+    "rig": (["rig", "new", "arm", "--out", "out/new.yaml"], ["new.yaml"]),
+    "fleet": (["fleet", "report", "store", "--out", "out"], ["index.html", "joint-knee.html"]),
+    "law": (["law", "run.mcap", "--json", "--out", "out"], list(file_names.LAW)),
+    "experiment": (
+        ["experiment", RIG, "--limits", "torque=1", "--json", "--out", "out"], list(file_names.EXPERIMENT)
+    ),
     "design": (["design", "--json", "--out", "out"], ["design.json", "report.html"]),
     "identify": (["identify", "run.mcap", "--json", "--out", "out"], list(file_names.IDENTIFICATION)),
     "diagnose": (["diagnose", "run.mcap", "--json", "--out", "out"], list(file_names.DIAGNOSIS)),
@@ -135,7 +169,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def misfires(monkeypatch, words: list[str], misfire: Callable[[str], None]) -> Iterator[int]:
-    """Run a verb again and again, each time with a later step that misfires, until none does."""
+    """Run a verb repeatedly, each time with a later step that fails, until none fails."""
     for n in range(1, 200):
         disk = Disk(n, misfire)
         with monkeypatch.context() as patch:
@@ -212,8 +246,8 @@ def test_a_symbolic_link_is_not_followed(folder, capsys, verb):
 
 
 @pytest.mark.parametrize("verb", ["predict", "simulate", "export", "identify", "simulate to a directory"])
-def test_what_is_no_regular_file_is_never_replaced(folder, capsys, verb):
-    """A pipe stands for devices: to replace /dev/null takes a system down."""
+def test_only_regular_files_are_replaced(folder, capsys, verb):
+    """A pipe stands for devices: replacing /dev/null would take a system down."""
     words, names = WRITERS[verb]
     (folder / "out").mkdir()
     os.mkfifo(folder / "out" / names[0])
@@ -253,7 +287,7 @@ def test_an_input_is_never_replaced(folder, record, capsys, words):
 
 
 @pytest.mark.parametrize("verb", ["design", "identify", "diagnose", "control", "paper"])
-def test_a_second_call_without_out_goes_beside_the_first(folder, capsys, verb):
+def test_a_second_call_without_out_writes_beside_the_first(folder, capsys, verb):
     words = WRITERS[verb][0][:-2]
     assert [main(words) for _ in range(3)] == [0, 0, 0]
     name = f"{verb}-run" if verb in ("identify", "diagnose") else verb
@@ -261,7 +295,7 @@ def test_a_second_call_without_out_goes_beside_the_first(folder, capsys, verb):
 
 
 def test_two_runs_at_once_do_not_take_one_name(folder, monkeypatch, capsys):
-    """The other run ends first, between the check and the naming."""
+    """The other run ends first, between the check of the name and its use."""
 
     def other(name: str) -> None:
         if name == "link":

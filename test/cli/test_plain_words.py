@@ -1,4 +1,4 @@
-"""What is wrong with a file is said in words for people, not in those of a parser."""
+"""A mistake in a file is described in words for people, not in those of a parser."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ PACKED = gzip.compress(b"u\n1\n2\n", mtime=0)
         (b"\xff\xfe\x00", "byte 0 is 0xff, which is not UTF-8"),
     ],
 )
-def test_of_a_rig(content, said, tmp_path, capsys):
+def test_a_mistake_in_a_rig_is_described_in_plain_words(content, said, tmp_path, capsys):
     (tmp_path / "rig.yaml").write_bytes(content)
     assert main(["simulate", str(tmp_path / "rig.yaml"), "--out", str(tmp_path / "bag")]) == 2
     _assert_plain(capsys.readouterr().err, said)
 
 
-def test_of_an_import_map(tmp_path, capsys):
+def test_a_mistake_in_an_import_map_is_described_in_plain_words(tmp_path, capsys):
     (tmp_path / "map.yaml").write_bytes(b"")
     (tmp_path / "run.csv").write_text("u\n1\n2\n")
     assert main(["import", *_files(tmp_path, "run.csv")]) == 2
@@ -44,7 +44,7 @@ def test_of_an_import_map(tmp_path, capsys):
         ("run.csv.gz", b"\xff\xfe\x00", "damaged or no gzip file"),
     ],
 )
-def test_of_a_table(name, content, said, tmp_path, capsys):
+def test_a_mistake_in_a_table_is_described_in_plain_words(name, content, said, tmp_path, capsys):
     (tmp_path / "map.yaml").write_text(MAP)
     (tmp_path / name).write_bytes(content)
     assert main(["import", *_files(tmp_path, name)]) == 2
@@ -70,7 +70,7 @@ def test_of_a_table(name, content, said, tmp_path, capsys):
         ),
     ],
 )
-def test_of_metadata(content, said, tmp_path):
+def test_a_mistake_in_metadata_is_described_in_plain_words(content, said, tmp_path):
     (tmp_path / metadata.NAME).write_bytes(content)
     contents = Contents()
     metadata.known(tmp_path, contents)

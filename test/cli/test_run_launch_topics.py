@@ -1,4 +1,4 @@
-"""Nodes without a `ros2` command: run, launch and topics."""
+"""Nodes without a `ros2` command: run, launch, topics and call."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from rsea_ros.errors import ParameterError
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_every_node_of_the_graph_is_one_that_there_is():
+def test_every_node_of_the_graph_exists():
     content = yaml.safe_load((ROOT / "launch" / "graph.yaml").read_text())
     assert {*content["first"], *content["others"]} <= set(node_names())
 
 
-def test_a_graph_starts_its_first_node_and_those_that_are_asked_for():
+def test_a_graph_starts_its_first_node_and_the_requested_ones():
     started = [call.name for call in node_calls("simulation", [])]
     assert started == ["plant", "model", "identify"]
     asked = node_calls(
@@ -44,7 +44,7 @@ def test_a_wrong_argument_is_refused_before_anything_starts(wrong):
         node_calls("simulation", [wrong])
 
 
-def test_parameters_are_handed_on_as_ros_reads_them():
+def test_parameters_are_passed_on_as_ros_reads_them():
     assert ros_arguments(["rig:=pendulum", "rate:=500.0"]) == [
         "--ros-args", "-p", "rig:=pendulum", "-p", "rate:=500.0", "--",
     ]  # fmt: skip
@@ -59,10 +59,10 @@ def test_a_node_that_fails_ends_the_others(capfd):
     assert "model ended with status 2" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize("words", [["run", "plant"], ["launch", "simulation"], ["topics"], ["demo"]])
+@pytest.mark.parametrize("words", ["run plant", "launch simulation", "topics", "call", "demo"])
 def test_without_ros_one_line_says_what_is_needed(words, monkeypatch, capsys):
     monkeypatch.setattr("rsea_ros.cli._ros.find_spec", lambda name: None)
-    assert cli.main(words) == 2
+    assert cli.main(words.split()) == 2
     assert "rclpy is missing" in capsys.readouterr().err
 
 
@@ -72,7 +72,7 @@ def rsea(*words: str) -> list[str]:
 
 
 def heard(topic: str, *running: subprocess.Popen[bytes]) -> dict[str, Any]:
-    """Return a message of a topic, once there is one, while some processes run."""
+    """Return the first message of a topic while some processes run."""
     while all(process.poll() is None for process in running):  # a plant compiles its simulation first
         echo = subprocess.run(
             rsea("topics", "echo", topic), cwd=ROOT, capture_output=True, text=True, timeout=60
@@ -99,3 +99,29 @@ def test_a_launched_graph_hears_the_documented_controller_and_one_signal_ends_it
         controller.wait()
         graph.send_signal(signal.SIGTERM)
     assert graph.wait(20) == 128 + signal.SIGTERM
+
+
+def call(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(rsea("call", *words), cwd=ROOT, capture_output=True, text=True, timeout=60)
+
+
+def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
+    driver = subprocess.Popen(rsea("run", "driver", "device:=simulated"), cwd=tmp_path)
+    try:
+        while (listed := call("driver")).returncode and driver.poll() is None:
+            pass  # a driver takes some seconds to start
+        assert "unconfigured" in listed.stdout and "clear_fault" in listed.stdout
+        early = call("driver", "activate")
+        assert early.returncode == 2
+        assert "'activate' while unconfigured, expected one of: configure" in early.stderr
+        up = call("driver", "configure", "activate", "stop")
+        assert up.stdout.splitlines()[:2] == ["/rsea/driver: inactive", "/rsea/driver: active"]
+        assert "did you mean clear_fault?" in call("driver", "clear_faults").stderr
+        down = call("driver", "deactivate", "cleanup")
+        assert down.stdout.splitlines() == ["/rsea/driver: inactive", "/rsea/driver: unconfigured"]
+    finally:
+        driver.send_signal(signal.SIGTERM)
+        status = driver.wait(20)
+    assert status == 0
+    missing = call("no_such_node", "stop")
+    assert missing.returncode == 2 and "node /rsea/no_such_node: it does not run" in missing.stderr

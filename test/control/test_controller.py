@@ -24,21 +24,21 @@ RIG, FREE = load_rig("paper_high_impedance"), load_rig("paper_moving_output")
 DESIGN = Design(GAINS, RATE, {}, math.nan)
 
 
-def test_a_sine_is_followed_and_no_load_is_told():
+def test_a_sine_is_followed_without_knowing_the_load():
     assert sine(RIG, RIG, DESIGN) < 0.02
     assert sine(FREE, RIG, DESIGN, 4.6) < 0.03
 
 
 def test_a_limited_slew_leaves_the_torque_of_the_model_alone():
-    """At 1 kHz the slew about a command that moves a free load pushed the model: 150 % off."""
+    """At 1 kHz the limited slew disturbed the model under a command that moves a free load: 150 % off."""
     gains = Gains(0.2446, 0.00087, 0.612, 29.97, 53.6)
     design = Design(gains, 1000.0, {}, math.nan)
     assert sine(FREE, RIG, design, 4.6, seconds=1.6, settle=1.2) < 0.03
 
 
 @pytest.mark.parametrize("times", [0.5, 2.0])
-def test_half_and_twice_the_load_are_followed_as_well(times):
-    """With the load's inertia told, and wrong by so much, it was 240 % off."""
+def test_a_sine_is_followed_with_half_and_twice_the_load(times):
+    """A controller that was given the load's inertia, wrong by that factor, was 240 % off."""
     load = FREE.with_values({"housing_end.inertia": times * FREE["housing_end.inertia"]})
     assert sine(load, FREE, DESIGN, 4.6 * times) < 0.05
 
@@ -69,7 +69,7 @@ def test_backlash_makes_no_limit_cycle():
     assert restlessness(RIG, DESIGN) < 1.1
 
 
-def test_small_sines_come_out_as_the_prediction_has_them():
+def test_small_sines_come_out_as_predicted():
     """No frequency is amplified beyond 1.5 dB: an extrapolator alone reached 18.7 dB at half the rate."""
     found = following(RIG, RIG, DESIGN)
     decibel = 20.0 * np.log10(np.abs(found.torque))
@@ -86,8 +86,8 @@ def test_a_jump_is_not_extrapolated():
     assert max(jump) < 1.05 and jump[-1] == pytest.approx(1.0, abs=1e-3)
 
 
-def test_missed_samples_are_passed_over_without_a_kink():
-    """Two that did not come in a sine of 5 Hz: what is predicted after them is as good as before."""
+def test_missed_samples_are_bridged_without_a_kink():
+    """After two lost samples of a sine of 5 Hz the prediction is as good as before."""
     prediction, errors = Prediction(80.0, 1.0 / RATE), []
     r = lambda k: math.sin(2.0 * math.pi * 5.0 * k / RATE)  # noqa: E731
     for k in range(200):
@@ -109,7 +109,7 @@ def test_a_parabola_is_predicted():
 @pytest.mark.parametrize("name", ["paper_high_impedance", "paper_moving_output", "prototype_knee"])
 @pytest.mark.parametrize("rate", [280.0, 1000.0])
 def test_the_inverse_leads_the_model_to_the_desired_torque(name, rate):
-    """Slow torques exactly, also where one sample alone cannot be inverted."""
+    """Slow torques are exact, also where a single sample cannot be inverted."""
     f = inverse(sampled(load_rig(name), rate))
     assert np.abs(inverse_poles(f)).max() < 1.0 + 1e-6
     x = np.zeros(len(f.plant.a))
@@ -130,8 +130,8 @@ def test_compensations_are_the_means_of_what_they_cancel():
     assert known.way(100.0) - known.way(-100.0) == pytest.approx(EFFECTS[3].parameters["gap"])
 
 
-def test_a_torque_beyond_the_limit_winds_nothing_up():
-    """200 N m asked for a second with 30 N m to be had; then 5 N m are there within 0.15 s."""
+def test_a_torque_beyond_the_limit_causes_no_windup():
+    """After a second of 200 N m requested with a limit of 30 N m, 5 N m are reached within 0.15 s."""
     wanted = np.concatenate([np.full(280, 200.0), np.full(200, 5.0)])
     controller = TorqueController(RIG, RATE, GAINS, limits=Limits(torque=30.0))
     trace = closed_loop(RIG, RATE, controller, wanted)
@@ -155,7 +155,7 @@ def test_it_takes_over_from_another_command_without_a_jump():
     assert np.array(ft) == pytest.approx(20.0, abs=0.3)
 
 
-def test_its_torque_grows_slowly_where_something_else_loads_the_spring():
+def test_the_torque_grows_slowly_where_something_else_loads_the_spring():
     loaded = Reading(20.0, 0.0, 20.0 / 1530.456, 0.0)
     controller = TorqueController(RIG, RATE, GAINS, limits=Limits(torque=68.0, ramp=0.25))
     controller.start(loaded, 50.0)
@@ -185,7 +185,7 @@ def test_lost_and_late_samples_do_no_harm(known):
     assert np.std(disturbed[-100:]) == pytest.approx(np.std(quiet), rel=0.2)
 
 
-def test_commands_that_come_far_too_late_are_feed_forward_and_swing_nothing_up():
+def test_commands_that_come_far_too_late_are_feed_forward_alone_and_stay_stable():
     """Six samples late at 1 kHz: feedback would diverge, feed-forward is late by 6 ms at 5 Hz, 19 %."""
     gains = Gains(0.2446, 0.00087, 0.612, 29.97, 53.6)
     plant, controller = Plant(RIG, 1000.0), TorqueController(RIG, 1000.0, gains)

@@ -1,4 +1,4 @@
-"""Measurements by the grid that they lie on: late ones and lost ones, by their stamps alone."""
+"""Measurements are placed on their grid by their stamps: late ones and lost ones."""
 
 import random
 
@@ -10,7 +10,7 @@ PERIOD = 1e9 / 280.0
 
 
 def placed(*periods):
-    """Periods that a grid counts between measurements at these instants, in periods."""
+    """Return the periods that a grid counts between measurements at these instants (in periods)."""
     grid = Grid(PERIOD)
     return [grid.place(round((100.0 + at) * PERIOD)) for at in periods]
 
@@ -25,7 +25,7 @@ def test_a_lost_cycle_is_counted_once():
     assert placed(0.0, 1.0, 3.0, 4.0) == [1, 1, 2, 1]
 
 
-def test_two_of_one_period_are_one_step():
+def test_two_measurements_of_one_period_are_one_step():
     assert placed(0.0, 1.0, 1.1, 2.0) == [1, 1, 0, 1]
     assert sum(placed(0.0, 1.9, 2.0, 3.0)) == 4
 
@@ -40,7 +40,7 @@ def test_lateness_of_any_kind_never_lets_the_model_run_ahead(off):
     assert abs(steps - 5000) <= 1
 
 
-def test_a_jump_of_the_stamps_is_told_and_not_counted():
+def test_a_jump_of_the_stamps_is_reported_and_not_counted():
     grid = Grid(PERIOD)
     grid.place(10**18)
     for jump in (-3600 * 10**9, 3600 * 10**9):

@@ -25,7 +25,7 @@ VALUES = {
 
 
 def largest(rate, seed):
-    """Largest |ft| and share of commands at the limit, for 10 N m at 5 Hz; bursts of commands 2 to 8 late."""
+    """Return the largest |ft| and the share of commands at the limit, 10 N m at 5 Hz, bursts 2 to 8 late."""
     dice, lateness = np.random.default_rng(seed), Lateness(rate)
     plant = Plant(RIG, rate, seed=seed)
     controller = TorqueController(RIG, rate, RATES[rate])
@@ -47,14 +47,14 @@ def largest(rate, seed):
 
 
 @pytest.mark.parametrize("rate", RATES)
-def test_feedback_that_fades_swings_nothing_up(rate):
+def test_feedback_that_fades_with_lateness_stays_stable(rate):
     for seed in (1, 2) if rate < 500.0 else (1,):
         ft, limited = largest(rate, seed)
         assert ft < 13.0 and limited == 0.0
 
 
 def every(n, **offsets):
-    """When measurements of n are taken: in time, but the 60th and so on of each 97 by so much later."""
+    """Return the instants of n measurements; of each 97, some from the 60th on are late by given amounts."""
     taken = np.zeros(n)
     for name, late in offsets.items():
         taken[np.arange(n) % 97 == int(name[1:])] = late
@@ -82,7 +82,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize(("rate", "kind"), [(280.0, kind) for kind in KINDS] + [(1000.0, next(iter(KINDS)))])
-def test_measurements_that_come_when_they_come_make_no_kick(rate, kind):
+def test_irregular_measurements_make_no_kick(rate, kind):
     """A single sample 2.6 periods after the one before made commands of 36 N m where 10 were asked."""
     n = round(1.2 * rate)
     taken, acting = KINDS[kind]
@@ -95,7 +95,7 @@ def test_measurements_that_come_when_they_come_make_no_kick(rate, kind):
 
 
 @pytest.mark.parametrize("rate", [280.0, 1000.0])
-def test_a_torque_sensor_that_samples_when_it_likes_costs_no_accuracy(rate):
+def test_a_torque_sensor_with_its_own_clock_costs_no_accuracy(rate):
     """Torques up to half a sample older than the angles were taken for torques of the same instant."""
     n = round(2.0 * rate)
     wanted = 10.0 * np.sin(2.0 * math.pi * 5.0 * np.arange(n) / rate)
@@ -116,7 +116,7 @@ def test_trust_falls_at_once_and_comes_back_slowly():
     assert lateness.take(1.5) == 1.0 and 0.0 < lateness.take(2.0) < 1.0
 
 
-def test_n_late_of_m_are_a_fault_and_a_few_are_none():
+def test_n_late_commands_of_m_are_a_fault_and_fewer_are_not():
     lateness = Lateness(280.0, Tolerance(0.5, 1.0))
     for k in range(2000):
         lateness.take(5.0 if k % 3 == 0 else 0.0)
@@ -128,7 +128,7 @@ def test_n_late_of_m_are_a_fault_and_a_few_are_none():
     assert not lateness.persists
 
 
-def test_an_error_that_stays_is_a_fault_and_a_step_is_none():
+def test_an_error_that_stays_is_a_fault_and_a_step_is_not():
     judge = _judge.Judge(VALUES)
     assert not any(judge.fault(0.0, 40.0) for _ in range(60))
     assert not any(judge.fault(40.0, 40.0) for _ in range(100))
@@ -140,8 +140,8 @@ def test_a_torque_beyond_the_sensor_is_a_fault_at_once():
     assert "ft of -111 N m" in _judge.Judge(VALUES).fault(-111.0, -111.0)
 
 
-def test_a_motor_that_makes_nothing_is_seen_and_one_that_is_late_is_not():
-    """A driver with a fault: what was commanded meanwhile, 25 N m for 10, came when that was cleared."""
+def test_a_motor_without_torque_is_noticed_and_a_late_one_is_not():
+    """When a fault of the driver was cleared, a torque commanded meanwhile acted: 25 N m in place of 10."""
     judge = _judge.Judge(VALUES)
     assert [judge.idle(25.0, 0.0) for _ in range(15)].index(True) == 13
     assert not any(judge.idle(25.0, 20.0) or judge.idle(1.0, 0.0) for _ in range(100))

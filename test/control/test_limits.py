@@ -1,4 +1,4 @@
-"""What the actuator cannot do, and how it feels: against formulas written out here."""
+"""Limits of the actuator and its impedance, against formulas written out here."""
 
 import math
 
@@ -36,7 +36,7 @@ def test_control_feels_soft_where_it_is_slow_and_hardly_stiffer_than_the_spring_
     assert np.abs(felt.controlled[0]) < 0.6 * B
 
 
-def test_reach_is_where_the_motor_has_no_more():
+def test_the_reach_ends_at_the_torque_limit_of_the_motor():
     """|T_m| = A |J s^2 + (b_m + b_s) s + K| / |b_s s + K|."""
     found = reach(RIG, 20.0, 44.2, 3.466)
     s = 2j * math.pi * found.torque
@@ -46,7 +46,7 @@ def test_reach_is_where_the_motor_has_no_more():
     assert largest(RIG, found.torque, 44.2, 3.466) == pytest.approx(20.0, rel=5e-3)
 
 
-def test_the_simulated_actuator_stops_following_there():
+def test_the_simulated_actuator_stops_following_at_its_reach():
     design = Design(GAINS, 280.0, {}, math.nan)
     edge = reach(RIG, 40.0, 50.0, math.inf).torque
     limits = Limits(torque=50.0)

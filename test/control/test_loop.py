@@ -29,7 +29,7 @@ def found():
 
 
 @pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
-def test_the_sampled_bench_is_the_simulated_one(rig):
+def test_the_sampled_bench_responds_as_the_simulated_one(rig):
     """A pulse into both; gravity and effects are in neither."""
     plant, model, x = Plant(rig, RATE, noise=False), sampled(rig, RATE), np.zeros(2)
     x = np.zeros(len(model.a))
@@ -41,8 +41,8 @@ def test_the_sampled_bench_is_the_simulated_one(rig):
 
 
 @pytest.mark.parametrize("hz", [1.0, 5.0, 17.5, 70.0])
-def test_a_sine_through_the_code_gives_the_formula(hz):
-    """The law reads a bench that a sine drives, and answers with -L of it; it remembers its answers."""
+def test_the_controller_answers_a_sine_as_the_formula_says(hz):
+    """The controller measures a bench driven by a sine and answers with -L times it."""
     model, law = sampled(FREE_RIG, RATE), law_of(FREE_RIG, RATE, GAINS)
     at = np.array([hz])
     response = responses(model, at)
@@ -70,8 +70,8 @@ def test_margins_are_those_of_python_control():
 
 
 @pytest.mark.parametrize("rig", [LOCKED_RIG, FREE_RIG], ids=lambda rig: rig.name)
-def test_a_bench_on_either_side_of_the_gain_margin(rig, found):
-    """A motor that makes so much more torque than its current says: the loop holds, or swings up."""
+def test_the_bench_is_stable_below_the_gain_margin_and_unstable_above(rig, found):
+    """With more torque per current the loop is stable below the margin and unstable above it."""
     name = LOCKED if rig is LOCKED_RIG else "free x 1"
     gain = 10.0 ** (found.margins[name].gain / 20.0)
     rms = {}
@@ -91,7 +91,7 @@ def test_poles_and_encirclements_agree(found):
         assert (largest_pole(law, stronger) < 1.0) is stable
 
 
-def test_what_is_unstable_with_any_load_is_refused_with_its_name():
+def test_gains_that_are_unstable_with_any_load_are_refused_with_that_load():
     loads = load_range(LOCKED_RIG, FREE_RIG)
     with pytest.raises(ParameterError, match=r"unstable at 280 Hz with load 'locked'.*modulus 1\.\d+"):
         check(LOCKED_RIG, loads, RATE, Gains(30.0, 0.1, 1.0, 50.0, 0.0))

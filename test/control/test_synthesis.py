@@ -1,4 +1,4 @@
-"""Gains by synthesis: what was demanded is kept, and no neighbour within the margins leaves less friction."""
+"""Gains by synthesis: the demands are kept, and no neighbour within the margins leaves less friction."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def found():
     return design(RIG, LOADS, RATE)
 
 
-def test_what_is_demanded_is_kept_with_every_load(found):
+def test_the_demands_are_kept_with_every_load(found):
     """|S| <= 2 is 6 dB and 29 degrees; <= 3 over the set's corners; |Z| over the spring's at most 1.2."""
     for margin in found.margins.values():
         assert margin.sensitivity <= 2.02 and margin.phase >= 28.9 and margin.gain >= 5.95
@@ -34,7 +34,7 @@ def test_what_is_demanded_is_kept_with_every_load(found):
 
 
 def test_no_neighbour_that_keeps_the_demands_is_clearly_better(found):
-    """Neither friction nor softness is had for nothing."""
+    """Less friction or a softer feel costs one of the demands."""
 
     def worth(design):
         gains = design.gains

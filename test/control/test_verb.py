@@ -19,7 +19,7 @@ def test_the_verb_writes_json_and_a_page(tmp_path, capsys):
         assert said in page
 
 
-def test_what_makes_no_sense_is_one_line_and_status_2(tmp_path, capsys):
+def test_senseless_options_are_refused_in_one_line_with_status_2(tmp_path, capsys):
     for arguments, line in (
         (["bare_drive"], "rig bare_drive: spring.rigid = True"),
         (["--rate", "0"], "--rate 0 Hz, expected 50 to 10000 Hz"),

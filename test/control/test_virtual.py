@@ -1,4 +1,4 @@
-"""The outer impedance loop: what a hand feels is what the linear model says, and passive as far as stated."""
+"""The outer impedance loop: the impedance felt is that of the linear model, and passive as far as stated."""
 
 import math
 

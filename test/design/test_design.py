@@ -1,4 +1,4 @@
-"""The design method: the paper's example comes out, and what the paper does not say."""
+"""The design method: the paper's example, and results that the paper leaves out."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def met(design):
     return [check.met for check in design.checks]
 
 
-def test_the_papers_example():
+def test_the_papers_example_is_reproduced():
     """150 N m, above 50 Hz, 6.169e-4 kg m^2: 260 N m/rad reach 55.8 Hz by Eq. (7)."""
     assert ASKED.band_eq_7 == pytest.approx(55.83, abs=5e-3)
     assert ASKED.checks[0].met
@@ -44,7 +44,7 @@ def test_the_papers_example():
     assert ASKED.rate == pytest.approx(185185.0, rel=1e-3)
 
 
-def test_what_the_paper_does_not_say():
+def test_the_example_also_yields_what_the_paper_leaves_out():
     assert float(mechanism.largest_torque(260.0)) == 130.0 < PAPER.torque
     assert math.isnan(ASKED.deflection)
     assert ASKED.linear == pytest.approx(0.577, abs=5e-4)
@@ -64,7 +64,7 @@ def test_the_least_stiffness_meets_all_and_a_little_less_does_not():
 
 
 @pytest.mark.parametrize("degrees", [0.5, 5.0, 30.0, 45.0])
-def test_deflection_turns_eq_8_round(degrees):
+def test_deflection_inverts_eq_8(degrees):
     theta = math.radians(degrees)
     torque = eq_8_spring_torque(185185.0, 0.0254, 0.0131, theta)
     k_s = eq_9_spring_stiffness(185185.0, 0.0254, 0.0131)
@@ -80,7 +80,7 @@ def test_no_deflection_carries_more_than_half_the_stiffness():
     assert theta[int(np.argmax(torque))] == pytest.approx(math.pi / 4, abs=2e-4)
 
 
-def test_monte_carlo_is_the_spread_of_the_formulas():
+def test_monte_carlo_agrees_with_the_closed_form_spread():
     """Eq. (7) goes as sqrt(K / J): log-normal spreads in closed form, arm and spring radius exact."""
     spreads = {**dict.fromkeys(spreads_of(UNIT), 0.0), "rate": 0.06, "inertia": 0.08}
     row = margins(ASKED, spreads)[0]
@@ -101,7 +101,7 @@ def test_robust_is_stiffer_and_impossible_where_the_motor_is_too_weak():
     assert robust_stiffness(PAPER, unit_named("h54-200-s500-r")) == math.inf
 
 
-def test_amplitudes_of_the_bands():
+def test_the_amplitude_of_a_band_is_limited_by_motor_and_travel():
     """The motor's limit over T_d/T_m of the clamped rig; 5 degrees of a spring by Eq. (8)."""
     rig = load_rig("paper_high_impedance")
     found = bands(rig, 44.2)
@@ -117,7 +117,7 @@ def test_the_design_as_a_rig_has_its_band():
     assert inner_inertia(rig) == pytest.approx(ASKED.inner) == pytest.approx(-6.883e-3, rel=1e-4)
 
 
-def test_both_senses_of_the_prototypes_drive():
+def test_both_arrangements_of_the_prototypes_drive_are_designed():
     """50 Hz need 1647 N m/rad with the circular spline held, 2759 with the flexspline; all 1728."""
     held = {row.train: row for row in by_train(PAPER, UNIT, 260.0)}
     circular, flexspline = held.values()
@@ -137,7 +137,7 @@ def test_a_heavier_chassis_helps_where_the_rotor_turns_backward(train, sign):
     assert sign * change < -0.4
 
 
-def test_band_over_the_rotors_inertia():
+def test_the_band_is_given_over_the_range_of_the_rotors_inertia():
     """Ends of the log-normal range, and no upper end where the spin cancels the chassis within it."""
     low, high = band_range(260.0, 6.169e-4, UNIT.spin, 0.5)
     for hz, factor in ((low, math.exp(1.6449 * 0.5)), (high, math.exp(-1.6449 * 0.5))):
@@ -145,7 +145,7 @@ def test_band_over_the_rotors_inertia():
     assert band_range(260.0, 6.169e-4, -6.0e-4, 0.5)[1] == math.inf
 
 
-def test_chassis_is_between_a_disc_and_a_ring():
+def test_the_chassis_inertia_is_between_a_disc_and_a_ring():
     assert math.sqrt(0.5) < gyration(PAPER) < 1.0
 
 

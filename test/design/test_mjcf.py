@@ -49,7 +49,7 @@ def chains(root):
 def matrices(text):
     """Return mass, damping and stiffness of the small motions, read from the XML alone, and the joints.
 
-    Last what is tied: rows of hinge angles that are zero.
+    The last value has the constraints: rows over the hinge angles whose product is zero.
     """
     root = ElementTree.fromstring(text)
     bodies, joints, absolute = chains(root)
@@ -74,7 +74,7 @@ def matrices(text):
 
 
 def characteristic(mass, damping, stiffness):
-    """Return det(M s^2 + D s + K) / det M at some s: what does not depend on the choice of coordinates."""
+    """Return det(M s^2 + D s + K) / det M at some s, which does not depend on the choice of coordinates."""
     return np.array([np.linalg.det(mass * s**2 + damping * s + stiffness) for s in S]) / np.linalg.det(mass)
 
 
@@ -95,7 +95,7 @@ def test_the_xml_holds_the_rigs_equations_of_motion(rig):
     np.testing.assert_allclose(characteristic(*found), expected, rtol=1e-6)
 
 
-def test_inertias_of_the_knee():
+def test_the_xml_has_the_inertias_of_the_knee():
     root = ElementTree.fromstring(mjcf(load_rig("prototype_knee")))
     found = {body.get("name"): floats(body.find("inertial"), "diaginertia")[2] for body in root.iter("body")}
     assert found == pytest.approx({"housing": 0.25, "rotor": 1.2 / 160**2, "chassis": 6.169e-4})
@@ -121,7 +121,7 @@ def test_the_export_knows_no_formula_of_the_train():
         assert not {"train_ratio", "rotor_turns", "spin_inertia"} & set(vars(module))
 
 
-def test_what_mujoco_cannot_hold_is_refused():
+def test_a_rig_that_mujoco_cannot_represent_is_refused():
     with pytest.raises(RigError, match="a rigid spring cannot be exported"):
         mjcf(load_rig("bare_drive"))
     with pytest.raises(RigError, match="lumped train cannot be exported"):

@@ -1,6 +1,6 @@
-"""Fits by a script: what each set of causes leaves of the F/T torque, in place of a simulation.
+"""Scripted fits: the residual of the F/T torque that each set of causes leaves, in place of a simulation.
 
-The search and the elimination see candidates, problems and scores as of real fits; a table says their sizes.
+Search and elimination see candidates, problems and scores as from real fits; a table gives their sizes.
 """
 
 from __future__ import annotations
@@ -48,12 +48,13 @@ def problem(*causes, stated=()):
     rig = RIG.with_effects(*(EffectSetting(n, dict(effect_named(n).typical)) for n in names))
     moved = [f"{n}.{p.name}" for n in causes for p in effect_named(n).parameters]
     unknowns = (unknown("prior", doubt=1.0), *map(unknown, moved))
-    return Problem((), rig, unknowns, ("ft",), stated=frozenset(stated))
+    newest = causes[-1] if causes else ""
+    return Problem((), rig, unknowns, ("ft",), stated=frozenset(stated), newest=newest)
 
 
 @dataclass
 class Script:
-    """What fits come to. ratio: by causes, in any order, of the residual over the noise; prior: its cost.
+    """Results of fits. ratio: residual over noise by causes, in any order; prior: its cost.
 
     log: each fit, as causes, and whether it was quick. cases: of every candidate.
     """

@@ -31,7 +31,7 @@ def score(missed=0.0, spread=0.0, **ratios):
 
 @dataclass(frozen=True)
 class Model:
-    """What the criteria ask of a model."""
+    """The part of a candidate that the criteria use."""
 
     validation: Score
     causes: tuple[str, ...] = ()
@@ -104,7 +104,7 @@ def test_a_candidate_is_refused_for_a_reason(candidate, present, reason):
     assert refusal(candidate, present) == reason
 
 
-def test_of_equals_the_simplest_is_accepted_and_those_as_simple_are_its_rivals():
+def test_of_equal_models_the_simplest_is_accepted_and_those_as_simple_are_its_rivals():
     present = score(ft=20.0)
     simple = model(FRICTION, ft=1.0, prior_cost=3.0)
     likelier = model(GAP, ft=1.0, prior_cost=1.0)
@@ -127,7 +127,7 @@ def test_a_tenth_more_loss_is_equally_good():
     assert not is_equally_good(model(GAP, ft=2.11), model(FRICTION, ft=2.0))
 
 
-def test_priors_decide_from_one_on():
+def test_priors_decide_from_a_difference_of_one():
     other = model(FRICTION, ft=1.0, prior_cost=2.0)
     assert costs_priors_less(model(GAP, ft=1.0, prior_cost=0.9), other)
     assert not costs_priors_less(model(GAP, ft=1.0, prior_cost=1.1), other)

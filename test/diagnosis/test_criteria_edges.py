@@ -1,4 +1,4 @@
-"""The criteria at their edges: scores whose ratios are exact in binary, and limits that they just meet."""
+"""The criteria at their limits: scores whose ratios are exact in binary and lie exactly on a limit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def score(missed=0.0, samples=100.0, **ratios):
 
 @dataclass(frozen=True)
 class Model:
-    """What the criteria ask of a model."""
+    """The part of a candidate that the criteria use."""
 
     validation: Score
     causes: tuple[str, ...] = ()
@@ -69,11 +69,11 @@ A, B, C = "coulomb_friction", "backlash", "hard_stop"
         (score(ft=2.0, missed=0.0), score(ft=2.0, missed=0.0), False),  # none was missed
     ],
 )
-def test_what_just_meets_the_limit_does_not_matter(now, before, matters):
+def test_a_gain_exactly_at_the_limit_does_not_matter(now, before, matters):
     assert preference(now, before, rule=HALF.acceptance).matters is matters
 
 
-def test_better_is_sure_and_matters():
+def test_better_means_sure_and_large_enough_to_matter():
     for now, better in ((1.9, False), (0.9, True), (4.0, False)):
         assert preference(score(ft=now), score(ft=2.0), rule=HALF.acceptance).better is better
 
@@ -99,7 +99,7 @@ def test_models_with_as_many_parameters_pay_nothing():
         (model(A, ft=40.0), model(ft=20.0), "not_sure"),
     ],
 )
-def test_how_much_a_candidate_must_take_away(candidate, present, reason):
+def test_a_candidate_must_take_away_enough(candidate, present, reason):
     assert refusal(candidate, present, RULE) == reason
     assert is_acceptable(candidate, present, RULE) is (reason is None)
 
@@ -111,7 +111,7 @@ def test_a_model_at_the_noise_is_enough_whatever_it_gains():
 
 
 def test_a_cause_pays_for_its_own_parameters_alone():
-    """Of 40 samples it takes a loss of 8: more than one parameter's price, less than that of all."""
+    """It gains a loss of 8 over 40 samples: more than the price of one parameter, less than that of all."""
     now, before = score(samples=1.0, ft=1.2), score(samples=1.0, ft=1.5)
     gained = float((before.loss(before) - now.loss(before)).sum())
     assert 2.0 * 1 < gained < 2.0 * 13
@@ -125,7 +125,7 @@ def test_far_from_the_floor_the_simplest_of_the_nearly_equal_is_accepted():
     assert break_tie([worse, best, nearly], present, RULE) == (nearly, ())
 
 
-def test_of_as_simple_ones_what_a_model_loses_counts_as_much_as_its_prior():
+def test_among_equally_simple_models_loss_and_prior_count_alike():
     best = model(A, ft=1.0, prior_cost=1.5)
     other = model(B, ft=1.000125, prior_cost=1.0)  # loses 1.0 more
     assert break_tie([other, best], score(ft=9.0)) == (best, (other,))
@@ -136,7 +136,7 @@ def test_rivals_of_the_accepted_are_no_larger_than_it():
     assert break_tie([large, small], score(ft=9.0)) == (small, ())
 
 
-def test_what_is_surely_worse_is_no_rival_near_the_floor():
+def test_a_surely_worse_model_is_no_rival_near_the_floor():
     best, worse = model(A, size=3, ft=1.0), model(B, ft=1.5)
     assert break_tie([worse, best], score(ft=9.0)) == (best, ())
 
@@ -151,12 +151,12 @@ def test_what_is_surely_worse_is_no_rival_near_the_floor():
         (model(A, ft=4.0), model(B, size=3, ft=4.0), False),  # near the floor
     ],
 )
-def test_nearly_as_good(simpler, best, nearly):
+def test_a_simpler_model_is_nearly_as_good_within_its_allowance(simpler, best, nearly):
     assert is_nearly_as_good(simpler, best, RULE) is nearly
 
 
 @pytest.mark.parametrize(("ratio", "equal"), [(4.0, True), (4.96875, True), (5.0, False), (40.0, False)])
-def test_equally_good(ratio, equal):
+def test_models_are_equally_good_within_the_allowance(ratio, equal):
     """25/16 of the loss are a quarter more of the residual."""
     assert is_equally_good(model(A, ft=ratio), model(B, ft=4.0), settings(room=0.5625)) is equal
 
@@ -171,7 +171,7 @@ def test_equally_good(ratio, equal):
         (1.5, 0.9999, True),  # and 0.8 less
     ],
 )
-def test_priors_between_equals(prior_cost, ratio, less):
+def test_priors_decide_between_equal_models(prior_cost, ratio, less):
     other = model(A, ft=1.0, prior_cost=2.0)
     assert costs_priors_less(model(B, ft=ratio, prior_cost=prior_cost), other) is less
 
@@ -209,7 +209,7 @@ LOST = Fault("frozen_samples", "ft", 0.1)
         ([BAD, BAD, FINE], [None, "confirmed"], [], "partly_explained"),
     ],
 )
-def test_the_verdict(scores, statuses, faults, verdict):
+def test_the_verdict_follows_from_scores_statuses_and_faults(scores, statuses, faults, verdict):
     assert verdict_of(scores, statuses, faults=faults) == verdict
 
 
@@ -244,5 +244,5 @@ def test_every_channel_must_reach_the_floor(ratios, reached):
         ({"ft": 4.0, "position": 1.0}, {"ft": 1.4, "position": 1.4}, True),  # at its noise before
     ],
 )
-def test_what_takes_most_of_the_residual(before, after, most):
+def test_causes_take_most_where_every_misfit_halves_or_one_large_one_vanishes(before, after, most):
     assert takes_most(score(**before), score(**after), settings(matters=0.0625)) is most

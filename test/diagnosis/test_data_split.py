@@ -1,4 +1,4 @@
-"""The sets of blocks: half the record fits, a quarter chooses, a quarter judges, whatever repeats in it."""
+"""The sets of blocks: half of a record for training, a quarter each for validation and test."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def test_strong_cogging_is_named_with_its_size():
     amplitude, cycles, rng = 4.0, 8.0, np.random.default_rng(2)
     phase = float(rng.uniform(-3.0, 3.0))
     ripple = {"amplitude": amplitude, "cycles_per_revolution": cycles, "phase": phase}
-    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 8.0)
+    record = record_run(hide(drawn_bench(rng), "torque_ripple", ripple), 2001, "chirp_noise", 6.0)
     diagnosis = diagnose([record], load_rig("paper_high_impedance"))
     assert diagnosis.causes[0].name == "torque_ripple"
     sizes = diagnosis.causes[0].parameters

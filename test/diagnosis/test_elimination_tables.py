@@ -1,4 +1,4 @@
-"""Backward elimination as tables: what models leave in, the causes that stay and the reasons out."""
+"""Backward elimination as tables: residuals of models in; remaining causes and reasons out."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_an_only_cause_is_not_taken_out(world):
     assert it.fits.log == [], "and no fit is spent on it"
 
 
-def test_of_three_one_after_the_other_goes(world):
+def test_redundant_causes_go_one_after_the_other(world):
     ratios = {"": 9.0, FRICTION: 1.0, GAP: 9.0, DELAY: 9.0, f"{FRICTION}+{GAP}": 1.0}
     ratios |= {f"{FRICTION}+{DELAY}": 1.0, f"{GAP}+{DELAY}": 9.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
     selection = world(script(ratios)).eliminate(FRICTION, GAP, DELAY)
@@ -107,7 +107,7 @@ def test_far_from_the_floor_fits_are_quick_and_in_units_of_what_is_left(world, r
 
 
 def test_a_cause_pays_for_its_own_parameters_alone(monkeypatch, world):
-    """Of 100 samples friction takes a loss of 5.7; its parameters cost 2 each, all of both models more."""
+    """Friction gains a loss of 5.7 over 100 samples; its parameters cost 2 each, both models' more."""
     monkeypatch.setattr(scripted, "SAMPLES", 2.5)
     it = world(script({f"{FRICTION}+{GAP}": 1.0, GAP: 1.03}))
     both, without = it.fits.candidate(FRICTION, GAP), it.fits.candidate(GAP)
@@ -128,7 +128,7 @@ SIMPLER = {"": 9.0, STRIBECK: 1.0, FRICTION: 1.0, "spring_hysteresis": 4.0}
          [(STRIBECK, "no_better_than_simpler", "spring_hysteresis")]),
     ],
 )  # fmt: skip
-def test_a_simpler_one_that_does_as_well_takes_the_place(world, ratios, left, said):
+def test_a_simpler_effect_that_does_as_well_takes_the_place(world, ratios, left, said):
     it = world(script(ratios), FRICTION, "spring_hysteresis", LUGRE, GAP)
     selection = it.eliminate(STRIBECK)
     assert selection.last.causes == left
@@ -157,7 +157,7 @@ def test_a_rival_that_acts_already_is_not_tried(world):
         (2.0, 0.0, {GAP, DELAY}),  # it does worse
     ],
 )
-def test_one_as_simple_and_likelier_takes_the_place_beside_another_cause(world, ratio, prior, left):
+def test_a_likelier_effect_as_simple_takes_the_place_beside_another_cause(world, ratio, prior, left):
     ratios = {"": 9.0, DELAY: 4.0, LAG: 4.0, GAP: 4.0, f"{DELAY}+{GAP}": 1.0, f"{LAG}+{GAP}": ratio}
     it = world(script(ratios, {f"{DELAY}+{GAP}": 4.0, f"{LAG}+{GAP}": prior}), LAG)
     selection = it.eliminate(DELAY, GAP)
@@ -177,14 +177,14 @@ def test_far_from_the_floor_priors_decide_nothing(world, both):
     assert it.guesses == {}
 
 
-def test_an_only_cause_was_compared_with_its_equals_when_it_was_chosen(world):
+def test_a_single_cause_is_not_compared_with_its_equals_again(world):
     it = world(script({"": 9.0, DELAY: 1.0, LAG: 1.0}, {DELAY: 9.0}), LAG)
     assert it.eliminate(DELAY).last.causes == (DELAY,)
     assert it.guesses == {}
 
 
 def test_a_replacement_is_followed_by_the_next(world):
-    """LuGre's gives way to Stribeck's, which in turn gives way to Coulomb's."""
+    """LuGre friction is replaced by Stribeck's, which is replaced by Coulomb's."""
     ratios = {"": 9.0, LUGRE: 1.0, STRIBECK: 1.0, FRICTION: 1.0}
     selection = world(script(ratios), STRIBECK, FRICTION).eliminate(LUGRE)
     assert reasons(selection) == [
@@ -228,7 +228,7 @@ def test_without_a_cause_the_nominal_model_is_the_only_one(world):
     assert [m.causes for m in nested.models] == [()]
 
 
-def test_effects_that_the_rig_states_come_first_and_are_no_causes(world):
+def test_effects_that_the_rig_states_come_first_and_are_never_causes(world):
     it = world(script({"": 9.0, FRICTION: 6.0, GAP: 5.0, f"{FRICTION}+{GAP}": 1.0}))
     full = it.fits.candidate(FRICTION, GAP, stated=(BIAS, DELAY))
     nested = nested_sequence(Selection((it.fits.candidate(stated=(BIAS, DELAY)), full)), it.models)

@@ -1,4 +1,4 @@
-"""Faults of the data: each kind put into a good record is found in its channel, and only there."""
+"""Faults of the data: each kind put into a good record is found in its channel and in no other."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ def good():
     return record_run(drawn_bench(np.random.default_rng(7)), 8, "chirp_noise", 12.0)
 
 
-def test_a_good_record_has_none(good):
+def test_a_good_record_has_no_faults(good):
     assert check(good, load_rig("paper_high_impedance")).faults == ()
 
 
 @pytest.mark.parametrize("kind", FAULTS)
-def test_a_fault_is_found_and_what_stays_is_whole(good, kind):
+def test_a_fault_is_found_and_the_rest_stays_whole(good, kind):
     checked = check(FAULTS[kind](good, np.random.default_rng(9)), load_rig("paper_high_impedance"))
     assert {f.kind for f in checked.faults} == {kind}
     for channel in checked.record.channels.values():
         assert np.all(np.isfinite(channel.y)) and np.all(np.diff(channel.t) > 0.0)
 
 
-def test_coarse_steps_are_told_and_nothing_is_masked(good):
+def test_coarse_steps_are_reported_and_nothing_is_masked(good):
     ft = good["ft"]
     stepped = good.with_channels(ft=Channel(ft.t, np.round(ft.y / 0.8) * 0.8))
     checked = check(stepped, load_rig("paper_high_impedance"))
@@ -43,7 +43,7 @@ def test_coarse_steps_are_told_and_nothing_is_masked(good):
 
 @pytest.mark.parametrize("name", ["ft", "position", "velocity"])
 @pytest.mark.parametrize("value", [0.0, np.nan])
-def test_a_dead_sensor_is_told_and_the_others_carry_on(good, name, value):
+def test_a_dead_sensor_is_reported_and_the_others_are_used(good, name, value):
     dead = good.with_channels(**{name: Channel(good[name].t, np.full(len(good[name]), value))})
     diagnosis = diagnose([dead], load_rig("paper_high_impedance"))
     assert {f.channel for f in diagnosis.faults} == {name}
@@ -53,7 +53,7 @@ def test_a_dead_sensor_is_told_and_the_others_carry_on(good, name, value):
 
 
 def test_stamps_that_scatter_are_put_on_the_even_clock_and_it_is_said(good):
-    """Such a bench was unexplained."""
+    """The verdict on this bench was `unexplained`."""
     off = np.random.default_rng(10).uniform(-3e-4, 3e-4, (2, len(good["command"])))
     scattered = {n: Channel(c.t + off[0 if n == "ft" else 1], c.y) for n, c in good.channels.items()}
     diagnosis = diagnose([good.with_channels(**scattered)], load_rig("paper_high_impedance"))

@@ -19,7 +19,7 @@ RIG = load_rig("paper_high_impedance")
 
 
 def checked(stiffer=1.0, seed=1):
-    """Return a short record of the rig with a spring so many times as stiff."""
+    """Return a short record of the rig with its stiffness times a factor."""
     bench = RIG.with_values({"spring.stiffness": stiffer * RIG["spring.stiffness"]})
     u = excitation("chirp", Settings(rate=280.0, duration=8.0))
     return check(synthesize(bench, Channel(np.arange(len(u)) / 280.0, u), seed=seed), RIG)
@@ -37,7 +37,7 @@ def test_a_held_out_record_takes_the_place_of_the_test_blocks():
     assert on_blocks.counts["ft"].sum() < 0.3 * alike.counts["ft"].sum()
 
 
-def test_what_was_simulated_on_the_cases_serves_for_their_test_blocks():
+def test_a_simulation_of_the_cases_is_reused_for_their_test_blocks():
     nominal = nominal_problem([checked()], RIG)
     theta = start_vector(nominal.unknowns)
     held_out = HeldOut(nominal.cases, RIG, None, DEFAULT.blocks)

@@ -22,7 +22,8 @@ from rsea_ros.model.prediction import predict
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.signals import Record
 
-DURATION = 14.0
+SECONDS = {34: 8.0, 35: 8.0, 36: 8.0, 37: 8.0, 38: 8.0, 39: 14.0}
+"""Duration of the records of each seed; the gain of a compliant gear varies more in shorter ones."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,11 @@ def conceal(seed: int) -> Concealed:
     parameters = drawn_parameters(effect, str(rng.choice(("medium", "strong"))), rng)
     excitation = str(rng.choice(("chirp_noise", "multisine")))
     bench = hide(drawn_bench(rng), effect, parameters)
-    record, fresh = (record_run(bench, 1000 * seed + k, excitation, DURATION) for k in (1, 2))
+    record, fresh = (record_run(bench, 1000 * seed + k, excitation, SECONDS[seed]) for k in (1, 2))
     return Concealed(record, fresh, effect, parameters[MAIN_PARAMETER[effect]])
 
 
-@pytest.mark.parametrize("seed", range(34, 40))
+@pytest.mark.parametrize("seed", SECONDS)
 def test_the_hidden_effect_is_found_with_its_size_and_its_gain(seed):
     concealed = conceal(seed)
     diagnosis = diagnose([concealed.record], load_rig("paper_high_impedance"))
@@ -65,10 +66,10 @@ def test_the_hidden_effect_is_found_with_its_size_and_its_gain(seed):
 
 
 def test_the_seeds_hide_different_effects():
-    assert len({conceal(seed).effect for seed in range(34, 40)}) == 6
+    assert len({conceal(seed).effect for seed in SECONDS}) == 6
 
 
-def test_what_the_catalogue_lacks_gets_no_name():
+def test_an_effect_outside_the_catalogue_gets_no_name():
     """The hidden effect and all that look like it are not tried: then nothing is named."""
     concealed = conceal(36)
     claims = effect_named(concealed.effect).claims

@@ -35,7 +35,7 @@ def test_guesses_name_all_parameters_and_values_of_the_rig(name, view):
         assert effect.vector({p: guess[p] for p in parameters})
 
 
-def test_what_the_residual_shows_comes_before_the_typical_size(view):
+def test_a_guess_from_the_residual_comes_before_the_typical_size(view):
     """A limit below the largest command, a constant by which the F/T torque is off."""
     limits = [g["limit"] for g in initial_guesses(effect_named("torque_saturation"), view)]
     assert max(limits) <= 1.01 * view.largest_command()

@@ -1,4 +1,4 @@
-"""A joint that positions command: what is wrong with it is found from its log."""
+"""A joint commanded by positions: its causes are found from its log."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def logged(rig: Rig, high: float = 3.0) -> Record:
     return synthesize(rig.with_values(off), Channel(stamps, targets), seed=6)
 
 
-def test_friction_and_a_delay_of_the_targets():
+def test_friction_and_a_delay_of_the_targets_are_named():
     rig = load_rig("pd_joint")
     true = rig.with_effect("coulomb_friction", torque=0.2).with_effect("command_delay", delay=0.015)
     found = diagnose([logged(true)], rig, settings=SETTINGS)
@@ -41,7 +41,7 @@ def test_friction_and_a_delay_of_the_targets():
     assert any("cannot determine the play in the gear" in s for s in remark_sentences(found.remarks))
 
 
-def test_a_joint_that_is_as_its_rig_says_but_for_its_values():
+def test_a_joint_with_other_values_has_no_cause():
     rig = load_rig("pd_joint")
     found = diagnose([logged(rig)], rig, settings=SETTINGS)
     assert (found.verdict, found.causes) == ("nothing_wrong", ())

@@ -1,4 +1,4 @@
-"""A recommended run: what excite plays of it is what was simulated, within the limits of rig and driver."""
+"""A recommended run: excite plays what was simulated, within the limits of rig and driver."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def like(rig, amplitude=20.0):
 
 
 def played(run, rig):
-    """What excite would publish, with its defaults for what the recommendation leaves open."""
+    """Return what excite would publish, with its defaults for options that the recommendation omits."""
     given = {k: v for k, v in _as_excited(run, rig).items() if k not in ("kind", "unit", "peak")}
     values = {p.name: p.default for p in TABLE}
     names = ("rate", "duration", "amplitude", "noise", "low", "high", "period", "seed")
@@ -71,13 +71,13 @@ def test_a_free_end_travels_no_further_than_it_did():
     assert moved(rig, played(run, rig))["position"] <= 1.05 * np.abs(case.measured["position"]).max()
 
 
-def test_what_is_asked_for_within_the_limits_is_what_is_played():
+def test_a_command_within_the_limits_is_played_as_requested():
     rig = load_rig("paper_high_impedance")
     run = allowed_run(rig, like(rig), *EVERY["multisine 0.1-5 Hz"], 20.0)
     assert np.abs(played(run, rig)).max() == pytest.approx(20.0, rel=0.01)
 
 
-def test_a_run_that_cannot_be_made_is_none():
+def test_an_impossible_run_is_not_recommended():
     rig = load_rig("paper_high_impedance")
     uneven = Settings(rate=280.03, duration=12.0, noise=0.0)
     assert allowed_run(rig, like(rig), "multisine", uneven, 20.0) is None

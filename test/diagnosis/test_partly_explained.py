@@ -1,4 +1,4 @@
-"""Where more is wrong than the catalogue knows: what is right is named, what looks alike is not confirmed."""
+"""Where the catalogue lacks one of the laws: a right cause is named, a look-alike is not confirmed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def diagnosed(tried, duration=10.0, **hidden):
 
 
 def test_a_right_cause_is_named_beside_a_law_that_the_catalogue_lacks():
-    """A dead band of the drive leaves half of the residual, and that took the right name away."""
+    """A dead band of the drive leaves half of the residual; the right cause then was not named."""
     tried = ("asymmetric_friction", "command_delay", "nonlinear_spring")
     found = diagnosed(tried, friction_offset=0.8, viscous_difference=1.2, deadband=5.0)
     assert found.verdict == "partly_explained"
@@ -34,7 +34,7 @@ def test_a_right_cause_is_named_beside_a_law_that_the_catalogue_lacks():
 
 
 def test_stribeck_for_coulomb_friction_with_quadratic_drag_is_not_confirmed():
-    """It takes nine tenths of the residual; a spline of the speed still gains beside it."""
+    """It takes nine tenths of the residual; a spline over the speed still gains beside it."""
     found = diagnosed(("stribeck_friction", "coulomb_friction"), coulomb=1.0, quadratic_drag=8.0)
     assert found.verdict != "explained"
     assert "confirmed" not in {c.status for c in found.causes if c.name == "stribeck_friction"}

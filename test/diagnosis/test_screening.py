@@ -1,6 +1,6 @@
-"""An effect that explains the data is not lost before it was fitted, however poor its first guess.
+"""An effect that explains the data is not lost before it is fitted, however poor its first guess.
 
-On the second bench, with the effect alone in the catalogue: what was lost, was lost with no rival about.
+On the second bench, with only this effect in the catalogue: such effects were lost even without rivals.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def steps(rng):
     ],
 )
 def test_a_guess_far_too_large_does_not_lose_the_effect(name, parameters, command):
-    """Two linear steps from a typical size left more than no effect at all, and that was the end of it."""
+    """Two linear steps from a typical size left more residual than no effect, and the effect was dropped."""
     rng = np.random.default_rng(5)
     record = record_command(hide(drawn_bench(rng), name, parameters), command(rng), rng)
     others = tuple(other for other in catalogue() if other != name)

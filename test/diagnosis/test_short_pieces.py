@@ -1,4 +1,4 @@
-"""Short pieces of a record: a model that is right leaves nothing but noise in any of them."""
+"""Short pieces of a record: the right model leaves only noise in each of them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def with_stated_noise(case, rig):
 
 @pytest.mark.parametrize("kind", ["multisine", "white_noise", "chirp"])
 def test_the_right_model_leaves_only_noise_in_every_piece(kind):
-    """A piece begins at the state that was measured, and what it runs up with does not count."""
+    """A piece begins at the measured state, and its run-up is not compared."""
     rig = load_rig("paper_high_impedance")
     command = excitation(kind, Settings(rate=RATE, duration=60.0, seed=3, amplitude=40.0))
     record = synthesize(rig, Channel(np.arange(len(command)) / RATE, command), seed=3)
@@ -47,7 +47,7 @@ def test_the_right_model_leaves_only_noise_in_every_piece(kind):
 @pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
 @pytest.mark.parametrize("rate", [250.0, 280.0, 500.0, 1000.0])
 def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_too(rate, jitter):
-    """Pieces that began within a hold gave the motor torque a whole command change: 2.5e7 for 2.5e4."""
+    """Pieces that began within a hold had a motor torque off by a change of the command: 2.5e7 for 2.5e4."""
     rig = load_rig("paper_high_impedance")
     command = excitation("white_noise", Settings(rate=rate, duration=32.0, seed=5))
     stamps = np.arange(len(command)) / rate
@@ -66,8 +66,8 @@ def test_the_true_model_costs_one_for_each_sample_of_its_pieces_on_longer_steps_
 
 @pytest.mark.parametrize("jitter", [0.0, 0.1], ids=["on_the_grid", "jittered"])
 @pytest.mark.parametrize(("times", "kept"), [(0.2, 0.2), (1.0, 1.0), (1.5, 1.5), (2.0, 1.0), (4.0, 1.0)])
-def test_pieces_hold_a_channel_no_more_than_about_as_often_as_commands(times, kept, jitter):
-    """Joint states at four times the rate of the commands took twice as long and told no more."""
+def test_pieces_sample_a_channel_about_as_often_as_commands_at_most(times, kept, jitter):
+    """Joint states at four times the rate of the commands took twice as long and added no information."""
     rig = load_rig("paper_high_impedance")
     t = np.arange(round(40.0 * RATE)) / RATE
     command = Channel(t, excitation("white_noise", Settings(rate=RATE, duration=40.0, seed=5)))

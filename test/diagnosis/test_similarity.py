@@ -1,4 +1,4 @@
-"""What a diagnosis finds does not depend on how strong a machine is: bounds and starts go with its size.
+"""A diagnosis does not depend on how strong a machine is: bounds and starts scale with its size.
 
 Scales are powers of 4, so that a machine 4^n times as strong gives the same to rounding;
 `python bench/similarity.py` diagnoses every effect at other factors.
@@ -35,7 +35,7 @@ SHOWN = ("torque_saturation", "coulomb_friction", "lugre_friction", "spring_hyst
 
 @functools.cache
 def screened(name: str, times: float):
-    """Return what screening makes of an effect on a machine with so many times the torque."""
+    """Return the screening of an effect on a machine with the torque scaled by a factor."""
     record, rig = record_with(RIG, effect_named(name), times, duration=5.0), similar(RIG, times)
     case = case_from(record, rig)
     present = solve(Problem((case,), rig, unknowns_of(rig, (case,)), MEASURED), iterations=3)

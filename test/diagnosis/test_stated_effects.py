@@ -33,7 +33,7 @@ def recorded(*effects):
 
 
 def test_a_known_effect_acts_and_is_no_cause():
-    """It came out as a cause without parameters, and the report ended in StopIteration."""
+    """It was reported as a cause without parameters, and the report raised StopIteration."""
     rig = RIG.with_effects(FRICTION)
     rig = replace(rig, known=rig.known | {f"coulomb_friction.{p}" for p in FRICTION.parameters})
     diagnosis = diagnose([recorded(FRICTION, GAP)], rig, settings=FEW)
@@ -45,7 +45,7 @@ def test_a_known_effect_acts_and_is_no_cause():
 
 
 def test_a_stated_effect_is_fitted_with_the_rig_and_not_dropped():
-    """It was taken out of the rig without a word and found again as a cause."""
+    """It was silently removed from the rig and found again as a cause."""
     guess = replace(FRICTION, parameters={**FRICTION.parameters, "torque": 2.0})
     diagnosis = diagnose([recorded(FRICTION)], RIG.with_effects(guess), settings=FEW)
     assert (diagnosis.verdict, diagnosis.causes) == ("nothing_wrong", ())
@@ -59,7 +59,7 @@ def test_a_record_too_short_for_the_blocks_is_refused_by_the_function_itself():
 
 
 def test_an_accepted_effect_that_is_no_cause_is_listed_as_rejected(monkeypatch):
-    """With the verdict `unexplained` it was in neither list."""
+    """With the verdict `unexplained` it was neither a cause nor rejected."""
     monkeypatch.setattr(outcome, "naming_of", lambda *_: {})
     diagnosis = diagnose([recorded(GAP)], RIG, settings=FEW)
     assert (diagnosis.verdict, diagnosis.causes) == ("unexplained", ())

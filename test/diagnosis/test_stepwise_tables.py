@@ -1,4 +1,4 @@
-"""Stepwise selection as tables: the steps of a search, where it ends, what a replacement must bring."""
+"""Stepwise selection as tables: the steps of a search, where it ends, the gain that a replacement needs."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class Step:
 
 
 class World:
-    """Stepwise selection on scripted fits and steps. told: what became of each model after its fit."""
+    """Stepwise selection on scripted fits and steps. events: what happened to each model after its fit."""
 
     now: World
 
     def __init__(self, monkeypatch, fits, steps):
         World.now = self
-        self.fits, self.steps, self.runs, self.told = fits, steps, [], []
+        self.fits, self.steps, self.runs, self.events = fits, steps, [], []
         self.theta = np.zeros(1)
         for name, stand_in in {
             "fit_candidate": fits.fit,
@@ -67,15 +67,15 @@ class World:
 
     def refit(self, model, setup):
         assert setup.cases == self.nominal.cases and setup.iterations is None
-        self.told.append(("refit", model.causes))
+        self.events.append(("refit", model.causes))
         return model
 
     def requieted(self, model):
-        self.told.append(("noise", model.causes))
+        self.events.append(("noise", model.causes))
         return model
 
     def scored(self, model, cases):
-        self.told.append(("scored", model.causes))
+        self.events.append(("scored", model.causes))
         assert cases == self.fits.cases
         return replace(model, outputs=[{"scored": True}])
 
@@ -125,7 +125,7 @@ def test_each_step_begins_with_the_last_model_and_says_its_number(world):
 
 
 @pytest.mark.parametrize("most", [1, 2])
-def test_as_many_causes_as_may_be(world, most):
+def test_no_more_causes_are_accepted_than_max_causes(world, most):
     ratios = {**BOTH, f"{FRICTION}+{GAP}": 3.0, f"{FRICTION}+{GAP}+{DELAY}": 1.0}
     it = world(script(ratios), {**ALONG, (FRICTION, GAP): (FRICTION, GAP, DELAY)})
     assert causes(it.select(settings(max_causes=most))) == [(), (FRICTION,), (FRICTION, GAP)][: most + 1]
@@ -133,7 +133,7 @@ def test_as_many_causes_as_may_be(world, most):
 
 
 @pytest.mark.parametrize(("replacements", "last"), [(0, (FRICTION,)), (1, (STRIBECK,)), (2, (LUGRE,))])
-def test_as_many_replacements_as_may_be(world, monkeypatch, replacements, last):
+def test_no_more_replacements_are_made_than_allowed(world, monkeypatch, replacements, last):
     it = world(script({"": 90.0, FRICTION: 60.0, STRIBECK: 30.0, LUGRE: 10.0, LAG: 50.0}), {(): (FRICTION,)})
     following = {(FRICTION,): (STRIBECK,), (STRIBECK,): (LUGRE,), (LUGRE,): (FRICTION,)}
 
@@ -146,7 +146,7 @@ def test_as_many_replacements_as_may_be(world, monkeypatch, replacements, last):
     assert selection.last.causes == last
 
 
-def test_what_was_tried_and_what_does_as_well_is_kept(world):
+def test_trials_and_equal_models_are_kept(world):
     selection = world(script(BOTH), ALONG).select()
     assert [(t.name, t.beside.causes, t.reason) for t in selection.trials] == [
         ("dead_zone", (), "not_sure"),
@@ -164,12 +164,12 @@ def test_every_model_is_fitted_again_in_its_noise_and_all_are_scored_in_that_of_
     it = world(script(BOTH), ALONG)
     selection = it.select()
     each = [(what, c) for c in ((), (FRICTION,), (FRICTION, GAP)) for what in ("noise", "refit")]
-    assert it.told == [*each, ("scored", ()), ("scored", (FRICTION,))]
+    assert it.events == [*each, ("scored", ()), ("scored", (FRICTION,))]
     assert [m.outputs for m in selection.models] == [[{"scored": True}]] * 2 + [[{}]]
 
 
 @pytest.mark.parametrize("start", [None, RIG])
-def test_the_first_fit_goes_further_and_begins_where_it_is_said(world, start):
+def test_the_first_fit_has_more_iterations_and_begins_at_the_given_values(world, start):
     it = world(script({"": 1.0}))
     it.select(start=start)
     ((setup, theta),) = it.fits.setups
@@ -193,7 +193,7 @@ def replacing(it, *present, effects=OTHERS):
         (4.9, 1.0, None),  # near the floor nothing is replaced
     ],
 )
-def test_a_more_detailed_effect_takes_a_place_where_it_brings_enough(world, before, after, expected):
+def test_a_more_detailed_effect_replaces_a_cause_where_it_gains_enough(world, before, after, expected):
     it = world(script({"": 40.0, FRICTION: before, STRIBECK: after, LAG: 9.0}), {(): (STRIBECK,)})
     assert replacing(it, FRICTION) == expected
     tried = [(7, (), (STRIBECK, LUGRE))] if before >= 5.0 else []
@@ -203,7 +203,7 @@ def test_a_more_detailed_effect_takes_a_place_where_it_brings_enough(world, befo
         assert setup.weights.ratio("ft") == before and setup.cases == it.fits.cases
 
 
-def test_a_place_is_offered_to_nothing_as_simple_and_to_nothing_that_acts(world):
+def test_a_place_is_offered_only_to_more_detailed_effects_that_are_not_in_the_model(world):
     it = world(script({f"{STRIBECK}+{LUGRE}": 20.0, DELAY: 20.0}))
     assert replacing(it, STRIBECK, LUGRE) is None
     assert replacing(it, DELAY, effects=[effect_named(LAG)]) is None
@@ -211,8 +211,8 @@ def test_a_place_is_offered_to_nothing_as_simple_and_to_nothing_that_acts(world)
 
 
 @pytest.mark.parametrize("first", [None, (STRIBECK, GAP)])
-def test_where_one_place_brings_nothing_the_next_is_offered(world, first):
-    """Delay has no rival here; Stribeck's in friction's place brings too little or nothing; a stop helps."""
+def test_the_next_place_is_tried_where_one_brings_nothing(world, first):
+    """Delay has no rival here; Stribeck friction in place of friction gains too little; a stop helps."""
     ratios = {"": 99.0, f"{DELAY}+{FRICTION}+{GAP}": 20.0, f"{DELAY}+{FRICTION}": 50.0, LAG: 9.0}
     ratios |= {f"{DELAY}+{GAP}": 50.0, f"{STRIBECK}+{GAP}": 19.0, f"{DELAY}+{FRICTION}+{STOP}": 9.0}
     steps = {(DELAY, GAP): first, (DELAY, FRICTION): (DELAY, FRICTION, STOP)}

@@ -1,4 +1,4 @@
-"""What known values count against data whose errors are no noise."""
+"""The weight of known values against data whose errors are not noise."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def score(ratio, waves=0.0):
 
 @dataclass(frozen=True)
 class Model:
-    """What the criteria ask of a model."""
+    """The part of a candidate that the criteria use."""
 
     validation: Score
     prior_cost: float = 0.0
@@ -36,14 +36,14 @@ class Model:
 NOMINAL = Model(score(25.0), 10.0, (), 6, 0)
 
 
-def test_what_a_right_model_gains_on_white_noise_counts_in_full():
+def test_a_right_models_gain_on_white_noise_counts_in_full():
     rng = np.random.default_rng(1)
     noise, missed = rng.normal(size=(400, 100)), 0.3
     gained = np.sum((noise + missed) ** 2 - noise**2, axis=1)
     assert temper(gained) == pytest.approx(1.0, abs=0.2)
 
 
-def test_what_some_blocks_gain_and_others_lose_counts_for_less():
+def test_a_gain_that_only_some_blocks_share_counts_for_less():
     gained = np.resize([110.0, -90.0], BLOCKS)
     assert temper(gained) < 0.02
     assert temper(np.full(BLOCKS, 10.0)) == 1.0
@@ -76,12 +76,12 @@ def test_a_cause_that_gains_less_than_known_values_lose_is_refused():
     ("spread", "value", "sigmas"),
     [(1.0, 2.0, 1.0), (1.0, 4.0, 2.0), (1.0, 16.0, 4.0), (2.0, 9.0, 2.0), (1.0, 0.5, 0.5), (1.0, 0.0, 1.0)],
 )
-def test_a_wide_doubt_is_one_of_the_order_of_magnitude(spread, value, sigmas):
+def test_a_wide_doubt_concerns_the_order_of_magnitude(spread, value, sigmas):
     damping = Unknown("spring.damping", 1.0, "N m s/rad", 0.0, np.inf, False, spread, 1.0)
     assert damping.sigmas(value) == pytest.approx(sigmas)
 
 
-def test_a_narrow_doubt_and_none_count_as_they_are():
+def test_a_narrow_doubt_counts_as_stated():
     stiffness = Unknown("spring.stiffness", 2155.0, "N m/rad", 0.2, 2e7, True, 0.1, 1.0)
     assert stiffness.sigmas(np.log(2764.0)) == pytest.approx(2.49, abs=0.01)
     assert Unknown("backlash.gap", 0.01, "rad", 0.0, 1.0, False, np.inf, 0.01).sigmas(0.5) == 0.0

@@ -1,4 +1,4 @@
-"""Two effects at once: the second shows only beside the first, or changes what the first is called."""
+"""Two effects at once: the second shows only beside the first, or changes the name of the first."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rsea_ros.model.rig_file import load_rig
     ("pair", "severity", "excitation", "seed", "duration", "gave_way"),
     [
         # the ripple is in what the lag does not explain
-        (("current_loop_lag", "torque_ripple"), "medium", "multisine", 2, 10.0, ()),
+        (("current_loop_lag", "torque_ripple"), "medium", "multisine", 2, 7.0, ()),
         # without the base a wrong gain of the sensor is likelier
-        (("base_compliance", "torque_constant_error"), "medium", "multisine", 3, 8.0, ()),
+        (("base_compliance", "torque_constant_error"), "medium", "multisine", 3, 6.0, ()),
         (("hard_stop", "stribeck_friction"), "strong", "chirp_noise", 1, 8.0, ("coulomb_friction",)),
     ],
 )

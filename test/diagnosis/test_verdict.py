@@ -1,4 +1,4 @@
-"""A verdict never contradicts the number that it comes with."""
+"""A verdict never contradicts the number beside it."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ NEAR = st.fixed_dictionaries({n: st.floats(0.9, 1.3) for n in ("ft", "position",
 
 
 def scored(ratios):
-    """Return the score of residuals that are so many times the noise."""
+    """Return the score of residuals with these ratios to the noise."""
     sums = {n: np.full(4, 100.0 * r**2) for n, r in ratios.items()}
     return Score(sums, {n: np.full(4, 100.0) for n in ratios})
 
 
 @given(RATIOS | NEAR)
-def test_nothing_is_wrong_exactly_when_every_residual_is_the_noise(ratios):
+def test_nothing_is_wrong_exactly_when_every_residual_is_noise(ratios):
     score = scored(ratios)
     at_noise = all(score.ratio(n) <= FLOOR for n in ratios)
     assert verdict_of([score]) == ("nothing_wrong" if at_noise else "unexplained")

@@ -1,4 +1,4 @@
-"""Makes `effect_bench` and `independent`, which are no tests, importable for the tests of the effects."""
+"""Make `effect_bench` and `independent`, which are no tests, importable for the tests of the effects."""
 
 import sys
 from pathlib import Path

@@ -51,7 +51,7 @@ def simulate(driven: Drive, name: str = "", parameters: Mapping[str, float] | No
 
 
 def difference(a: Mapping[str, np.ndarray], b: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a - b of the three sensors of the mechanics in units of their noise, shape (3 n,)."""
+    """Return a - b of position, velocity and ft in units of their noise, shape (3 n,)."""
     return np.concatenate([(a[n] - b[n]) / NOISE[n] for n in SIGNALS])
 
 

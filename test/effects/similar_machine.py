@@ -1,6 +1,6 @@
-"""A machine that is similar to another: its torques, stiffnesses and inertias are some times as large.
+"""A machine similar to another: its torques, stiffnesses and inertias are scaled by one factor.
 
-Angles and times stay, so it moves alike, and all that is said of it is the same in units of its torques.
+Angles and times stay, so it moves alike, and its diagnosis is the same in units of its torques.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ _TORQUES = {"N m": 1, "N m/rad": 1, "N m s/rad": 1, "N m s^2/rad^2": 1, "kg m^2"
 
 
 def factor(unit: str, times: float) -> float:
-    """Return by how much a number of a unit is larger on a machine with so many times the torque."""
+    """Return the factor by which a number of a unit grows on a machine with the torque scaled."""
     return float(times ** _TORQUES.get(unit, 0))
 
 
 def similar(rig: Rig, times: float) -> Rig:
-    """Return a rig with so many times the torque, its sensors' noise included."""
+    """Return a rig with the torque scaled, its sensors' noise included."""
     values = {n: v * factor(rig.unit(n), times) for n, v in rig.values().items()}
     sensors = {
         n: replace(s, noise=s.noise * times, quantum=s.quantum * times) if n in ("ft", "motor_torque") else s
@@ -35,7 +35,7 @@ def similar(rig: Rig, times: float) -> Rig:
 
 
 def similar_parameters(effect: Effect, parameters: Mapping[str, float], times: float) -> dict[str, float]:
-    """Return parameters of an effect on a machine with so many times the torque."""
+    """Return the parameters of an effect on a machine with the torque scaled."""
     return {p.name: parameters[p.name] * factor(p.unit, times) for p in effect.parameters}
 
 

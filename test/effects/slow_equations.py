@@ -1,6 +1,6 @@
-"""Every effect a second time: its equations of motion as one would write them down, solved by scipy.
+"""A second implementation of every effect: its equations of motion as written on paper, solved by scipy.
 
-Nothing of `rsea_ros.model` or of the effects' functions is used. Each law gets (t, x, u, p), with
+It uses nothing of `rsea_ros.model` and none of the effects' functions. Each law gets (t, x, u, p), with
 x = (angle, speed, …) and the command u held, and returns (x', torque that the F/T sensor sees), and the angle
 and speed that the encoder reads where they are not the first two of x.
 """

@@ -1,4 +1,4 @@
-"""What every effect of the catalogue is held to, and how a new one gets in."""
+"""The contract of every effect of the catalogue, and how a new one is added."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ every_rig = pytest.mark.parametrize(
 )
 
 
-def test_every_effect_of_the_contract_is_there():
+def test_every_effect_of_the_contract_is_in_the_catalogue():
     assert set(CONTRACT) <= set(catalogue())
 
 
@@ -66,7 +66,7 @@ def test_parameters_are_those_of_the_contract(name):
 
 
 @every_effect
-def test_null_equals_nominal_to_the_last_bit(effect: Effect):
+def test_the_null_effect_equals_the_nominal_model_to_the_last_bit(effect: Effect):
     driven = drive(duration=2.0)
     nominal, extended = simulate(driven), simulate(driven, effect.name, effect.null)
     for channel, values in nominal.items():
@@ -93,7 +93,7 @@ def test_the_step_is_short_enough(effect: Effect):
 
 @every_rig
 @every_effect
-def test_finite_over_the_whole_bounds(effect: Effect, rig: str):
+def test_the_simulation_is_finite_over_the_whole_bounds(effect: Effect, rig: str):
     driven, bench = drive(duration=1.0), load_rig(rig)
     if effect.name == "base_compliance" and "spring_end" not in bench.clamped:
         with pytest.raises(ParameterError, match="spring_end is free, expected clamped"):
@@ -106,14 +106,14 @@ def test_finite_over_the_whole_bounds(effect: Effect, rig: str):
 
 
 @every_effect
-def test_finite_beside_a_soft_gear(effect: Effect):
+def test_the_simulation_is_finite_beside_a_soft_gear(effect: Effect):
     soft = RIG.with_values({"gear.stiffness": 1e4})
     for values in simulate(drive(duration=1.0), effect.name, effect.typical, soft).values():
         assert np.abs(values).max() < 100.0
 
 
 @every_effect
-def test_described_for_people_and_fits(effect: Effect):
+def test_every_effect_is_described_for_people_and_for_fits(effect: Effect):
     assert effect.about and len(effect.about) < 80
     assert all(p.name in effect.equation for p in effect.parameters), effect.equation
     for p in effect.parameters:
@@ -124,7 +124,7 @@ def test_described_for_people_and_fits(effect: Effect):
 
 
 @every_effect
-def test_it_names_its_source(effect: Effect):
+def test_every_effect_names_its_source(effect: Effect):
     assert "Source:" in EffectPage(effect).description
 
 
@@ -195,7 +195,7 @@ def test_a_file_that_fails_is_a_fault_of_that_file(tmp_path: Path, monkeypatch, 
         catalogue()
 
 
-def test_measured_current_shows_what_is_done_to_the_command_only():
+def test_the_measured_current_shows_only_what_is_done_to_the_command():
     driven = drive(duration=1.0)
     nominal = simulate(driven)["motor_torque"]
     shown = {e.name for e in ON_THE_BENCH
@@ -203,7 +203,7 @@ def test_measured_current_shows_what_is_done_to_the_command_only():
     assert shown == {e.name for e in catalogue().values() if e.port == Port.COMMAND}
 
 
-def test_longest_delay_is_whole_at_a_short_step():
+def test_the_longest_delay_is_kept_at_a_short_step():
     commanded = command(rate=280.0, duration=1.0)
     late = replace(commanded, t=commanded.t + 17 / 280.0)
     shifted = simulate(drive_from(record_of(commanded)))["position"][:-17]

@@ -1,4 +1,4 @@
-"""What the effects say about themselves, held against the simulation."""
+"""The properties that the effects claim, checked against the simulation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def change(effect: Effect, driven: Drive) -> np.ndarray:
 
 
 @every_effect
-def test_it_shows_most_in_its_channel(effect: Effect):
+def test_an_effect_shows_most_in_its_stated_channel(effect: Effect):
     driven = drive(duration=10.0)
     nominal, extended = simulate(driven), simulate(driven, effect.name, effect.typical)
     shows = {n: rms(extended[n] - nominal[n]) / noise for n, noise in NOISE.items()}
@@ -33,7 +33,7 @@ def test_it_shows_most_in_its_channel(effect: Effect):
 
 
 @every_effect
-def test_parity(effect: Effect):
+def test_an_effect_has_its_stated_parity(effect: Effect):
     forward, backward = (change(effect, drive(amplitude=a)) for a in (20.0, -20.0))
     odd, even = rms(forward - backward) / 2, rms(forward + backward) / 2
     share = even / (odd + even)
@@ -42,7 +42,7 @@ def test_parity(effect: Effect):
 
 
 @every_effect
-def test_growth_with_the_amplitude(effect: Effect):
+def test_an_effect_grows_with_the_amplitude_as_stated(effect: Effect):
     sizes = [rms(change(effect, drive(amplitude=a))) for a in (6.0, 12.0, 24.0)]
     exponents = np.diff(np.log2(np.maximum(sizes, 1e-6)))
     if effect.claims.amplitude_exponent is None:

@@ -18,7 +18,7 @@ def test_every_effect_has_an_independent_equation():
     assert set(slow_equations.LAWS) == {e.name for e in ON_THE_BENCH}
 
 
-def test_the_two_benches_are_the_same():
+def test_both_implementations_agree_without_effects():
     ours = (RIG["rotor.reflected_inertia"], RIG["chassis.inertia"], RIG["rotor.reflected_damping"],
             RIG["spring.stiffness"], RIG["spring.damping"], RIG["gear.ratio"])  # fmt: skip
     theirs = (slow_equations.J_M, slow_equations.J_SC, slow_equations.B_M,
@@ -27,7 +27,7 @@ def test_the_two_benches_are_the_same():
 
 
 @pytest.mark.parametrize("effect", ON_THE_BENCH, ids=lambda e: e.name)
-def test_simulation_obeys_the_equation(effect: Effect):
+def test_the_simulation_obeys_the_equation_of_every_effect(effect: Effect):
     commanded = command(rate=280.0, duration=slow_equations.DURATION)
     simulated = simulate(drive_from(record_of(commanded)), effect.name, effect.typical)
     nominal = simulate(drive_from(record_of(commanded)))

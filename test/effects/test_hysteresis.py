@@ -24,7 +24,7 @@ def beta_of(gamma: float) -> float:
 
 @pytest.mark.parametrize("gamma", GAMMAS)
 @pytest.mark.parametrize("z", [-0.9, -0.2, 0.0, 0.7])
-def test_a_way_in_one_direction_is_exact(gamma: float, z: float):
+def test_motion_in_one_direction_is_exact(gamma: float, z: float):
     beta, way = beta_of(gamma), 1.7
 
     def law(u, y):
@@ -58,7 +58,7 @@ def test_the_simulation_obeys_the_law(gamma: float, monkeypatch: pytest.MonkeyPa
         assert rms(simulated[name] - true[name]) < TOLERANCE[name], name
 
 
-def test_dahl_is_what_it_is_without_the_shape():
+def test_the_law_without_a_shape_parameter_is_dahls():
     driven = drive_from(record_of(command(280.0, 2.0)))
     short, full = (
         simulate(driven, "spring_hysteresis", {"torque": 1.0, "angle": 2e-3, **more})

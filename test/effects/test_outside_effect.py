@@ -119,14 +119,14 @@ def with_paddle():
     return RIG.with_effects(EffectSetting("paddle", SIZE))
 
 
-def test_it_is_simulated_and_identified(record):
+def test_an_outside_effect_is_simulated_and_identified(record):
     guessed = RIG.with_effects(EffectSetting("paddle", {**SIZE, "coefficient": 3.0}))
     identified = identify([record], guessed)
     sizes = {p.name: p.value for p in identified.parameters}
     assert sizes["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
 
 
-def test_a_diagnosis_names_it(record):
+def test_a_diagnosis_names_an_outside_effect(record):
     tried = ("paddle", "coulomb_friction", "damping_drift")
     settings = DiagnosisSettings(max_causes=1, without=tuple(n for n in catalogue() if n not in tried))
     diagnosis = diagnose([record], RIG, settings=settings)
@@ -135,12 +135,12 @@ def test_a_diagnosis_names_it(record):
     assert part_of(effect_named("paddle")) == "support"
 
 
-def test_a_law_is_looked_for_beside_it(record):
+def test_a_law_is_searched_beside_an_outside_effect(record):
     base = fitted_base([record], with_paddle())
     assert base.solution.values["paddle.coefficient"] == pytest.approx(8.0, rel=0.1)
 
 
-def test_its_page_and_its_line_in_the_catalogue(capsys):
+def test_an_outside_effect_has_a_page_and_a_line_in_the_catalogue(capsys):
     assert "a paddle in oil" in repr(effects) and "of the paddle" in effects["paddle"]._repr_html_()
     assert main(["effects", "paddle"]) == 0
     shown = capsys.readouterr().out
@@ -148,13 +148,13 @@ def test_its_page_and_its_line_in_the_catalogue(capsys):
 
 
 @pytest.mark.parametrize("export", [export_mjcf, export_urdf, export_bam], ids=lambda e: e.__name__)
-def test_an_export_says_that_it_leaves_it_out(export):
+def test_an_export_says_that_it_leaves_an_outside_effect_out(export):
     rig = load_rig("pendulum" if export is export_bam else "paper_moving_output")
     exported = export(rig.with_effects(EffectSetting("paddle", SIZE)))
     assert "paddle" in {unsaid.name for unsaid in exported.unsaid}
 
 
-def test_the_controller_compensates_it_by_the_law_of_the_step():
+def test_the_controller_compensates_an_outside_effect_by_the_law_of_the_step():
     mean = 8.0 * np.mean(np.sqrt(np.linspace(0.19, 0.21, 20001)))
     assert compensation(with_paddle()).friction(0.19, 0.21) == pytest.approx(mean, rel=1e-3)
     assert compensation(with_paddle(), ()).friction(0.19, 0.21) == 0.0
@@ -165,7 +165,7 @@ def test_play_of_another_name_is_crossed_by_the_controller():
     assert gap == 3e-3
 
 
-def test_a_joint_is_told_of_play_of_another_name_that_its_data_do_not_show():
+def test_a_joint_reports_play_of_another_name_that_its_data_do_not_show():
     (gap,) = unknowns_of_effect(effect_named("worn_key"), {"gap": 2e-3})
     problem = SimpleNamespace(unknowns=(gap,))
     trial = SimpleNamespace(name="worn_key", problem=problem, theta=start_vector((gap,)))
@@ -175,7 +175,7 @@ def test_a_joint_is_told_of_play_of_another_name_that_its_data_do_not_show():
     assert remark.code == "play_undetermined" and remark.values == pytest.approx((2e-3, 0.004))
 
 
-def test_a_delay_of_another_name_is_a_delay():
+def test_a_delay_of_another_name_is_treated_as_a_delay():
     rig = RIG.with_effects(EffectSetting("late_bus", {"delay": 4e-3}))
     assert without_delay(rig) == (RIG.with_effects(), 4e-3)
     hz, plant = np.array([10.0]), sampled(RIG, 280.0)

@@ -13,11 +13,11 @@ REFERENCE = (TORQUE, STIFFNESS, INERTIA, SPEED, PERIOD)
 
 
 @pytest.mark.parametrize("ratio", [0.51, 1.0, 1.99])
-def test_within_a_factor_of_two_the_catalogue_stands(ratio: float):
+def test_within_a_factor_of_two_the_bounds_are_those_of_the_catalogue(ratio: float):
     assert scale_to(*(ratio * v for v in REFERENCE)) == Scale()
 
 
-def test_what_is_not_known_counts_as_the_catalogues():
+def test_an_unknown_size_of_the_machine_counts_as_that_of_the_catalogue():
     assert scale_to(0.0, math.inf, math.nan, -1.0, 0.0) == Scale()
 
 
@@ -35,7 +35,7 @@ def test_a_servo_may_have_a_saturation_and_no_friction_of_a_big_machine():
     [("N m", 4.0), ("N m/rad", 16.0), ("kg m^2", 64.0), ("rad", 0.25), ("1/rad^2", 16.0), ("rad/s", 2.0),
      ("N m s/rad", 2.0), ("N m s^2/rad^2", 1.0), ("1/(N m)", 0.25), ("Hz", 4.0), ("1", 1.0), ("V", 1.0)],
 )  # fmt: skip
-def test_a_number_goes_with_its_unit(unit: str, expected: float):
+def test_a_number_scales_with_its_unit(unit: str, expected: float):
     assert Scale(4.0, 16.0, 64.0, 2.0, 0.25).factor(unit) == expected
 
 
@@ -49,13 +49,13 @@ def test_lags_keep_their_size_and_their_bounds_only_widen():
         assert lag.low <= 1e-5 and lag.high >= 0.1 and lag.starts == (1e-3, 0.01)
 
 
-def test_angles_that_no_machine_changes_stand():
+def test_angles_that_do_not_depend_on_the_machine_keep_their_bounds():
     large = Scale(4.0**6, 1.0)
     assert effect_named("backlash").at(large) == effect_named("backlash")
     assert effect_named("torque_ripple").at(large).parameters[2].high == 2.0 * math.pi
 
 
-def test_bounds_hold_what_a_rig_states():
+def test_bounds_include_what_a_rig_states():
     friction = effect_named("coulomb_friction").at(Scale(4.0**-3))
     assert friction.main.high < 1.0
     assert friction.reaching({"torque": 3.0}).main.high == 3.0

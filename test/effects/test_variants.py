@@ -1,4 +1,4 @@
-"""What the typical sizes leave out of an equation, against the general integrator: optional parameters."""
+"""Optional parameters, which are zero at the typical sizes, against the general integrator."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MASS, DAMPING, HEAVY = 0.5, 0.4, 6.0
 
 
 def settling(t, p):
-    """Return how far a drift has come at t."""
+    """Return the part of a drift that is reached at t."""
     return math.expm1(-t / p["time_constant"]) / math.expm1(-DURATION / p["time_constant"])
 
 

@@ -1,4 +1,4 @@
-"""The loop finds a hidden cause by runs, and learns nothing from one that broke."""
+"""The loop finds a hidden cause by designed runs, and learns nothing from a run that broke off."""
 
 import json
 
@@ -25,26 +25,26 @@ BENCH = hide(Bench(), "current_loop_lag", {"time_constant": 3e-3})
 
 @pytest.fixture(scope="module")
 def log():
-    """A few seconds of slow work, which show no cause."""
+    """Return a few seconds of slow work, which show no cause."""
     t = np.arange(4 * 280) / 280.0
     return record_command(BENCH, 0.3 * np.sin(2.0 * np.pi * 0.25 * t), np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")
 def known(log):
-    """What the slow work says."""
+    """Return the evidence of the slow work."""
     return weigh([log], RIG, CAUSES)
 
 
 @pytest.fixture(scope="module")
 def proposal(known):
-    """The run that is designed first."""
+    """Return the first designed run."""
     return propose(known.hypotheses(), ASKED, known.cases[0].noise)
 
 
 @pytest.fixture
 def campaign(proposal):
-    """A function that makes a loop; every run that it proposes is the first one."""
+    """Return a function that makes a loop in which every proposed run is the first one."""
 
     def make(play, **more):
         return Campaign(RIG, CAUSES, ASKED, play, choose=lambda *_: proposal, **more)
@@ -52,7 +52,7 @@ def campaign(proposal):
     return make
 
 
-def test_what_the_log_could_not_show_stays_as_likely_as_no_cause(known):
+def test_a_cause_that_the_log_could_not_show_stays_as_likely_as_none(known):
     assert known.probability["hard_stop"] == pytest.approx(known.probability["nothing"], rel=0.1)
     assert min(known.probability.values()) > 0.05
 

@@ -1,4 +1,4 @@
-"""A designed run separates what a fixed one separates slowly, and keeps its limits whatever the bench is."""
+"""A designed run separates causes faster than a fixed one, and keeps its limits on every bench."""
 
 from dataclasses import replace
 
@@ -36,13 +36,13 @@ def possible(**causes):
 
 @pytest.fixture(scope="module")
 def friction_or_play():
-    """What slow work leaves open, and the run designed for it."""
+    """Return the causes that slow work leaves open, and the run designed for them."""
     pair = possible(coulomb_friction={"torque": 0.3}, backlash={"gap": 4e-4})
     return pair, propose(pair, ASKED)
 
 
 def left_of_rival(command, rival, seed):
-    """Return what a rival leaves over the noise, fitted to a record of the second bench with play."""
+    """Return the residual over the noise of a rival, fitted to a record of the second bench with play."""
     bench = hide(Bench(), "backlash", {"gap": 4e-4})
     record = record_command(bench, command, np.random.default_rng(seed))
     case = cases_of([record], RIG)[0]

@@ -1,4 +1,4 @@
-"""Runs begin and end at rest, keep a slew limit, and waste no torque on crests; their files hold them."""
+"""Runs begin and end at rest, keep a slew limit, have a low crest factor, and survive their files."""
 
 import numpy as np
 import pytest
@@ -24,10 +24,10 @@ def test_a_run_begins_and_ends_at_rest_and_keeps_its_slew(kind, slew):
 def test_the_multisine_has_a_low_crest():
     run = np.trim_zeros(command_of(Shape("multisine", 1.0, low=0.5, high=60.0), 4.0, RATE))
     middle = run[100:-100]
-    assert np.max(np.abs(middle)) / middle.std() < 2.2  # a random one has about 3.5
+    assert np.max(np.abs(middle)) / middle.std() < 2.2  # a random multisine has about 3.5
 
 
-def test_a_file_gives_back_its_run(tmp_path):
+def test_a_run_survives_its_file(tmp_path):
     command = command_of(Shape("steps", 5.0), 1.0, RATE)
     (tmp_path / "run.csv").write_text(run_text(command, RATE))
     again, rate = read_run(tmp_path / "run.csv")
@@ -59,7 +59,7 @@ def test_a_file_of_another_form_is_refused(tmp_path, text, message):
         ("torque=-1", "expected > 0"),
     ],
 )
-def test_limits_that_make_no_sense_are_refused(text, message):
+def test_senseless_limits_are_refused(text, message):
     with pytest.raises(ParameterError, match=message):
         limits_from(text)
 

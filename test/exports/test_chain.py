@@ -96,7 +96,7 @@ def test_the_rotor_of_the_knee_turns_as_its_train_says(train, turns):
     assert gear.find("axis").get("xyz") == "-1 0 0"  # from the chassis on to the housing
 
 
-def test_urdf_and_sdf_say_the_same_joints():
+def test_urdf_and_sdf_have_the_same_joints():
     rig = load_rig("two_moving_outputs").with_effect("coulomb_friction").with_effect("hard_stop")
     urdf = ElementTree.fromstring(export_urdf(rig).content)
     _, sdf = tree(export_sdf(rig).content)

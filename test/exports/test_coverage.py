@@ -1,4 +1,4 @@
-"""Each export names every effect of the catalogue, as said or as left out, and its file says so too."""
+"""Each export, and its file, lists every effect of the catalogue as exported or as left out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rigs_with(name):
 
 
 @pytest.mark.parametrize("target", EXPORTS)
-def test_every_effect_is_said_or_left_out(target):
+def test_every_effect_is_exported_or_reported_as_left_out(target):
     said_effects = set()
     for name in catalogue():
         for rig in rigs_with(name):
@@ -53,7 +53,7 @@ def test_the_files_are_xml_whatever_the_rig_is_called(target):
     ElementTree.fromstring(made.content)
 
 
-def test_the_python_file_stays_one_whatever_the_rig_is_called():
+def test_the_python_file_stays_valid_whatever_the_rig_is_called():
     rig = load_rig("so101_joint")
     made = export_isaac(type(rig)(**{**vars(rig), "name": '"""\nimport os\n"""'}))
     compile(made.content, "actuator.py", "exec")
@@ -112,7 +112,7 @@ NAMES["m6"] = NAMES["m5"] | {"load_friction_motor_quad", "load_friction_external
     ],
 )
 def test_bam_gets_the_parameters_of_its_model(model, effects):
-    """The names are those that bam/model.py reads for each model; it passes by any other."""
+    """The names are those that bam/model.py reads for each model; it ignores any other."""
     rig = load_rig("pd_joint")
     for name, parameters in effects.items():
         rig = rig.with_effect(name, **parameters)
@@ -123,12 +123,12 @@ def test_bam_gets_the_parameters_of_its_model(model, effects):
 
 
 @pytest.mark.parametrize(("motor", "load"), [(3.0, 1.0), (1.0, 3.0), (-2.0, -0.5)])
-def test_bams_budget_is_our_friction_at_speed(motor, load):
-    """BAM's loss for M6, as its paper has it, is the size of our friction by direction."""
+def test_bams_friction_budget_equals_ours_at_speed(motor, load):
+    """BAM's loss for M6, as in its paper, is the size of our friction by direction."""
     p = {"motor_coefficient": 0.2, "load_coefficient": 0.07, "quadratic": 0.03}
     rig = load_rig("pd_joint").with_effect("directional_load_friction", **p)
     v = json.loads(export_bam(rig).content)
-    external, fade = -load, 1.0  # M6 fades its quadratic part with speed; this one never gets there
+    external, fade = -load, 1.0  # M6 fades its quadratic part with speed; this speed is below that
     assert v["dtheta_stribeck"] > 1e6
     loss = v["friction_base"] + abs(external * v["load_friction_external"] - motor * v["load_friction_motor"])
     quad = v["load_friction_external_quad"] * external**2 if abs(external) < abs(motor) else 0.0
@@ -139,8 +139,8 @@ def test_bams_budget_is_our_friction_at_speed(motor, load):
 
 
 @pytest.mark.parametrize("target", EXPORTS)
-def test_an_effect_without_a_size_is_nothing_to_say(target):
-    """A model.yaml may hold effects at their null values, and no file holds an infinite limit."""
+def test_an_effect_at_its_null_value_is_not_exported(target):
+    """A model.yaml may hold effects at their null values, and a file cannot hold an infinite limit."""
     rig = load_rig("paper_high_impedance")
     idle = rig.with_effects(*(EffectSetting(n, e.null) for n, e in catalogue().items()))
     assert EXPORTS[target](idle).content == EXPORTS[target](rig).content

@@ -1,4 +1,4 @@
-"""Exports that run here: MuJoCo and an FMU play what our simulation plays, and the difference is a number."""
+"""Exports that run here: MuJoCo and an FMU play the command of our simulation; the difference is measured."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from rsea_ros.cli.main import main
+from rsea_ros.design.mjcf import STEP
+from rsea_ros.exports import mujoco_play
 from rsea_ros.exports.difference import RATE, differences, ours
 from rsea_ros.exports.fmu import export_fmu
 from rsea_ros.exports.fmu_play import play_fmu
@@ -28,7 +30,7 @@ def command(seconds):
 
 
 def share_lost(nominal, rig):
-    """Return the largest share of the effects' size, in a channel, by which MuJoCo differs."""
+    """Return the largest difference of MuJoCo in a channel, as a share of the effects' size."""
     given = command(0.25)
     mine, without = ours(rig, given, RATE), ours(nominal, given, RATE)
     size = {one.channel: one.times_noise for one in differences(rig, mine, without)}
@@ -46,8 +48,8 @@ def apart(rig):
 
 @MUJOCO
 @pytest.mark.parametrize("name", ["paper_high_impedance", "paper_moving_output", "prototype_knee"])
-def test_a_nominal_rig_is_the_same_in_mujoco(name):
-    """The knee's rotor turns at -160: told bodies and teeth only, the engine finds that by itself."""
+def test_a_nominal_rig_moves_alike_in_mujoco(name):
+    """The knee's rotor turns at -160; the engine is given only bodies and teeth."""
     assert max(apart(load_rig(name)).values()) < 0.01
 
 
@@ -65,13 +67,13 @@ SHARE = {"spring_hysteresis": 0.25, "stribeck_friction": 0.15, "asymmetric_frict
         "base_compliance",
     ],
 )  # fmt: skip
-def test_an_effect_in_mujocos_terms_is_the_effect(name):
+def test_an_exported_effect_acts_alike_in_mujoco(name):
     rig = load_rig("paper_high_impedance")
     assert share_lost(rig, rig.with_effect(name)) < SHARE.get(name, 0.05)
 
 
 @MUJOCO
-def test_several_effects_at_once_beside_free_ends():
+def test_several_effects_beside_free_ends_act_alike_in_mujoco():
     nominal = load_rig("paper_moving_output")
     rig = nominal.with_effect("backlash").with_effect("torque_ripple").with_effect("quadratic_drag")
     assert share_lost(nominal, rig.with_effect("torque_saturation").with_effect("command_delay")) < 0.05
@@ -79,8 +81,8 @@ def test_several_effects_at_once_beside_free_ends():
 
 @MUJOCO
 @pytest.mark.parametrize("other", ["torque_constant_error", "current_loop_lag", "torque_saturation"])
-def test_what_cannot_stand_beside_another_is_left_out_whole(other):
-    """The actuator had become a dcmotor already when its gain was refused."""
+def test_an_effect_that_conflicts_with_another_is_left_out_entirely(other):
+    """The actuator was already a dcmotor when its gain was refused."""
     both = load_rig("paper_high_impedance").with_effect("voltage_sag", limit=5.0).with_effect(other)
     made = export_mjcf(both)
     left = {one.name for one in made.unsaid} & {"voltage_sag", other}
@@ -91,7 +93,27 @@ def test_what_cannot_stand_beside_another_is_left_out_whole(other):
 
 
 @MUJOCO
-def test_a_model_that_runs_away_is_told_and_leaves_no_log(tmp_path, monkeypatch, capsys):
+def test_a_long_excitation_is_played_in_pieces(monkeypatch):
+    """One call took minutes, in which no signal was served; the pieces are one motion."""
+    from mujoco import rollout
+
+    rig, given, played, sizes = load_rig("paper_moving_output"), command(0.25), rollout.rollout, []
+
+    def counted(model, data, state, control, **more):
+        sizes.append(control.shape[1])
+        return played(model, data, state, control, **more)
+
+    whole = play_mujoco(export_mjcf(rig).content, rig, given)
+    monkeypatch.setattr(rollout, "rollout", counted)
+    monkeypatch.setattr(mujoco_play, "PIECE", 20)
+    pieces = play_mujoco(export_mjcf(rig).content, rig, given)
+    hold = round(1.0 / RATE / STEP)
+    assert sizes == [20 * hold] * 3 + [(len(given) - 60) * hold]
+    assert all(np.array_equal(pieces[name], y) for name, y in whole.items())
+
+
+@MUJOCO
+def test_a_model_that_diverges_is_reported_and_leaves_no_log(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     stiff = "lugre_friction:coulomb_torque=50,bristle_stiffness=1e8,bristle_damping=0"
     arguments = ["export", "--mjcf", "paper_high_impedance", "--effect", stiff, "--duration", "0.5"]
@@ -143,7 +165,7 @@ def test_an_effect_that_the_rig_cannot_have_is_one_line(target, tmp_path, capsys
     assert not list(tmp_path.iterdir())
 
 
-def test_an_fmu_is_our_simulation_and_takes_other_parameters(tmp_path):
+def test_an_fmu_plays_our_simulation_and_accepts_other_parameters(tmp_path):
     from fmpy import simulate_fmu
     from fmpy.validation import validate_fmu
 
@@ -176,7 +198,7 @@ def test_drifts_of_an_fmu_come_to_their_size_over_its_duration():
 
 
 @pytest.mark.parametrize("arguments", [[], ["--mjcf", "prototype_knee", "--urdf", "prototype_knee"]])
-def test_one_target_is_asked_for(arguments, capsys):
+def test_a_target_must_be_named(arguments, capsys):
     with pytest.raises(SystemExit) as end:
         main(["export", *arguments])
     assert end.value.code == 2

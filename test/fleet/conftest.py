@@ -1,4 +1,4 @@
-"""A new store, files that pass for bags, and `fleet_stubs` importable."""
+"""A new store, files that stand for bags, and `fleet_stubs` importable."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def store(tmp_path: Path) -> Store:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Give a folder of five files that pass for bags."""
+    """Return a folder of five files that stand for bags."""
     folder = tmp_path / "bags"
     folder.mkdir()
     for number in range(5):

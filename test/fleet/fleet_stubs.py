@@ -1,4 +1,4 @@
-"""Joints and the work of a task for tests of the engine: a row at once, whatever the recording holds."""
+"""Joints and a task for tests of the engine: the task returns a row at once, whatever the recording holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Alarms are files, each told once; a week of trouble is one file."""
+"""Alarms are files, each sent once; a week of trouble is one file."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ STEP = Alarm("knee/spring.stiffness/down", "knee", "spring.stiffness", "change",
 
 @pytest.fixture
 def worn(store, folder, monkeypatch):
-    """Give a store of which trends say that one joint changed."""
+    """Return a store whose trends show a change of one joint."""
     Engine(store, Serial(), stub_work, lambda step, share: None).run(bags_of([str(folder)], [KNEE]))
     monkeypatch.setattr(told, "alarms", lambda history, recordings: (STEP,))
     return store
 
 
-def test_an_alarm_is_told_once(worn):
+def test_an_alarm_is_sent_once(worn):
     (first,) = told.tell_alarms(worn)
     assert "knee: spring.stiffness" in first.text and "-250 to -150 N m/rad" in first.text
     assert told.tell_alarms(worn) == []
     assert [file.name for file in (worn.path / "alarms").iterdir()] == [first.file.name]
 
 
-def test_an_alarm_is_shaped_as_a_webhook_takes_it(worn):
+def test_an_alarm_has_the_form_that_a_webhook_accepts(worn):
     (first,) = told.tell_alarms(worn)
     body = json.loads(first.file.read_text(encoding="utf-8"))
     (alert,) = body["alerts"]

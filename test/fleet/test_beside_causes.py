@@ -1,4 +1,4 @@
-"""A row's parameters are those beside the causes: a fit without them takes backlash for a softer spring."""
+"""A row has the parameters fitted together with the causes: otherwise backlash softens the spring."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 
-def test_a_parameter_of_a_row_is_the_one_beside_the_causes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_row_has_the_parameters_of_the_fit_with_causes(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = load_rig("paper_high_impedance")
     u = excitation("chirp", Settings(duration=6.0, seed=2))
     gap = EffectSetting("backlash", {"gap": 3e-3})

@@ -14,7 +14,7 @@ from rsea_ros.fleet.executor import Job, WorkerLost
 
 
 class Future:
-    """A future that is done when it is asked for."""
+    """A future that is done at the first request."""
 
     def __init__(self, key: str, status: str, result: object) -> None:
         self.key, self.status, self._result = key, status, result
@@ -49,8 +49,8 @@ def test_a_few_tasks_for_each_worker_are_in_flight():
     assert OnDask(Client()).places == 2 * PER_WORKER
 
 
-def test_workers_are_asked_for_again_and_again(monkeypatch):
-    """One that is killed before it is up is restarted by nobody else: without this a run waits for ever."""
+def test_missing_workers_are_requested_repeatedly(monkeypatch):
+    """Nothing else restarts a worker that is killed before it is up: without this a run waits for ever."""
     now, asked = [100.0], []
     monkeypatch.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: now[0]))
     workers = OnDask(Client(), lambda: asked.append(now[0]))

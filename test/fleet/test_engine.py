@@ -1,4 +1,4 @@
-"""The engine: new recordings only, nothing lost, nothing double, whatever is killed."""
+"""The engine: only new recordings, nothing lost and nothing twice, whatever is killed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def count(store, outcome="done"):
 
 
 class Unlucky(Serial):
-    """Loses the worker of some tasks so many times; has several jobs in flight, the newest done first."""
+    """An executor that loses the worker of some tasks; of several jobs in flight the newest ends first."""
 
     places = 3
 
@@ -82,7 +82,7 @@ def test_other_settings_and_another_joint_are_new(store, folder):
     assert answer(store, "SELECT count(*) FROM recordings")[1] == [(10,)], "the newest analysis of each"
 
 
-def test_a_lost_worker_is_forgiven_and_poison_is_quarantined(store, folder):
+def test_a_lost_worker_is_replaced_and_a_recording_that_kills_workers_is_quarantined(store, folder):
     losses = {"run1.mcap": 2, "run3.mcap": 1000}
     summary = played(store, folder, executor=Unlucky(losses), limits=Limits(back_off=0.001))
     assert summary.outcomes == {"done": 4, "quarantined": 1}
@@ -170,7 +170,7 @@ def test_a_compaction_killed_half_way_leaves_no_row_twice(store, folder, monkeyp
 
 
 def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folder, monkeypatch):
-    """The compacted file replaced one of that name: finishing that must not take the new one."""
+    """Finishing a compaction must not remove a new file with the name of a compacted one."""
 
     def work(task: Task):
         poison = {"outcome": "quarantined"} if task.bag.url.endswith("run2.mcap") else {}
@@ -185,7 +185,7 @@ def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folde
 
 
 def test_two_runs_take_turns(store):
-    """Another process holds the lock: a run that does not wait says who, one that waits begins after it."""
+    """Another process holds the lock: a run that does not wait names it, one that waits begins after it."""
     code = f"""
 import time
 from rsea_ros.fleet.store import Outcome, locked, open_store
@@ -218,7 +218,7 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
 
 
 def test_jobs_that_wait_to_be_tried_again_do_not_hold_the_others_up(store, folder):
-    """While one is due later, the others are worked through."""
+    """While one job waits to be retried, the others are done."""
     begin = time.monotonic()
     summary = played(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=Limits(back_off=0.3))
     assert summary.outcomes == {"done": 5} and time.monotonic() - begin < 5.0

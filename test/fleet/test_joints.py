@@ -89,7 +89,7 @@ def test_a_joint_travels_to_another_process(mapped):
         (("joints:", "joint:"), ("unknown key 'joint'", "did you mean joints?")),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(mapped, tmp_path, change, said):
+def test_a_mistake_is_reported_with_its_line(mapped, tmp_path, change, said):
     assert change[0] in GOOD
     with pytest.raises(JointMapError) as caught:
         joints(tmp_path, GOOD.replace(*change, 1))

@@ -120,7 +120,7 @@ def test_sql_answers_and_changes_nothing(serial, capsys):
         assert "rsea fleet: " in capsys.readouterr().err
 
 
-def test_a_recording_that_grows_while_it_is_read_is_no_row(lab, tmp_path):
+def test_a_recording_that_grows_while_it_is_read_makes_no_row(lab, tmp_path):
     from rsea_ros.fleet.joints import Joint
     from rsea_ros.fleet.sources import bags_of
 
@@ -148,6 +148,6 @@ def test_a_date_stands_in_the_path(path, pattern, date):
 
 
 @pytest.mark.parametrize("option", [["--workers", "0"], ["--memory", "-1"], ["--serial", "--scheduler", "x"]])
-def test_options_that_make_no_sense_are_refused(lab, option, capsys):
+def test_senseless_options_are_refused(lab, option, capsys):
     assert main([*running(lab), "--out", str(lab / "no"), *option]) == 2
     assert option[0] in capsys.readouterr().err and not (lab / "no").exists()

@@ -22,14 +22,14 @@ LATENCY, FT_TIMEOUT, WATCHDOG = 0.03, 0.2, 0.5
 
 
 def device_on(bench, limits=None, *, absolute=False, **motor):
-    """The driver's device on a bench."""
+    """Return the driver's device on a bench."""
     settings = MotorSettings(bench.port, 4_000_000, **{"latency": LATENCY, "watchdog": WATCHDOG, **motor})
     sensor = SensorSettings("127.0.0.1", bench.ft_port, bench.page_port, FT_TIMEOUT)
     return DynamixelNetft(Motor(settings), sensor, limits or Limits(68.0), STIFFNESS, absolute=absolute)
 
 
 class Loop:
-    """The driver's loop, run by the test: each cycle wants `torque`."""
+    """The driver's loop, run by the test: each cycle commands `torque`."""
 
     def __init__(self, bench, limits=None, **motor):
         self.bench = bench

@@ -1,4 +1,4 @@
-"""The page of an F/T sensor, over a real connection: whatever answers there, it is one line in good time."""
+"""The page of an F/T sensor over a real connection: whatever answers, one line within the time limit."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ def whole(body, head=HEAD):
     return [head + b"Content-Length: %d\r\n\r\n" % len(body), body]
 
 
-def test_a_sensor_that_answers():
+def test_a_sensor_that_answers_gives_its_calibration():
     with served(whole(GOOD)) as (port, requests):
         read = calibration.fetch("127.0.0.1", port)
     assert (read.force, read.torque, read.rate) == (1e-6, 1e-6, 7000.0)
     assert requests[0].startswith(b"GET /netftapi2.xml HTTP/1.1\r\nHost: 127.0.0.1:")
 
 
-def test_a_page_in_pieces_and_without_a_length():
+def test_a_page_in_pieces_and_without_a_length_is_read():
     with served([HEAD + b"\r\n", GOOD[:50], GOOD[50:]], pause=0.01) as (port, _):
         assert calibration.fetch("127.0.0.1", port).force == 1e-6
     chunks = [b"%x\r\n%s\r\n" % (len(part), part) for part in (GOOD[:50], GOOD[50:])]
@@ -90,7 +90,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_no_calibration_is_one_line(case):
+def test_a_page_without_a_calibration_is_one_line(case):
     parts, message = REFUSED[case]
     with served(parts) as (port, _), pytest.raises(DeviceError, match=message) as caught:
         calibration.fetch("127.0.0.1", port)
@@ -113,10 +113,10 @@ def test_a_page_that_drips_ends_in_time(case):
         started = time.monotonic()
         with pytest.raises(DeviceError, match=r"no whole answer within 0.2 s"):
             calibration.fetch("127.0.0.1", port, timeout=0.2)
-        assert time.monotonic() - started < 1.0  # six times shorter than the drops take
+        assert time.monotonic() - started < 1.0  # six times shorter than the dripping page takes
 
 
-def test_a_page_without_end_is_left_at_its_ceiling(monkeypatch):
+def test_an_endless_page_is_abandoned_at_the_size_limit(monkeypatch):
     monkeypatch.setattr(page, "LARGEST", 1000)
     with (
         served([HEAD + b"\r\n"], itertools.repeat(b" " * 500)) as (port, _),
@@ -125,7 +125,7 @@ def test_a_page_without_end_is_left_at_its_ceiling(monkeypatch):
         calibration.fetch("127.0.0.1", port)
 
 
-def test_nobody_answers():
+def test_a_sensor_that_does_not_answer_is_one_line():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
     with pytest.raises(DeviceError, match=r"Connection refused"):

@@ -90,7 +90,7 @@ def test_a_tripped_bus_watchdog_is_a_fault_and_cleared_by_the_service(loop):
     assert torques(loop.bench, since)[-1][0] != 0
 
 
-def test_an_ft_gap_is_counted_exactly_and_no_fault(loop):
+def test_an_ft_gap_is_counted_exactly_and_is_no_fault(loop):
     loop.bench.ask("ft_gap", records=123)
     loop.cycles(20, 10.0)
     assert loop.guarded.fault is None
@@ -108,7 +108,7 @@ def test_a_lost_ft_stream_is_a_fault_after_its_time_out(loop, how):
     assert loop.cycles(3, 10.0) == [10.0] * 3
 
 
-def test_the_condition_latch_alone_is_no_fault(loop):
+def test_the_condition_latch_by_itself_is_no_fault(loop):
     loop.bench.ask("ft_status", bits=0x80010000)
     loop.cycles(20, 10.0)
     assert loop.guarded.fault is None

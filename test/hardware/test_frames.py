@@ -22,7 +22,7 @@ VECTORS = {
 
 
 @pytest.mark.parametrize("name", VECTORS)
-def test_the_makers_vectors(name):
+def test_the_makers_test_vectors_are_reproduced(name):
     identity, payload, crc = VECTORS[name]
     packet = frame(identity, bytes.fromhex(payload))
     assert packet[-2:] == bytes.fromhex(crc)
@@ -32,7 +32,7 @@ def test_the_makers_vectors(name):
 
 
 def short_payloads():
-    """Every payload of up to 7 bytes of those that stuffing is about."""
+    """Yield every payload of up to 7 of the bytes that stuffing treats."""
     for length in range(8):
         yield from map(bytes, itertools.product(ALPHABET, repeat=length))
 
@@ -45,7 +45,7 @@ def test_stuffing_is_undone_for_every_short_payload_and_holds_no_header():
         assert b"\xff\xff\xfd\x00" not in packed
 
 
-def test_what_no_stuffing_makes_is_refused_by_both_codecs():
+def test_impossible_stuffing_is_refused_by_both_codecs():
     for payload in short_payloads():
         assert (unstuffed(payload) is None) == (protocol2.unescape(payload) is None)
 
@@ -84,7 +84,7 @@ def test_the_frame_behind_a_damaged_one_is_found():
 
 
 def mutations(rng, packet):
-    """Damage that a CRC of 16 bits shows: a burst of up to 16 bits, a frame cut short, no frame at all.
+    """Yield damage that a CRC of 16 bits detects: a burst of up to 16 bits, a frame cut short, random bytes.
 
     The burst lies before or in the CRC: across its border it is none, as the CRC's low byte comes first.
     """
@@ -105,7 +105,7 @@ def test_damaged_and_random_bytes_give_no_frame_that_was_not_sent():
             strings += 1
 
 
-def test_the_crc_of_the_driver_is_the_remainder_of_the_peer():
+def test_the_crcs_of_driver_and_peer_agree():
     rng = random.Random(5)
     for _ in range(500):
         data = rng.randbytes(rng.randrange(60))

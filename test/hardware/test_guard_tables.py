@@ -24,17 +24,17 @@ def torques(it, *commands):
     return [it.allowed(*c) for c in commands]
 
 
-def test_a_new_guard_commands_nothing_and_has_nothing_against_it():
+def test_a_new_guard_commands_zero_and_has_no_fault():
     new = guard()
     assert (new.torque, new.limited, new.fault, new.halted) == (0.0, 0, None, False)
 
 
-def test_a_step_of_torque_is_limited_where_nothing_is_said():
-    """40 000 N m/s: 40 N m a ms, which no actuator of this size can follow, and no typing error gets past."""
+def test_a_step_of_torque_is_limited_by_default():
+    """40 000 N m/s: 40 N m a ms, which no actuator of this size can follow; it stops a typing error."""
     assert Guard(Limits(68.0), 1e-3).allowed(68.0, 0.0) == pytest.approx(40.0)
 
 
-def test_slew_holds_both_ways_and_from_the_torque_before():
+def test_the_slew_limit_holds_both_ways_and_from_the_previous_torque():
     it = guard(slew=64.0)
     assert torques(it, *[(9.0, 0.0)] * 3, *[(-9.0, 0.0)] * 5) == [1, 2, 3, 2, 1, 0, -1, -2]
     assert it.limited == 8
@@ -46,14 +46,14 @@ def test_commands_within_the_limits_are_not_counted():
     assert it.limited == 0
 
 
-def test_no_command_is_no_torque_and_no_fault():
+def test_without_a_command_there_is_no_torque_and_no_fault():
     it = guard()
     assert torques(it, (9.0, 0.0), (9.0, None), (9.0, None)) == [9.0, 0.0, 0.0]
     assert it.fault is None and it.limited == 0
 
 
 @pytest.mark.parametrize(("age", "tripped"), [(0.05, False), (0.0501, True)])
-def test_a_command_counts_for_50_ms_where_nothing_is_said(age, tripped):
+def test_a_command_counts_for_50_ms_by_default(age, tripped):
     it = guard()
     it.allowed(9.0, 0.0)
     it.allowed(9.0, age)
@@ -67,7 +67,7 @@ def test_the_fault_of_late_commands_says_how_late_in_ms():
     assert it.fault == Fault("command_timeout", 250.0, 125.0, "ms")
 
 
-def test_an_end_of_the_program_is_zero_torque_and_no_fault():
+def test_at_the_end_of_the_program_the_torque_is_zero_without_a_fault():
     it = guard()
     it.allowed(9.0, 0.0)
     it.halted = True
@@ -75,7 +75,7 @@ def test_an_end_of_the_program_is_zero_torque_and_no_fault():
     assert it.fault is None
 
 
-def test_any_other_fault_is_zero_torque_at_once():
+def test_any_other_fault_makes_the_torque_zero_at_once():
     it = guard()
     it.allowed(9.0, 0.0)
     it.trip(Fault("ft"))
@@ -99,14 +99,14 @@ def test_the_first_fault_stays_and_so_does_its_ramp():
     (PERIOD, [0, 0, 0, 0, 0]),
     (0.0, [0, 0, 0, 0, 0]),  # a ramp shorter than a cycle takes one
 ])  # fmt: skip
-def test_the_ramp_takes_its_time_and_a_cycle_at_least(age, ramp, expected):
+def test_the_ramp_takes_its_duration_and_one_cycle_at_least(age, ramp, expected):
     it = guard(ramp=ramp)
     it.allowed(-8.0, 0.0)
     it.trip(Fault("command_timeout"))
     assert [abs(it.allowed(-8.0, age)) for _ in range(5)] == expected
 
 
-def test_the_ramp_takes_20_ms_where_nothing_is_said():
+def test_the_ramp_takes_20_ms_by_default():
     it = guard(period=0.005)
     it.allowed(8.0, 0.0)
     it.trip(Fault("command_timeout"))
@@ -116,8 +116,8 @@ def test_the_ramp_takes_20_ms_where_nothing_is_said():
 @pytest.mark.parametrize(
     ("late", "expected"), [(0.0, 6.0), (1.0, 6.0), (1.5, 5.0), (3.0, 2.0), (4.0, 0.0), (9.0, 0.0)]
 )
-def test_what_is_left_of_the_ramp_goes_by_the_age_of_the_command(late, expected):
-    """late: cycles of a ramp of four since the command counted no more."""
+def test_the_rest_of_the_ramp_follows_the_age_of_the_command(late, expected):
+    """late: cycles since the command ceased to count, of a ramp of four."""
     it = guard(command_timeout=2 * PERIOD, ramp=4 * PERIOD)
     it.allowed(8.0, 0.0)
     it.trip(Fault("command_timeout"))
@@ -157,7 +157,7 @@ def test_a_soft_start_begins_anew_when_commands_have_ceased(pause, expected):
     assert it.allowed(9.0, 0.0) == expected
 
 
-def test_there_is_no_soft_start_where_nothing_is_said():
+def test_there_is_no_soft_start_by_default():
     assert guard().allowed(64.0, 0.0) == 64.0
 
 
@@ -203,7 +203,7 @@ def test_the_fault_of_a_missed_torque_says_by_how_much():
     assert it.fault == Fault("effort", 5.0, 4.0, "N m", "between commanded and measured torque")
 
 
-def test_a_torque_shows_in_the_measured_one_within_three_cycles():
+def test_a_torque_must_be_measured_within_three_cycles():
     it = guard(**EFFORT)
     misses(it, 0.0, 0.0, 0.0, wanted=0.0)
     assert misses(it, 0.0, 0.0, 0.0, 0.0, 0.0, wanted=10.0) == [False] * 5, "the first miss is the third"
@@ -230,7 +230,7 @@ def test_a_missed_torque_is_forgotten_when_a_fault_is_cleared():
     assert misses(it, 0.0, 0.0, 0.0, 0.0) == [False, False, False, True]
 
 
-def test_a_ramp_is_no_missed_torque():
+def test_a_ramp_is_not_taken_for_a_missed_torque():
     it = guard(**EFFORT)
     it.allowed(10.0, 0.0)
     it.trip(Fault("ft"))
@@ -241,9 +241,9 @@ def test_a_ramp_is_no_missed_torque():
     assert it.fault is None
 
 
-def test_a_missed_torque_trips_nothing_where_nothing_is_said():
+def test_a_missed_torque_trips_nothing_by_default():
     assert misses(guard(), *[1e9] * 30) == [False] * 30
 
 
-def test_a_missed_torque_has_a_tenth_of_a_second_where_nothing_is_said():
+def test_a_missed_torque_trips_after_a_tenth_of_a_second_by_default():
     assert misses(guard(effort=4.0), *[0.0] * 7) == [False] * 6 + [True]  # 7 cycles are 0.109 s

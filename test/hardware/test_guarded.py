@@ -1,4 +1,4 @@
-"""A device behind its limits: what reaches it, in which order, and what becomes of its failures."""
+"""A device behind its limits: which calls reach it, in which order, and how its failures end."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Log(Protection):
 
 
 class Device:
-    """A device that writes down what is asked of it. broken: by method, the errors of the next calls."""
+    """A device that logs its calls. broken: by method, the errors of the next calls."""
 
     def __init__(self, kind=BUS_WATCHDOG):
         self.log, self.broken, self.during = [], {}, {}
@@ -105,7 +105,7 @@ def test_a_device_that_nothing_protects_is_closed_again_unless_that_is_allowed(k
         assert device.log == ["open"]
 
 
-def test_protection_is_asked_for_where_nothing_is_said():
+def test_protection_is_required_by_default():
     with pytest.raises(ParameterError):
         Guarded(Device(NONE), Limits(64.0), 64.0).open()
 
@@ -163,6 +163,30 @@ def test_lost_answers_in_a_row_are_a_fault_and_other_errors_at_once(
         assert [s is None for s in states] == [a is not None for a in answers]
 
 
+@pytest.mark.parametrize(("method", "what"), [("read", "failed_reads"), ("write", "failed_writes")])
+def test_every_second_answer_lost_is_a_fault_though_never_two_in_a_row(joint, device, method, what):
+    """Torque went on for ever on a line that lost every second reply."""
+    device.broken = {method: [LOST, None] * 14}
+    for _ in range(28):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault is None
+    device.broken = {method: [LOST]}
+    joint.cycle(1.0, 0.0)
+    assert joint.fault == Fault("no_reply", 15, 15, "cycles", "of the last 29: no reply")
+    joint.clear()
+    device.broken = {method: [LOST] * 2}
+    joint.cycle(1.0, 0.0)
+    joint.cycle(1.0, 0.0)
+    assert joint.fault is None and joint.cycles == {what: 17}
+
+
+def test_a_third_of_the_answers_lost_is_none(joint, device):
+    device.broken = {"read": [LOST, None, None] * 40}
+    for _ in range(120):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault is None
+
+
 def test_an_answer_that_is_late_while_another_is_lost_makes_no_fault_of_both(joint, device):
     device.broken = {"read": [LOST, LOST], "write": [LOST, LOST]}
     joint.cycle(1.0, 0.0)
@@ -188,7 +212,7 @@ def test_a_device_that_does_not_enable_gets_no_torque(device):
     assert not joint.enabled
 
 
-def test_disabling_is_zero_torque_and_told_to_the_protection(joint, device):
+def test_disabling_makes_the_torque_zero_and_informs_the_protection(joint, device):
     joint.write(9.0, 0.0)
     device.log.clear()
     joint.disable()
@@ -196,7 +220,7 @@ def test_disabling_is_zero_torque_and_told_to_the_protection(joint, device):
     assert (joint.enabled, joint.guard.torque) == (False, 0.0)
 
 
-def test_what_somebody_else_talks_to_is_left_alone(joint, device):
+def test_a_device_that_another_thread_uses_is_left_alone(joint, device):
     joint.away = True
     assert joint.cycle(9.0, 0.0) is None
     for refused in (joint.enable, joint.reboot):
@@ -208,7 +232,7 @@ def test_what_somebody_else_talks_to_is_left_alone(joint, device):
     assert joint.away, "it is still the other's"
 
 
-def test_a_cycle_does_not_wait_for_whoever_has_the_device(joint):
+def test_a_cycle_does_not_wait_for_another_user_of_the_device(joint):
     with ExitStack() as first:
         assert joint.taken(first) is True
         with ExitStack() as second:
@@ -272,7 +296,7 @@ def test_lost_answers_are_counted_anew_after_a_fault_was_cleared(joint, device):
         joint.cycle(1.0, 0.0)
 
 
-def test_a_reboot_ends_the_torque_first_and_makes_it_as_before_after(joint, device):
+def test_a_reboot_ends_the_torque_first_and_restores_it_afterwards(joint, device):
     joint.write(9.0, 0.0)
     device.log.clear()
     seen = []
@@ -286,7 +310,7 @@ def test_a_reboot_ends_the_torque_first_and_makes_it_as_before_after(joint, devi
 
 
 @pytest.mark.parametrize("refusal", [None, NoReply("no reply")])
-def test_what_was_disabled_stays_so_over_a_reboot(joint, device, refusal):
+def test_a_disabled_device_stays_disabled_over_a_reboot(joint, device, refusal):
     joint.disable()
     device.log.clear()
     device.broken = {"disable": [None, refusal]}
@@ -319,7 +343,7 @@ SPRING = Spring(1500.0)
         (SPRING, {"wrench": WRENCH, "deflection": 0.01}, "sensor"),
     ],
 )
-def test_where_a_wrench_comes_from(device, spring, reading, source):
+def test_a_wrench_comes_from_sensor_or_deflection(device, spring, reading, source):
     joint = Guarded(device, Limits(64.0), 64.0, spring)
     assert joint.ft_source == "none"
     device.reading = reading
@@ -346,7 +370,7 @@ def test_a_deflection_that_was_measured_must_go_on(device, before, now, fault):
     assert (None if joint.fault is None else str(joint.fault)) == fault
 
 
-def test_what_is_disabled_during_a_reboot_stays_without_torque(joint, device):
+def test_a_device_disabled_during_a_reboot_stays_without_torque(joint, device):
     device.during = {"reboot": joint.disable}
     joint.reboot()
     assert device.log == ["disable", "beat False", "reboot", "disable", "beat False"]

@@ -59,14 +59,14 @@ def test_a_voltage_at_its_limit_is_fine_and_one_below_it_is_not():
 
 
 DEFAULTS = [
-    # just inside what holds where nothing is said, just outside, cause
+    # just inside the default limit, just outside, cause
     (reading(position=math.radians(4.99)), reading(position=math.radians(5.01)), "deflection"),
     (reading(temperature=69.9), reading(temperature=70.1), "temperature"),
 ]
 
 
 @pytest.mark.parametrize(("inside", "outside", "cause"), DEFAULTS)
-def test_the_spring_and_the_motor_are_guarded_where_nothing_is_said(inside, outside, cause):
+def test_spring_and_motor_are_guarded_by_default(inside, outside, cause):
     assert complaint(Limits(68.0), inside) is None
     assert complaint(Limits(68.0), outside).cause == cause
 
@@ -93,7 +93,7 @@ def test_the_torque_is_that_about_the_axis_of_the_actuator(axis):
         assert (fault is not None) == (place == axis)
 
 
-def test_the_axis_is_the_torque_about_z_where_nothing_is_said():
+def test_the_axis_is_z_by_default():
     assert complaint(only(ft=50.0), reading(wrench=wrench(5, 51.0))).cause == "ft_torque"
 
 
@@ -116,7 +116,7 @@ def test_a_reading_that_is_no_number_is_a_fault_with_its_values(name, value):
         ({"voltage": 1.0}, "voltage"),
     ],
 )
-def test_what_the_device_complains_of_comes_before_what_is_measured(more, cause):
+def test_a_fault_of_the_device_comes_before_a_measured_one(more, cause):
     assert complaint(ALL, reading(**more)).cause == cause
 
 
@@ -129,7 +129,7 @@ def test_what_the_device_complains_of_comes_before_what_is_measured(more, cause)
         (Fault("voltage", 19.0, 20.0, "V", "too low"), "voltage: 19 V, limit 20 V too low"),
     ],
 )
-def test_a_fault_in_words(fault, text):
+def test_a_fault_is_described_with_value_limit_and_unit(fault, text):
     assert str(fault) == text
 
 

@@ -1,4 +1,4 @@
-"""Limits against plain arithmetic: what is cut down, what trips, and how the torque ends."""
+"""Limits against plain arithmetic: which torques are cut, which readings trip, and how the torque ends."""
 
 import math
 
@@ -70,13 +70,13 @@ def test_a_reading_beyond_a_limit_names_cause_value_and_limit(reading, told):
     assert seen.allowed(30.0, 0.0) == 0.0
 
 
-def test_what_is_not_measured_trips_nothing():
+def test_a_quantity_that_is_not_measured_trips_nothing():
     blind = guard(current=12.0, voltage=20.0)
     blind.look(State(0, 0.0, 0.0, 0.0))
     assert blind.fault is None and math.isnan(State(0, 0.0, 0.0, 0.0).voltage)
 
 
-def test_the_first_fault_is_the_one_that_is_told():
+def test_the_first_fault_is_the_one_reported():
     first = guard()
     first.look(State(0, 1.0, 0.0, 0.0, hardware_error="encoder"))
     assert first.fault.cause == "hardware_error"
@@ -117,7 +117,7 @@ def cycles(answers, count):
     return faults, device.written
 
 
-def test_two_lost_replies_are_none_and_three_in_a_row_a_fault():
+def test_three_lost_replies_in_a_row_are_a_fault_and_two_are_not():
     lost = NoReply("no reply")
     assert cycles([lost, lost, None, lost, lost], 6)[0] == [""] * 6
     faults, written = cycles([lost, lost, lost], 5)
@@ -153,7 +153,7 @@ def test_a_motor_that_does_not_make_its_torque_for_long_enough_is_a_fault():
     assert str(watched.fault) == "effort: 7 N m, limit 6 N m between commanded and measured torque"
 
 
-def test_a_torque_that_changes_from_cycle_to_cycle_and_is_measured_late_is_none():
+def test_a_changing_torque_that_is_measured_late_is_no_fault():
     watched, torques = guard(slew=1e6, effort=6.0, effort_time=0.05), [0.0, 0.0]
     for k in range(100):
         torques.append(watched.allowed(60.0 * (-1) ** k, 0.0))

@@ -45,7 +45,7 @@ class Three:
         return states
 
     def beside(self, work):
-        """Do something in a thread while the cycles go on; the readings of each. Raises what it raises."""
+        """Run work in a thread while the cycles go on; return their readings. Raises its error."""
         heard = []
         with ThreadPoolExecutor(1) as pool:
             future = pool.submit(work)
@@ -55,11 +55,11 @@ class Three:
         return heard
 
     def causes(self):
-        """What is latched, of each."""
+        """Return the latched fault of each motor."""
         return [member.fault and member.fault.cause for member in self.members]
 
     def acting(self):
-        """Whether each motor has a goal and its torque on."""
+        """Return whether each motor has a goal and its torque on."""
         goals = [self.bench.torque(place) for place in range(3)]
         return [goal != 0 and on for goal, on in goals]
 
@@ -100,7 +100,7 @@ def test_each_motor_makes_its_torque_by_two_frames_a_cycle(three):
     assert three.bench.torque(2) == (round(2.0 / 1.939 / 2.69e-3), True)
 
 
-def test_the_first_ones_sensor_is_read_in_the_same_cycle(three):
+def test_the_sensor_of_the_first_motor_is_read_in_the_same_cycle(three):
     three.cycles(20, (2.0, 0.0, 0.0))
     state, *others = three.cycles(5, (2.0, 0.0, 0.0))
     assert len(state.wrenches) > 1 and math.isfinite(state.wrench[5])
@@ -130,8 +130,8 @@ def test_a_reboot_of_one_leaves_the_others_their_torque(three):
     assert three.acting() == [True] * 3
 
 
-def test_a_motor_that_is_unplugged_leaves_the_others_heard(three):
-    """Those behind it in a request wait for its reply, so it comes last in the next one."""
+def test_an_unplugged_motor_does_not_silence_the_others(three):
+    """Motors behind it in a request wait for its reply, so it is asked last in the next one."""
     three.cycles(5, (1.0, 1.0, 1.0))
     three.bench.ask("set", motor=0, id=9)
     try:
@@ -162,7 +162,7 @@ def test_a_port_that_comes_back_is_opened_by_the_first_that_is_cleared(three):
     assert three.causes() == [None] * 3 and three.acting() == [True] * 3
 
 
-def test_a_line_that_is_not_heard_zeroes_every_motor(three):
+def test_a_silent_line_zeroes_every_motor(three):
     three.cycles(5, (1.0, 1.0, 1.0))
     three.bench.ask("misbehave", drop=1.0)
     three.cycles(4, (1.0, 1.0, 1.0))

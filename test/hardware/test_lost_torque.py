@@ -28,7 +28,7 @@ SECOND = 280
     [(54024, "torque_enable"), (54024, "mode"), (54025, "torque_enable"), (54025, "watchdog")],
     indirect=["loop"],
 )
-def test_registers_that_the_torque_hangs_on_are_read_once_a_second(loop, register):
+def test_registers_that_the_torque_depends_on_are_read_once_a_second(loop, register):
     loop.bench.ask("set", **{register: 3 if register == "mode" else 0})
     loop.until_fault(10.0, most=2 * SECOND)
     assert loop.guarded.fault.cause == "motor_state"
@@ -42,12 +42,12 @@ def test_registers_that_the_torque_hangs_on_are_read_once_a_second(loop, registe
 @pytest.mark.parametrize(
     ("loop", "kind"), [(54024, "supervisor"), (54025, "bus watchdog")], indirect=["loop"]
 )
-def test_motors_say_what_protects_them(loop, kind):
+def test_motors_state_what_protects_them(loop, kind):
     assert loop.device.protection.kind == kind
 
 
-def test_a_motor_away_when_its_fault_is_cleared_is_there_the_next_time(loop):
-    """An emergency stop: the port was opened again, the motor not set up, and it was 'not open' for ever."""
+def test_a_motor_absent_at_one_clear_fault_can_be_cleared_at_the_next(loop):
+    """After an emergency stop the port was opened again but the motor not set up: 'not open' for ever."""
     loop.bench.ask("misbehave", silent=True)
     loop.until_fault(10.0)
     loop.bench.ask("vanish")
@@ -98,8 +98,8 @@ while True:
 """
 
 
-def test_a_service_zeroes_the_torque_when_a_whole_group_is_killed(benches, service):
-    """Driver, its children and its session at once, as a service manager or a container does it."""
+def test_a_supervisor_service_zeroes_the_torque_when_a_whole_process_group_is_killed(benches, service):
+    """Driver, its children and its session are killed at once, as by a service manager or a container."""
     bench, root = benches(), Path(__file__).resolve().parents[2]
     well_behaved(bench)
     words = [sys.executable, "-c", DRIVER, bench.port, bench.ft_port, bench.page_port, service]
@@ -113,7 +113,7 @@ def test_a_service_zeroes_the_torque_when_a_whole_group_is_killed(benches, servi
 
 
 def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
-    """Its terminal hangs up, and all that was started from it is killed."""
+    """Its terminal hangs up, and everything started from it is killed."""
     bench, root = benches(), Path(__file__).resolve().parents[2]
     well_behaved(bench)
     near, far = pty.openpty()
@@ -133,7 +133,7 @@ def test_the_drivers_own_supervisor_outlives_a_login_that_is_killed(benches):
     _until(lambda: _is_free(bench.port))  # the supervisor has it until it ends
 
 
-def test_a_service_lets_the_port_go_and_its_death_is_a_fault(benches, service):
+def test_a_supervisor_service_releases_the_port_and_its_death_is_a_fault(benches, service):
     bench = benches()
     well_behaved(bench)
     for _ in range(2):
@@ -145,7 +145,7 @@ def test_a_service_lets_the_port_go_and_its_death_is_a_fault(benches, service):
         assert bench.torque() == (0, False)
 
 
-def test_a_service_that_is_not_there_is_refused(benches, tmp_path):
+def test_a_supervisor_service_that_does_not_run_is_refused(benches, tmp_path):
     well_behaved(benches())
     with pytest.raises(SupervisorLost, match="expected a supervisor that listens there"):
         Loop(benches(), supervisor=str(tmp_path / "nobody"))

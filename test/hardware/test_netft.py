@@ -1,4 +1,4 @@
-"""RDT and the calibration page: what is lost is counted exactly, what is not a record is refused."""
+"""RDT and the calibration page: lost records are counted exactly, and other datagrams are refused."""
 
 import math
 import random
@@ -50,7 +50,7 @@ def test_duplicates_and_overtaken_records_are_left_out():
     assert (sequence.counts["duplicate"], sequence.counts["reordered"]) == (1, 1)
 
 
-def test_a_sensor_that_was_switched_off_and_one_that_stands_still_are_seen():
+def test_a_sensor_that_was_switched_off_or_stands_still_is_noticed():
     sequence = Sequence()
     assert sequence.accept(record(1, 10**9 * 3)) and sequence.accept(record(2, 10**9 * 3))
     assert sequence.counts["frozen"] == 1
@@ -122,7 +122,7 @@ def test_the_calibration_is_counts_per_unit(counts, units, force, torque):
         ("<html>", "not XML"),
     ],
 )
-def test_a_calibration_that_cannot_be_is_refused(page, message):
+def test_an_impossible_calibration_is_refused(page, message):
     with pytest.raises(DeviceError, match=message):
         parse(page.encode())
 
@@ -170,7 +170,7 @@ def test_records_of_a_stranger_are_not_taken(streamed):
     assert [a.record.sequence for a in receiver.take()] == [77]
 
 
-def test_a_stream_that_falls_silent_is_asked_for_again(streamed):
+def test_a_stream_that_falls_silent_is_requested_again(streamed):
     receiver, sensor, client = streamed
     sensor.sendto(datagram(9, 9), client)
     assert sensor.recvfrom(64)[0] == request(2)
@@ -181,7 +181,7 @@ def test_a_stream_that_falls_silent_is_asked_for_again(streamed):
 
 
 def test_a_stream_is_followed_again_after_its_counters_moved_on_unheard():
-    """150 s of silence at 7 kHz: every record after it was taken for damage, for ever."""
+    """After 150 s of silence at 7 kHz every record was taken for damage, for ever."""
     sequence, far = Sequence(), 1 << 21
     assert sequence.accept(decode(datagram(1)))
     accepted = [sequence.accept(decode(datagram(far + k))) for k in range(8)]
@@ -197,8 +197,8 @@ def test_a_new_stream_after_which_only_the_sensors_own_counter_has_moved_on_is_f
     assert [sequence.accept(r) for r in records][-1]
 
 
-def test_a_tare_collects_beside_the_cycle(streamed):
-    """Both took from one queue, and the one that came second raised IndexError."""
+def test_a_tare_collects_while_the_cycle_reads(streamed):
+    """Tare and cycle took from one queue, and the second of them raised IndexError."""
     receiver, sensor, client = streamed
     found = []
     thread = threading.Thread(target=lambda: found.extend(receiver.collect(0.2)))

@@ -1,4 +1,4 @@
-"""What does not fit the machine is refused when it is opened, by name and number."""
+"""Settings that do not fit the machine are refused at opening, by name and number."""
 
 import pytest
 
@@ -16,14 +16,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_does_not_fit_is_refused(benches, device, name):
+def test_settings_that_do_not_fit_the_machine_are_refused(benches, device, name):
     motor, limits, message = WRONG[name]
     with pytest.raises(RseaError, match=message):
         device(limits, **motor).open()
     assert benches().torque() == (0, False)
 
 
-def test_a_port_that_is_not_there_is_named(tmp_path):
+def test_a_port_that_does_not_exist_is_named(tmp_path):
     port = Port(str(tmp_path / "nothing"), 4_000_000, 1e-3)
     with pytest.raises(PortLost, match=r"port .*nothing: .*expected a serial port that is free"):
         port.open()

@@ -1,4 +1,4 @@
-"""The serial port on a pseudo-terminal: what comes is read whole, once, and not after it was thrown away."""
+"""The serial port on a pseudo-terminal: bytes are read whole, once, and not after they were discarded."""
 
 import os
 import time
@@ -50,13 +50,13 @@ def test_a_reply_in_pieces_is_read_whole(wire):
         assert received(port, len(piece)) == piece
 
 
-def test_without_a_reply_there_is_none_when_the_time_is_over(wire):
+def test_without_a_reply_nothing_is_returned_after_the_time_out(wire):
     port, _ = wire
     port.setPacketTimeoutMillis(2.0)
     assert port.receive() == b"" and port.isPacketTimeout() and port.left == 0.0
 
 
-def test_what_came_before_is_thrown_away(wire):
+def test_bytes_that_came_before_are_discarded(wire):
     port, near = wire
     os.write(near, b"older")
     time.sleep(0.05)

@@ -65,7 +65,7 @@ def test_a_supervised_toy_is_stopped_when_the_driver_hangs(toy):
     assert device.protection.kind == NONE
 
 
-def test_a_supervised_toy_that_is_driven_on_is_left_alone(toy):
+def test_a_supervised_toy_that_is_still_driven_is_left_alone(toy):
     device = toy(supervised="yes", watchdog=1.0)
     loop = guarded(device)
     loop.open()
@@ -81,8 +81,8 @@ def test_a_supervised_toy_that_is_driven_on_is_left_alone(toy):
     device.close()
 
 
-def test_a_reboot_that_takes_its_time_under_torque_is_no_hang(toy):
-    """The supervisor was told of no torque only by the motor itself; it stopped what was being set up."""
+def test_a_long_reboot_under_torque_is_not_taken_for_a_hang(toy):
+    """Only the motor told the supervisor that its torque was off: one that was being set up was stopped."""
     device = toy(supervised="yes", boot="0.3")
     loop = guarded(device)
     loop.open()

@@ -82,8 +82,8 @@ def test_the_docs_have_every_model_with_its_constant():
         assert (f"| {constant.value:g} |" in row) if constant else ("not known, set it" in row)
 
 
-def test_every_model_is_on_the_bench_too_with_the_same_units():
-    """The bench has tables of its own: a slip of the pen in one of them shows here."""
+def test_the_bench_has_every_model_with_the_same_units():
+    """The bench has independent tables: a typing error in either of them fails here."""
     assert set(MODELS) == set(TABLES)
     names = {"goal": "goal_torque", "mode": "operating_mode", "watchdog": "bus_watchdog"}
     for number, model in MODELS.items():
@@ -126,7 +126,7 @@ def test_each_series_makes_the_torque_and_says_what_it_is(benches, model):
         ({"torque_limit": 300}, "torque_limit = 2 N m, expected at most 1.439 N m, the motor's own limit"),
     ],
 )
-def test_what_the_motor_is_set_to_is_compared_with_the_drivers_limits(benches, values, told):
+def test_the_settings_of_the_motor_are_compared_with_the_drivers_limits(benches, values, told):
     bench = benches(1020)
     usual = {"drive_mode": 0, "startup": 0, "temperature_limit": 80, "max_voltage": 160, "torque_limit": 1193}
     bench.ask("set", **values)

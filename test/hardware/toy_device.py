@@ -48,10 +48,10 @@ class Toy:
         self.torque, self.on = 0.0, False
 
     def zero_ft(self):
-        """Have no sensor."""
+        """Do nothing: there is no sensor."""
 
     def recover(self):
-        """Be there."""
+        """Do nothing: the toy is always ready."""
 
     def reboot(self):
         self.disable()

@@ -1,4 +1,4 @@
-"""Fault managers make faults of the codes: the table in the docs is that of the code."""
+"""The table of fault codes in the docs, on which fault managers rely, is that of the code."""
 
 import re
 from pathlib import Path

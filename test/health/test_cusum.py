@@ -30,7 +30,7 @@ def test_false_alarms_stay_below_the_stated_rate_even_at_the_edge_of_the_doubt(c
     assert rate_of_alarms(h, OUTER, 1_000, seed=1) > 5.0 * stated
 
 
-def test_a_change_is_found_within_a_few_looks_and_none_without_excitation():
+def test_a_change_is_found_within_a_few_looks_and_only_with_excitation():
     cusum = Cusum(INNER, OUTER, threshold(1e-3, 4, EVERY))
     looks = 0
     while not cusum.take(np.array([40.0, 0.0]), np.array([20.0, 0.0]), NONE):
@@ -40,6 +40,6 @@ def test_a_change_is_found_within_a_few_looks_and_none_without_excitation():
     assert not any(cusum.take(np.zeros(2), np.zeros(2), NONE) for _ in range(1000)) and not cusum.suspects
 
 
-def test_one_look_however_strange_is_no_alarm():
+def test_a_single_look_is_never_an_alarm():
     cusum = Cusum(INNER, OUTER, threshold(1e-3, 4, EVERY))
     assert not cusum.take(np.full(2, 1e9), np.full(2, 1.0), NONE) and cusum.suspects

@@ -1,4 +1,4 @@
-"""Blocks give the innovations of the observer, and the evidence of a look the change that made it."""
+"""A block gives the innovations of the observer, and the evidence of a look gives the change behind it."""
 
 import numpy as np
 import pytest

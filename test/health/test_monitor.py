@@ -1,4 +1,4 @@
-"""The whole watch on a bench that shares no code with the model: what changed is named and sized."""
+"""The whole watch on a bench that shares no code with the model: changes are named and sized."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_a_joint_in_a_position_loop_is_refused():
         ({"ft_gain": 1.1}, "RSEA_FT_GAIN", 0.1, 0.02),
     ],
 )
-def test_what_changes_is_named_and_sized(fault, code, size, tolerance):
+def test_a_change_is_named_and_sized(fault, code, size, tolerance):
     _, (finding,) = watched(**fault)
     assert finding.code == code and finding.confidence > 0.95
     assert finding.size == pytest.approx(size, abs=tolerance)

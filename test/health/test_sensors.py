@@ -1,4 +1,4 @@
-"""What the sensors themselves show: frozen, missing, no numbers, and nothing of it on a good record."""
+"""Findings on the sensors themselves: frozen, missing, not a number; none on a good record."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def stopped(y):
     return y
 
 
-def test_a_good_record_has_nothing_nor_has_rest():
+def test_a_good_record_and_rest_have_no_findings():
     still = synthesize(RIG, Channel(T, np.zeros(len(T))), seed=1)
     assert found() == [] and found(**still.channels) == []
 
@@ -60,7 +60,7 @@ def test_values_that_are_no_numbers_are_counted():
     assert found(ft=with_values("ft", spoilt)) == [("RSEA_BAD_DATA", "3 no numbers")]
 
 
-def test_a_clock_that_is_set_begins_anew_and_is_said():
+def test_after_a_clock_was_set_the_watch_restarts_and_reports_it():
     monitor = Monitor(RIG, noise_of(RIG))
     t, kind, values = events_of(RECORD)
     monitor.take(t, kind, values)

@@ -1,4 +1,4 @@
-"""Makes `benches`, which is no test, importable for the tests of the identification."""
+"""Make `benches`, which is no test, importable for the tests of the identification."""
 
 import sys
 from pathlib import Path

@@ -25,7 +25,7 @@ LEFT = [FT, POSITION, FT_RATE, POSITION_RATE]
 
 @dataclass(frozen=True)
 class Problem:
-    """What the clocks' test asks of a problem."""
+    """The part of a problem that the test of the clocks uses."""
 
     unknowns: tuple
     cases: tuple = ("one", "two")
@@ -64,13 +64,13 @@ ONE_BLOCK, OWN_BLOCKS = np.zeros(4, np.int64), np.arange(4)
         ((0, 1, 1, 0), math.inf, (1, 0, 0, 1), ONE_BLOCK, 0.0),  # the other unknown itself
     ],
 )
-def test_by_how_many_standard_deviations_a_clock_is_asked_for(jacobian, doubt, residual, blocks, z):
+def test_a_clock_is_asked_for_by_its_standard_deviations(jacobian, doubt, residual, blocks, z):
     fit = solution(residual, jacobian, doubt=doubt)
     columns = np.array([[0.0, 2.0, 2.0, 0.0]]).T
     assert clocks._score(fit, columns, [0], [FT], blocks) == pytest.approx(z, abs=1e-9)
 
 
-def test_a_clock_that_nothing_shows_is_not_asked_for():
+def test_a_clock_without_sensitivity_is_not_asked_for():
     fit = solution((1, 2, 3, 4), (1, 0, 0, 0))
     assert clocks._score(fit, np.zeros((4, 1)), [0], [FT], ONE_BLOCK) == 0.0
 
@@ -99,7 +99,7 @@ def test_a_second_clock_is_asked_for_beside_the_first(doubt, z):
         (0.5, [(0, 1, 0, 0)], math.sqrt((2.4**2 + 3.2**2 + 25) / 4)),
     ],
 )
-def test_what_a_fit_with_clocks_would_leave(doubt, taken, left):
+def test_the_cost_that_a_fit_with_clocks_would_leave_is_predicted(doubt, taken, left):
     fit = solution((3, 4, 0, 5), (1, 0, 0, 0), doubt=doubt)
     columns = np.array(taken, float).reshape(len(taken), 4).T
     free = [unknown("clock.ft", doubt)] * len(taken)
@@ -115,14 +115,14 @@ def test_what_a_fit_with_clocks_would_leave(doubt, taken, left):
         (1.0, 0.5, 15.0 / 14.0),  # of (3 1, 1 5)
     ],
 )
-def test_how_many_times_as_wide_an_interval_were_with_a_clock_free(doubt, clock_doubt, wider):
+def test_a_free_clock_widens_an_interval_by_a_known_factor(doubt, clock_doubt, wider):
     fit = solution((0, 0, 0, 0), (1, 1, 0, 0), (0, 0, 0, 3), doubt=doubt, names=["near", "apart"])
     columns = np.array([(1, 0, 0, 0)], float).T
     cost = clocks._cost(fit, columns, [unknown("clock.ft", clock_doubt)])
     assert cost == pytest.approx({"near": math.sqrt(wider), "apart": 1.0})
 
 
-def test_an_unknown_that_nothing_shows_costs_nothing():
+def test_an_unknown_without_sensitivity_costs_nothing():
     cost = clocks._cost(solution((0, 0), (0, 0)), np.array([[1.0], [0.0]]), [FT])
     assert cost == {"value.0": 0.0}
 
@@ -193,7 +193,7 @@ def test_every_clock_may_be_asked_for(world, monkeypatch):
 @pytest.mark.parametrize(
     ("left", "taken"), [(1.3, ["clock_rate.ft", "clock.position"]), (1.31, ["clock.position"])]
 )
-def test_a_rate_that_stands_in_for_a_misfit_is_none(world, left, taken):
+def test_a_clock_rate_that_imitates_a_misfit_is_not_accepted(world, left, taken):
     world.z = {("clock_rate.ft",): 9.0, ("clock.position", "clock_rate.ft"): 4.0}
     world.left = left
     assert [u.name for u in world.asked().clocks] == taken
@@ -217,7 +217,7 @@ def test_a_rig_that_is_judged_by_torque_has_no_clocks_to_ask_for(world):
     assert world.asked() == Asked((), None)
 
 
-def test_clocks_asked_for_begin_at_right():
+def test_requested_clocks_start_at_zero_offset():
     fit = solution((0, 0), (1, 0), theta=[0.5])
     problem, theta = freed(fit, Asked((FT, FT_RATE)))
     assert [u.name for u in problem.unknowns] == ["value.0", "clock.ft", "clock_rate.ft"]
@@ -250,7 +250,7 @@ def test_a_clock_within_two_standard_deviations_of_right_is_taken_as_right(
     [(None, ()), ({}, ()), ({"a": 1.0, "b": 1.9}, ()), ({"a": 2.0, "b": 1.0}, ("a", 2.0)),
      ({"a": 2.0, "b": 3.0, "c": 1.0}, ("b", 3.0))],
 )  # fmt: skip
-def test_the_largest_cost_is_said_from_twice_on(cost, said):
+def test_the_largest_cost_is_reported_from_a_factor_of_two(cost, said):
     assert [(r.code, r.names, r.values) for r in Asked((), cost).remarks] == [
         ("clocks_taken_as_right", said[:1], said[1:])
     ] * bool(said)

@@ -1,4 +1,4 @@
-"""Clocks enter a fit where the data ask for them, and only there."""
+"""Clocks are fitted only where the data require it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def clocks(result):
     return {p.name: p for p in result.parameters if p.name.startswith("clock")}
 
 
-def test_right_clocks_are_left_alone_and_their_cost_is_said():
+def test_correct_clocks_are_left_alone_and_their_cost_is_reported():
     nominal, true = bench("paper_high_impedance", 1)
     result = identify([recorded(true, 1, 20.0)], nominal)
     assert clocks(result) == {}
@@ -49,7 +49,7 @@ def test_right_clocks_are_left_alone_and_their_cost_is_said():
         (1.5e-4, -90.0, {"clock.ft", "clock_rate.ft"}),
     ],
 )
-def test_a_wrong_clock_is_asked_for_with_its_size(offset, ppm, moved):
+def test_a_wrong_clock_is_fitted_with_its_size(offset, ppm, moved):
     nominal, true = bench("paper_high_impedance", 1)
     result = identify([with_clock(recorded(true, 1, 20.0), "ft", offset, ppm)], nominal)
     assert set(clocks(result)) == moved
@@ -61,7 +61,7 @@ def test_a_wrong_clock_is_asked_for_with_its_size(offset, ppm, moved):
     assert (sensor.clock_rate != 0.0) == ("clock_rate.ft" in moved)
 
 
-def test_a_rate_is_part_of_the_rig():
+def test_a_clock_rate_is_part_of_the_rig():
     _, true = bench("paper_high_impedance", 1)
     record = recorded(true, 1, 5.0)
     fast = replace(true, sensors={**true.sensors, "ft": Sensor(0.03, 0.0, clock_rate=200.0)})

@@ -7,28 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coloured_cases import RATE, case, white
 from scipy.signal import lfilter
 
 from rsea_ros.identification import coloured
 from rsea_ros.identification.coloured import is_noise, residual_of
-from rsea_ros.identification.spectra import Shape, segment_spectra, shape_of
-
-RATE = 256.0
-
-
-def white(size, seed=0):
-    return np.random.default_rng(seed).normal(size=size)
-
-
-def case(y, rate=RATE, mask=None):
-    """A case of one channel, at whose command and motion nobody looks."""
-    t = np.arange(len(y)) / rate
-    return SimpleNamespace(
-        t={"ft": t},
-        mask={"ft": np.ones(len(y), bool) if mask is None else mask},
-        measured={"ft": y},
-        drive=SimpleNamespace(t=t, torque=np.sin(3.0 * t), q=np.cos(5.0 * t), v=np.sin(7.0 * t)),
-    )
 
 
 def passes(y, **more):
@@ -40,7 +23,7 @@ FINE = {"_lasting": 0.0, "_slow": 0.0, "off": 0.0, "_unsteady": 0.0, "_kurtosis"
 
 @pytest.fixture
 def measured(monkeypatch):
-    """Have every measure of a residual give a number."""
+    """Make every measure of a residual return a given number."""
 
     def set_to(**values):
         numbers = {**FINE, **values}
@@ -81,7 +64,7 @@ def test_a_residual_that_fails_in_one_point_is_a_misfit(measured, values, noise)
 
 
 @pytest.mark.parametrize(("size", "noise"), [(1499, False), (1500, True)])
-def test_short_records_do_not_say(measured, size, noise):
+def test_short_records_decide_nothing(measured, size, noise):
     measured()
     assert passes(white(size)) is noise
 
@@ -99,7 +82,7 @@ def test_measures_are_given_the_rate_of_the_channel_and_the_ratio_of_the_gear(
     assert seen == pytest.approx([100.0, ratio])
 
 
-def test_no_residual_is_no_noise(measured):
+def test_an_empty_residual_is_not_noise(measured):
     measured()
     assert passes(np.zeros(2000)) is False
     assert passes(np.where(np.arange(2000) % 2, 0.0, white(2000))) is True, "some zeros are"
@@ -134,234 +117,3 @@ def test_a_misfit_in_noise_does_not_pass(misfit):
 def test_the_residual_is_measured_less_simulated_and_zero_where_it_does_not_count():
     made = case(np.array([5.0, 7.0, 9.0]), mask=np.array([True, False, True]))
     assert residual_of(made, {"ft": np.array([1.0, 1.0, 2.0])}, "ft").tolist() == [4.0, 0.0, 7.0]
-
-
-ALTERNATING = np.resize([1.0, -1.0], 10_000)
-
-
-@pytest.mark.parametrize(
-    ("values", "share"),
-    [
-        (np.full(1000, 3.0), 1.0),
-        (np.linspace(-2.0, 5.0, 1000), 1.0),
-        (ALTERNATING, 0.0),
-        (ALTERNATING + 1.0, 0.5),
-        (ALTERNATING + 2.0, 0.8),
-        (ALTERNATING + np.linspace(-3.0, 3.0, 10_000), 0.75),  # a trend of RMS sqrt(3)
-        (np.linspace(-1.0, 1.0, 10_000) ** 2 - 1.0 / 3.0, 0.0),  # a curve is neither
-    ],
-)
-def test_the_share_of_a_constant_and_a_trend(values, share):
-    assert coloured._lasting(values) == pytest.approx(share, abs=2e-3)
-
-
-def toned(size, *tones, rate=RATE):
-    """Sines of given frequency (Hz) and amplitude."""
-    t = np.arange(size) / rate
-    return sum(a * np.sin(2.0 * math.pi * f * t + 0.3) for f, a in tones)
-
-
-def shaped(size, density, seed=0):
-    """Noise of a power density that is a function of frequency (Hz)."""
-    spectrum = np.fft.rfft(white(size, seed))
-    frequency = np.linspace(0.0, 0.5 * RATE, len(spectrum))
-    return np.fft.irfft(spectrum * np.sqrt(density(frequency)), size)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "expected"),
-    [
-        (0.0, 0.25, 50.0),  # all of what is called slow
-        (0.12, 0.25, 50.0 * 0.5),  # half of it
-        (0.25, 0.3, 1.0),  # between: neither
-        (0.3, 1.0, 1.0 / 50.0),
-        (0.3, 0.65, 1.0 / 25.5),  # half of what it is compared with
-        (1.0, 99.0, 1.0),
-    ],
-)
-def test_slow_is_below_a_quarter_of_a_hertz(low, high, expected):
-    """Power of 50 within a band and of 1 elsewhere, over 256 s."""
-    y = shaped(2**16, lambda f: np.where((f >= low) & (f < high), 50.0, 1.0))
-    assert coloured._slow(y, RATE) == pytest.approx(expected, rel=0.35)
-
-
-@pytest.mark.parametrize(
-    ("line", "ratio"),
-    [
-        (0, 1.0),  # a mean
-        (1, 34.0),  # 100, 1 and 1 on average
-        (3, 34.0),
-        (4, 1.0),  # 0.25 Hz
-        (5, 0.1),  # 0.3125 Hz: 100 and ten times 1
-        (15, 0.1),
-        (16, 1.0),  # 1 Hz
-    ],
-)
-def test_which_lines_are_slow_and_which_they_are_compared_with(monkeypatch, line, ratio):
-    """Lines of a sixteenth of a hertz, one of which has a power of 100."""
-    spectra = np.ones((2, 129), complex)
-    spectra[:, line] = 10.0
-    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: spectra)
-    assert coloured._slow(np.zeros(9), 16.0) == pytest.approx(ratio)
-
-
-@pytest.mark.parametrize(("lines", "ratio"), [(101, 1.0), (81, 0.0)])
-def test_two_slow_lines_are_the_fewest(monkeypatch, lines, ratio):
-    """At 20 Hz: lines of 0.1 Hz, and of 0.125."""
-    monkeypatch.setattr(coloured, "segment_spectra", lambda *rest: np.ones((2, lines), complex))
-    assert coloured._slow(np.zeros(9), 20.0) == ratio
-
-
-def test_a_mean_is_not_slow():
-    y = white(2**15)
-    assert coloured._slow(y + 1e3, RATE) == pytest.approx(coloured._slow(y, RATE), rel=1e-6)
-
-
-@pytest.mark.parametrize(("seconds", "known"), [(14, False), (33, True)])
-def test_a_record_without_two_slow_lines_does_not_say_whether_it_is_slow(seconds, known):
-    """Segments of half its length: of 8 s one line lies below 0.25 Hz, of 16 s three."""
-    y = white(int(seconds * RATE)) + toned(int(seconds * RATE), (0.12, 9.0))
-    assert (coloured._slow(y, RATE) > 0.0) is known
-
-
-def test_values_too_rare_for_a_hertz_are_not_slow():
-    assert coloured._slow(white(64), 1e9) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("values", "excess"),
-    [
-        (lambda rng: rng.normal(size=50_000), 0.0),
-        (lambda rng: rng.uniform(-1.0, 1.0, 50_000), -1.2),
-        (lambda rng: rng.laplace(size=50_000), 3.0),
-        (lambda rng: 5.0 + 2.0 * rng.uniform(-1.0, 1.0, 50_000), -1.2),  # whatever mean and size
-    ],
-)
-def test_excess_kurtosis_of_known_distributions(values, excess):
-    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
-    assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.15)
-
-
-def test_kurtosis_is_that_of_the_whitened_residual():
-    """Smoothing makes anything Gaussian; what was smoothed is not."""
-    y = lfilter([1.0], [1.0, -0.97], np.random.default_rng(2).laplace(size=2**16))
-    shape = shape_of(segment_spectra(y, 1024, 8))
-    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
-    assert coloured._kurtosis(flat, y) < 0.3
-    assert coloured._kurtosis(shape, y) > 0.7
-
-
-def unsteady(y, shape=None):
-    spectra = segment_spectra(y, 1024, 8)
-    return coloured._unsteady(spectra, shape or shape_of(spectra), RATE)
-
-
-@pytest.mark.parametrize("memory", [0.0, 0.95])
-def test_power_of_stationary_noise_varies_as_it_should(memory):
-    worst = [unsteady(lfilter([1.0], [1.0, -memory], white(2**16, seed=k))) for k in range(8)]
-    assert 0.8 < np.mean(worst) < 1.6
-
-
-@pytest.mark.parametrize(("band", "least"), [((0.6, 3.0), 1.4), ((3.0, 10.0), 5.0), ((10.0, 40.0), 20.0)])
-def test_noise_that_comes_late_in_one_band_is_unsteady(band, least):
-    """The power of a band of n lines is off by its mean half of the time: n / 1.5 times what it may be."""
-    size = 2**16
-    burst = shaped(size, lambda f: np.where((f >= band[0]) & (f < band[1]), 40.0, 0.0), seed=5)
-    burst[: size // 2] = 0.0
-    lines = (band[1] - band[0]) * 1024 / RATE
-    value = unsteady(white(size) + burst)
-    assert value == pytest.approx(lines / 1.5, rel=0.35) and value > least
-
-
-def test_the_worst_band_says_whether_noise_is_steady():
-    calm = np.ones((10, 513), complex)
-    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
-    assert coloured._unsteady(calm, flat, RATE) == 0.0
-    burst = calm.copy()
-    burst[:5, 40:160] *= math.sqrt(3.0)  # from 10 to 40 Hz: 3 and 1, off by half of its mean
-    assert coloured._unsteady(burst, flat, RATE) == pytest.approx(0.25 * 120 / 1.5)
-    assert coloured._unsteady(burst, Shape(flat.share, 9.0 * flat.level, 0.0), RATE) == pytest.approx(20.0)
-
-
-def share(a, b):
-    return coloured._shared(segment_spectra(a, 512, 16), segment_spectra(b, 512, 16), RATE)
-
-
-@pytest.mark.parametrize(
-    ("gain", "expected"),
-    [(0.0, 0.0), (0.5, 0.2), (1.0, 0.5), (2.0, 0.8), (-1.0, 0.5), (1e6, 1.0)],
-)
-def test_the_share_of_the_power_that_is_coherent(gain, expected):
-    witness = white(2**15, seed=1)
-    assert share(white(2**15) + gain * witness, witness) == pytest.approx(expected, abs=0.04)
-    assert share(white(2**15) + gain * witness, 1e3 * witness) == pytest.approx(expected, abs=0.04)
-
-
-def test_chance_is_taken_away_from_coherence():
-    """Of 16 segments, 31 half overlapping, one in 29 of the power agrees by chance, in no band more."""
-    one_band = [share(white(8192, seed=k), white(8192, seed=1000 + k)) for k in range(40)]
-    assert -0.01 < np.mean(one_band) < 0.05  # the worst of four bands
-
-
-def test_the_worst_band_says_what_is_shared():
-    witness = white(2**16, seed=1)
-    low = shaped(2**16, lambda f: np.where(f < 4.0, 1.0, 0.0), seed=1)
-    assert share(white(2**16) + 3.0 * low, witness) == pytest.approx(0.9, abs=0.03)
-
-
-NOT_SHARED = -(1.056 / 4) / (1.0 - 1.056 / 4)
-"""Of four segments: what no coherence at all comes to, less what chance makes of it."""
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "expected"),
-    [
-        # lines of half a hertz: 1 to 7 below 4 Hz, 8 to 27 below 14, 28 to 99 below 50, 100 to 245 above
-        (1, 7, 1.0),
-        (1, 1, (1.0 + 6.0 * NOT_SHARED) / 7.0),
-        (8, 27, 1.0),
-        (28, 99, 1.0),
-        (100, 245, 1.0),
-        (0, 0, NOT_SHARED),
-        (246, 256, NOT_SHARED),
-    ],
-)
-def test_lines_that_are_shared_count_in_their_band(first, last, expected):
-    a, b = np.ones((4, 257), complex), np.ones((4, 257), complex)
-    b[2:] = -1.0
-    b[2:, first : last + 1] = 1.0
-    assert coloured._shared(a, b, RATE) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "lines"), [(2, 11, 10), (12, 39, 28), (40, 159, 120), (160, 491, 332), (0, 1, 0)]
-)
-def test_lines_that_are_unsteady_count_in_their_band(first, last, lines):
-    """Lines of a quarter of a hertz, with powers of 3 and 1: off by half of the mean."""
-    spectra = np.ones((10, 513), complex)
-    spectra[:5, first : last + 1] = math.sqrt(3.0)
-    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
-    assert coloured._unsteady(spectra, flat, RATE) == pytest.approx(0.25 * lines / 1.5)
-
-
-def test_no_power_is_not_shared():
-    assert share(np.zeros(8192), white(8192)) == pytest.approx(-1.056 / 31 / (1.0 - 1.056 / 31))
-
-
-def test_lines_lie_between_zero_and_half_the_rate():
-    assert coloured._lines(np.zeros((3, 5)), 8.0).tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-
-
-@pytest.mark.parametrize(
-    ("top", "lows", "inside"),
-    [
-        (10, (0.4, 3.0, 7.0), [[1, 2], [3, 4, 5, 6], [7, 8, 9]]),  # the last ends at 9.6
-        (10, (3.0, 9.0), [[3, 4, 5, 6, 7, 8]]),  # a band of one line has none
-        (10, (3.0, 20.0), [[3, 4, 5, 6, 7, 8, 9]]),
-        (10, (7.0, 8.0), [[8, 9]]),
-        (200, (188.5, 195.0), [[189, 190, 191]]),
-    ],
-)
-def test_bands_and_their_lines(top, lows, inside):
-    bands = coloured._bands(np.arange(top + 1.0), lows)
-    assert [np.flatnonzero(b).tolist() for b in bands] == inside

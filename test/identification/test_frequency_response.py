@@ -62,7 +62,7 @@ def test_noise_free_record_gives_the_transfer_function(kind: str, name: str) -> 
 
 
 @pytest.mark.parametrize("kind", ["chirp", "multisine"])
-def test_moving_output_with_its_antiresonance(kind: str) -> None:
+def test_the_antiresonance_of_the_moving_output_is_measured(kind: str) -> None:
     rig = load_rig("paper_moving_output")
     record = synthesize(rig, command_of(kind, KINDS[kind][0]), noise=False)
     gain, phase = errors(rig, estimate_response(record, "ft"))
@@ -84,7 +84,7 @@ def test_stamps_of_the_sensor_do_not_matter(kind: str, late: float) -> None:
     assert float(np.max(difference)) < 2e-3
 
 
-def test_short_record_by_local_polynomials() -> None:
+def test_a_short_record_is_evaluated_by_local_polynomials() -> None:
     rig = load_rig("paper_high_impedance")
     response = estimate_response(synthesize(rig, command_of("white_noise", 15.0), noise=False), "ft")
     gain, phase = errors(rig, response)
@@ -114,7 +114,7 @@ def test_jitter_and_missing_samples_leave_no_bias() -> None:
     assert np.mean(np.abs(response.sd / np.abs(response.response))[inside]) < 0.02
 
 
-def test_sensor_faster_than_the_command() -> None:
+def test_a_sensor_faster_than_the_command_leaves_no_bias() -> None:
     rig, command = load_rig("paper_high_impedance"), command_of("chirp", 60.0)
     stamps = np.arange(round(command.t[-1] * 1000.0)) / 1000.0
     gain, phase = errors(rig, estimate_response(sampled_at(rig, command, stamps), "velocity"), low=2.0)
@@ -122,7 +122,7 @@ def test_sensor_faster_than_the_command() -> None:
     assert phase < 1.0
 
 
-def test_torque_per_position_is_spring_and_damper() -> None:
+def test_torque_over_position_is_that_of_spring_and_damper() -> None:
     rig = load_rig("paper_high_impedance")
     response = estimate_response(
         synthesize(rig, command_of("chirp", 160.0), noise=False), "ft", input="position"
@@ -139,7 +139,7 @@ def test_motor_torque_follows_the_command() -> None:
     assert float(np.max(np.abs(response.response - 1.0))) < 1e-9
 
 
-def test_missing_channel_and_short_record_are_said() -> None:
+def test_a_missing_channel_and_a_short_record_are_named() -> None:
     record = synthesize(load_rig("bare_drive"), command_of("white_noise", 15.0))
     with pytest.raises(ChannelError, match="no channel 'ft'"):
         estimate_response(record, "ft")

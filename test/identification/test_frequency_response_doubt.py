@@ -28,7 +28,7 @@ def noisy(kind: str, duration: float, seed: int, level: float) -> tuple[Record, 
 @pytest.mark.parametrize(
     ("kind", "duration"), [("white_noise", 80.0), ("chirp", 60.0), ("multisine", 60.0), ("white_noise", 15.0)]
 )
-def test_circles_hold_the_truth(kind: str, duration: float) -> None:
+def test_circles_contain_the_truth(kind: str, duration: float) -> None:
     inside, count = 0, 0
     for seed in SEEDS:
         clean, record = noisy(kind, duration, seed, level=0.5)
@@ -56,7 +56,7 @@ def test_coherence_falls_with_noise() -> None:
 
 
 @pytest.mark.parametrize(("effect", "distorts"), [("nonlinear_spring", True), (None, False)])
-def test_distortion_is_told_from_noise(effect: str | None, distorts: bool) -> None:
+def test_distortion_is_distinguished_from_noise(effect: str | None, distorts: bool) -> None:
     rig = load_rig("paper_high_impedance")
     if effect:
         rig = rig.with_effects(EffectSetting(effect, {"cubic": 2000.0}))

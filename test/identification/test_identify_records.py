@@ -51,7 +51,7 @@ def test_the_ft_sensor_stamped_half_a_sample_later_gives_the_same_parameters(cas
     agree(off_grid, true)
 
 
-def test_stamps_count_not_places(case):
+def test_stamps_count_and_not_positions_in_the_record(case):
     """A sensor read half a sample later but stamped as if not is late: the residual shows it."""
     nominal, true, record = case
     later = sampled(true, record, {"ft": record["ft"].t + 0.5 * PERIOD}, 8)
@@ -62,7 +62,7 @@ def test_stamps_count_not_places(case):
 
 
 @pytest.mark.parametrize("deviation", [5e-5, 3e-4])
-def test_jitter(case, deviation):
+def test_jittered_stamps_leave_no_bias(case, deviation):
     nominal, true, record = case
     rng = np.random.default_rng(9)
     names = ("ft", "position", "velocity")
@@ -72,7 +72,7 @@ def test_jitter(case, deviation):
     assert result.rig["spring.stiffness"] == pytest.approx(true["spring.stiffness"], rel=2e-4)
 
 
-def test_missing_samples(case):
+def test_missing_samples_leave_no_bias(case):
     nominal, true, record = case
     rng = np.random.default_rng(11)
     keep = {
@@ -83,13 +83,13 @@ def test_missing_samples(case):
     agree(identify([thinned], nominal), true)
 
 
-def test_sensors_of_other_rates(case):
+def test_sensors_of_other_rates_leave_no_bias(case):
     nominal, true, record = case
     stamps = {"ft": np.arange(0.003, 9.9, 1.0 / 1000.0), "position": np.arange(0.01, 9.9, 1.0 / 100.0)}
     agree(identify([sampled(true, record, stamps, 12)], nominal), true)
 
 
-def test_several_bags_tell_more_than_one(case):
+def test_several_bags_narrow_the_intervals(case):
     nominal, true, record = case
     second = recorded(true, 13, 10.0)
     one, two = identify([record], nominal), identify([record, second], nominal)
@@ -100,8 +100,8 @@ def test_several_bags_tell_more_than_one(case):
     assert len(two.sources) == 2
 
 
-def test_a_controller_in_the_loop():
-    """The bag's command is what the loop made; the rig names the controller and the bag has the reference."""
+def test_values_are_recovered_with_a_controller_in_the_loop():
+    """The bag's command comes from the loop; the rig states the controller and the bag has the reference."""
     nominal, true = bench("paper_high_impedance", 14)
     loop = Controller(k_p=30.0, k_v=20.0)
     nominal, true = (replace(rig, controller=loop) for rig in (nominal, true))
@@ -128,7 +128,7 @@ def closed_loop(rig: Rig, seed: int) -> Record:
     return Record({"command": made, "reference": asked["reference"], **measured}, source="loop")
 
 
-def test_a_sensor_without_a_known_zero(case):
+def test_a_sensor_without_a_known_zero_leaves_no_bias(case):
     nominal, true, record = case
     sensors = {**nominal.sensors, "position": replace(nominal.sensors["position"], zero_unknown=True)}
     shifted = record.with_channels(position=Channel(record["position"].t, record["position"].y + 0.7))
@@ -151,7 +151,7 @@ def test_nan_and_stamps_that_go_back_are_refused(case):
 
 @pytest.mark.parametrize("torque", [0.0, 10.0])
 def test_a_constant_torque_is_refused_in_words(torque):
-    """It ended in LinAlgError, or in a report that JSON cannot hold."""
+    """It raised LinAlgError, or made a report that JSON cannot hold."""
     t = np.arange(2800) / 280.0
     channels = {
         name: Channel(t, np.full(len(t), value))
@@ -177,8 +177,8 @@ def test_stamps_that_scatter_about_the_clock_of_a_sensor_are_put_on_it(case):
     agree(result, true)
 
 
-def test_how_well_an_even_clock_is_known_is_in_the_intervals(case):
-    """Its zero is known to 3 µs, which move the dampings by two half-widths: four in five intervals held."""
+def test_the_doubt_of_an_even_clock_is_in_the_intervals(case):
+    """The clock's zero is known to 3 µs, which move the dampings by two half-widths: one in five missed."""
     nominal, _, record = case
     rng = np.random.default_rng(9)
     clocks = {n: "ft" if n == "ft" else "joint" for n in record.channels if n != "command"}
@@ -193,8 +193,8 @@ def test_how_well_an_even_clock_is_known_is_in_the_intervals(case):
 
 
 @pytest.mark.parametrize("clocks", [("command",), ("command", "ft", "joint")], ids=["commands", "all"])
-def test_so_are_the_stamps_of_commands(case, clocks):
-    """The model was driven at wrong instants: 29 times the noise, and nothing explained it."""
+def test_stamps_of_commands_that_scatter_are_put_on_an_even_clock(case, clocks):
+    """The model was driven at wrong instants: a residual of 29 times the noise, which no effect explained."""
     nominal, true, record = case
     rng = np.random.default_rng(12)
     off = {c: rng.uniform(-3e-4, 3e-4, len(record["command"])) for c in clocks}

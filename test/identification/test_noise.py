@@ -1,4 +1,4 @@
-"""The noise floor: of coloured noise, coarse steps, slow channels, and never that of a misfit."""
+"""The noise floor of coloured noise, coarse steps and slow channels; a misfit never raises it."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def test_states_slower_than_the_commands_have_the_noise_of_their_sensors():
         assert result.noise_rms[n] == pytest.approx(full.noise_rms[n], rel=0.3), n
 
 
-def test_noise_that_agrees_with_another_sensor_is_no_noise():
-    """What both sensors see is a torque that the model lacks, however random it looks."""
+def test_a_residual_coherent_with_another_sensor_is_not_noise():
+    """A torque that both sensors see is missing in the model, however random it looks."""
     from types import SimpleNamespace
 
     rng = np.random.default_rng(7)
@@ -112,7 +112,7 @@ def test_noise_that_agrees_with_another_sensor_is_no_noise():
 
 
 @pytest.mark.parametrize("size", [64, 80])
-def test_a_short_channel_does_not_tell_whether_its_noise_is_flat(size):
+def test_a_short_channel_does_not_show_whether_its_noise_is_flat(size):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         rms, flat = top_of_band(np.random.default_rng(0).normal(size=size))
@@ -120,7 +120,7 @@ def test_a_short_channel_does_not_tell_whether_its_noise_is_flat(size):
     assert not flat
 
 
-def test_a_channel_that_repeats_the_command_has_no_less_than_no_noise():
+def test_a_channel_that_repeats_the_command_has_positive_noise():
     t = np.arange(600) / 280.0
     command = Channel(t, 20.0 * np.sin(0.01 * t))
     torque = Channel(t + 1.0 / 280.0, 3.0 * command.y)

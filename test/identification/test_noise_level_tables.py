@@ -1,4 +1,4 @@
-"""The noise after a fit as tables: residuals of known power, and what passes for noise, in; the noise out."""
+"""The noise after a fit as tables: residuals of known power and scripted decisions in, the noise out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def case(noise, drive=DRIVE, least=None, mask=None, first=START, **measured):
 
 
 class World:
-    """Scripts. white: by size, level and flatness of the top of the band. noises: what passes for noise."""
+    """Scripted measures. white: by size, level and flatness of the top of the band. noises: accepted."""
 
     def __init__(self, monkeypatch):
         self.white, self.noises, self.asked = {}, set(), []
@@ -70,7 +70,7 @@ def world(monkeypatch):
         (2.0, 0.50, True, MOTION, False, 1.0, False),  # filtered: the top of the band says nothing
     ],
 )
-def test_the_noise_of_a_channel(world, before, white, flat, drive, passes, after, coloured):
+def test_the_noise_follows_from_the_residual(world, before, white, flat, drive, passes, after, coloured):
     world.white = {4096: (white, flat)}
     world.noises = {"ft"} if passes else set()
     known = world.known(case({"ft": before}, drive, ft=alternating(1.0)))
@@ -79,14 +79,14 @@ def test_the_noise_of_a_channel(world, before, white, flat, drive, passes, after
 
 
 @pytest.mark.parametrize(("least", "after"), [({"ft": 3.0}, 3.0), ({"ft": 0.1}, 0.97), ({}, 0.97)])
-def test_no_noise_below_the_least(world, least, after):
+def test_the_noise_is_never_below_the_least(world, least, after):
     world.white = {4096: (0.97, True)}
     known = world.known(case({"ft": 2.0}, least=least, ft=alternating(1.0)))
     assert known.noise == pytest.approx({"ft": after}, rel=1e-12)
 
 
 @pytest.mark.parametrize(("rms", "asked"), [(1.04, []), (1.0401, ["ft"])])
-def test_what_lies_four_percent_above_is_asked_about(world, rms, asked):
+def test_a_residual_four_percent_above_is_tested_for_coloured_noise(world, rms, asked):
     world.white = {4096: (1.0, True)}
     world.known(case({"ft": 1.0}, ft=alternating(rms)))
     assert [channel for channel, _ in world.asked] == asked
@@ -111,7 +111,7 @@ def test_a_misfit_of_one_channel_leaves_no_other_coloured(world):
     assert known.noise == {"ft": 1.0, "position": 1.0} and known.coloured == {"ft", "position"}
 
 
-def test_a_channel_at_its_noise_is_not_asked_about(world):
+def test_a_channel_at_its_noise_is_not_tested(world):
     world.white, world.noises = {4096: (0.5, True), 2048: (1.0, True)}, {"ft"}
     known = world.known(
         case({"ft": 9.0, "position": 1.0}, ft=alternating(1.0), position=alternating(1.0, 2048))
@@ -121,13 +121,13 @@ def test_a_channel_at_its_noise_is_not_asked_about(world):
 
 
 @pytest.mark.parametrize(("more", "ratio"), [({}, 1.0), ({"ratio": 502.0}, 502.0)])
-def test_the_ratio_of_the_gear_goes_to_whoever_looks_for_ripple(world, more, ratio):
+def test_the_gear_ratio_reaches_the_search_for_ripple(world, more, ratio):
     world.white = {4096: (0.5, True)}
     world.known(case({"ft": 9.0}, ft=alternating(1.0)), **more)
     assert world.asked == [("ft", ratio)]
 
 
-def test_only_samples_that_count_and_channels_that_are_simulated(world):
+def test_only_valid_samples_of_simulated_channels_count(world):
     world.white = {4096: (0.5, False), 100: (0.5, True)}
     y, keep = alternating(1.0), np.ones(4096, bool)
     y[:1000], keep[:1000] = 50.0, False
@@ -164,7 +164,7 @@ def seconds(*amplitudes):
         (seconds(1.0, 1.0, 1.0, SQRT3), START, slice(3 * 256 + 1, None), None, 0.25 * SQRT3 / 1.5 / 2.0),
     ],
 )
-def test_coloured_noise_has_room_for_its_own_doubt(world, left, first, gone, rms, doubt):
+def test_coloured_noise_has_an_allowance_for_its_doubt(world, left, first, gone, rms, doubt):
     """Two standard deviations of the RMS, from how the power varies from second to second."""
     world.white, world.noises = {len(left): (0.1, True)}, {"ft"}
     keep = np.ones(len(left), bool)

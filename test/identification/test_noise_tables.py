@@ -83,7 +83,7 @@ def test_from_64_samples_on_a_channel_has_a_spectrum(size, short):
         (sensor(40.0, 3.0), 4.0),
     ],
 )
-def test_the_least_noise_of_fine_values(stated, least):
+def test_fine_values_have_a_least_noise(stated, least):
     assert least_noise(white(4000) / np.std(white(4000)), stated) == pytest.approx(least, rel=1e-6)
 
 
@@ -101,7 +101,7 @@ def test_fine_steps_count_half_as_the_rig_states_them():
     assert least_noise(coarse, sensor(0.0, 1.0)) == 0.5
 
 
-def test_a_channel_that_stands_still_has_more_than_no_noise():
+def test_a_channel_that_stands_still_has_positive_noise():
     assert least_noise(np.zeros(100), sensor()) > 0.0
 
 
@@ -187,7 +187,7 @@ LOG = lfilter([0.25, 0.5, 0.25], [1.0], white(2**14))
         (LOG, sensor(100.0), 100.0),
     ],
 )
-def test_what_the_rig_states_counts_where_the_spectrum_is_not_flat(y, stated, floor):
+def test_the_noise_that_the_rig_states_counts_where_the_spectrum_is_not_flat(y, stated, floor):
     assert noise_floor(record(y), "ft", stated) == pytest.approx(floor, rel=0.1)
 
 
@@ -215,7 +215,7 @@ def test_steps_and_noise_that_are_stated_add_up():
 
 
 @pytest.mark.parametrize("gain", [0.0, 0.5, 20.0])
-def test_what_follows_the_command_linearly_is_no_noise(gain):
+def test_a_linear_response_to_the_command_is_not_noise(gain):
     command = white(2**15, seed=5)
     response = lfilter([0.0, gain], [1.0, -0.3], command)
     y = response + white(2**15, 0.1, seed=6)
@@ -229,7 +229,7 @@ def test_few_segments_do_not_make_noise_smaller():
     assert 0.98 < np.mean(floors) / np.mean(alone) < 1.05
 
 
-def test_what_is_not_finite_does_not_count():
+def test_values_that_are_not_finite_do_not_count():
     y, command = white(2**13), white(2**13, seed=7)
     y[100:200] = np.nan
     command[50] = np.nan
@@ -241,7 +241,7 @@ def test_a_channel_that_only_repeats_the_command_has_nearly_no_noise():
     assert noise_floor(record(np.roll(command, 1), command), "ft", sensor()) < 0.02
 
 
-def test_the_command_held_before_an_instant():
+def test_the_command_in_force_at_an_instant_is_the_last_one_before_it():
     command = Channel(np.arange(4.0), np.array([1.0, 2.0, np.nan, 4.0]))
     at = np.array([-1.0, 0.0, 0.9, 1.0, 2.5, 3.0, 9.0])
     assert noise._held_before(command, at).tolist() == [1.0, 1.0, 1.0, 2.0, 0.0, 4.0, 4.0]
@@ -268,5 +268,5 @@ GRID = np.resize(np.arange(-3.0, 4.0), 100)
         (np.full(100, 5.0), 0.0),
     ],
 )
-def test_the_step_of_coarse_values(values, step):
+def test_the_step_of_coarse_values_is_found(values, step):
     assert step_of(values) == pytest.approx(step)

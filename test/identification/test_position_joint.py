@@ -1,4 +1,4 @@
-"""Joints that positions command, identified in their loop: values, gains, and what cannot be told."""
+"""Joints commanded by positions, identified in their loop: values, gains, and what is not determined."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def with_spread(rig: Rig, spreads: Mapping[str, float]) -> Rig:
 
 
 def rigid(rig: Rig) -> Rig:
-    """Return a joint whose shaft gives nowhere, its rotor's inertia known."""
+    """Return a joint with a rigid shaft and a known rotor inertia."""
     kept = {n: q for n, q in rig.quantities.items() if n.split(".")[0] != "spring"}
     return replace(rig, quantities=kept, rigid_spring=True)
 
@@ -54,7 +54,7 @@ def stiff() -> Rig:
     return replace(rigid(load_rig("pd_joint")), known=frozenset({"gear.ratio", "spring_end.inertia"}))
 
 
-def test_values_and_a_doubted_gain_from_position_and_current(stiff):
+def test_position_and_current_determine_the_values_and_a_doubted_gain(stiff):
     nominal = with_spread(stiff, {"controller.k_p": 0.3})
     result = identify([run(stiff.with_values(TRUE))], nominal)
     assert result.verdict == "adequate"
@@ -64,7 +64,7 @@ def test_values_and_a_doubted_gain_from_position_and_current(stiff):
         assert sigma < 0.05 * true
 
 
-def test_without_a_current_only_ratios_to_the_gains_are_told(stiff):
+def test_without_a_current_only_ratios_to_the_gains_are_determined(stiff):
     free = {
         "controller.k_p": 0.3,
         "controller.k_d": 0.3,
@@ -81,7 +81,7 @@ def test_without_a_current_only_ratios_to_the_gains_are_told(stiff):
     assert sigma > 0.1 * estimate
 
 
-def test_the_checks_speak_of_targets(stiff):
+def test_the_checks_mention_targets_and_not_commands(stiff):
     record = run(stiff)
     found = check_record(record, stiff)
     assert found.light != "red"

@@ -32,7 +32,7 @@ def bench_of_eq_10(noise: float) -> Record:
     )
 
 
-def test_eq_10_from_a_record() -> None:
+def test_a_record_gives_eq_10() -> None:
     fit = fit_second_order(estimate_response(bench_of_eq_10(noise=0.0), "ft"), high=60.0)
     assert (fit.c, fit.a1, fit.a0) == pytest.approx((C, A1, A0), rel=2e-4)
     values = effective_values(K_S, fit.c, fit.a1, fit.a0)
@@ -40,14 +40,14 @@ def test_eq_10_from_a_record() -> None:
     assert values.damping == pytest.approx(26.088, rel=2e-4)
 
 
-def test_eq_10_from_a_noisy_record_within_its_interval() -> None:
+def test_a_noisy_record_gives_eq_10_within_its_interval() -> None:
     fit = fit_second_order(estimate_response(bench_of_eq_10(noise=0.2), "ft"), high=60.0)
     sd = np.sqrt(np.diag(fit.covariance))
     assert np.all(np.abs(np.array([fit.c - C, fit.a1 - A1, fit.a0 - A0])) < 3.0 * sd)
     assert np.all(sd / np.array([C, A1, A0]) < 0.01)
 
 
-def test_reference_numbers_of_eq_10() -> None:
+def test_eq_10_has_its_reference_numbers() -> None:
     printed = SecondOrder(C, A1, A0, np.zeros((3, 3)))
     values = effective_values(K_S, C, A1, A0)
     assert values.inertia == pytest.approx(0.95677, abs=5e-6)
@@ -57,7 +57,7 @@ def test_reference_numbers_of_eq_10() -> None:
     assert printed.damping_ratio == pytest.approx(0.337, abs=5e-4)
 
 
-def test_band_without_lines_is_said() -> None:
+def test_a_band_without_lines_is_refused() -> None:
     response = estimate_response(bench_of_eq_10(noise=0.0), "ft")
     with pytest.raises(IdentificationError, match="0 lines from 200 to 300 Hz, expected at least 4"):
         fit_second_order(response, low=200.0, high=300.0)

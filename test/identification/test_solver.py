@@ -39,8 +39,8 @@ def test_the_minimum_of_a_curve_is_found():
     assert solve(Decay()).theta == pytest.approx([2.0, 3.0], rel=1e-5)
 
 
-def test_a_cliff_behind_the_minimum_is_walked_around():
-    """A step over it is taken shorter; where a derivative needs one, that unknown stays for a while."""
+def test_a_cliff_behind_the_minimum_is_avoided():
+    """A step over the cliff is shortened; an unknown whose derivative would cross it is held for a while."""
     found = solve(Decay(start=(1.0, 3.4), cliff=3.40001))
     assert np.isfinite(found.cost) and found.theta[1] < 3.40001
     assert solve(Decay(cliff=3.1)).theta == pytest.approx([2.0, 3.0], rel=1e-5)
@@ -59,12 +59,12 @@ def test_derivatives_across_the_cliff_are_zero():
 
 
 @pytest.mark.parametrize("worst", [np.nan, np.inf, 1e200])
-def test_power_of_what_ran_away_is_infinite(worst):
+def test_the_power_of_a_diverged_simulation_is_infinite(worst):
     assert power(np.array([1.0, worst])) == np.inf
     assert power(np.array([1.0, 2.0])) == 5.0
 
 
-def test_a_value_that_may_vanish_is_none_where_rounding_left_of_it():
+def test_a_value_that_may_vanish_is_zero_where_only_rounding_is_left_of_it():
     """A fit ended at a damping of 9e-15 N m s/rad, which no rig may have: the diagnosis broke off."""
     rig = load_rig("paper_high_impedance")
     unknowns = unknowns_of_rig(rig)

@@ -1,4 +1,4 @@
-"""Slow ramps against a locked output: what is read off is what the bench has."""
+"""Slow ramps against a locked output: the values that are read off are those of the bench."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def with_effect(name: str, **parameters: float) -> Rig:
     return rig.with_effects(EffectSetting(name, parameters))
 
 
-def test_a_plain_spring():
+def test_a_plain_spring_has_its_stiffness():
     rig = load_rig("paper_high_impedance")
     found = statics_of(ramps(rig), rig)
     assert found is not None
@@ -61,7 +61,7 @@ def test_saturation_is_its_limit():
     assert found is not None and found.limit == pytest.approx(13.0, rel=0.01)
 
 
-def test_none_of_a_quick_run_and_of_a_free_output():
+def test_a_quick_run_and_a_free_output_give_no_statics():
     _, true = bench("paper_high_impedance", 1)
     assert statics_of(recorded(true, 1), true) is None
     moving = load_rig("paper_moving_output")

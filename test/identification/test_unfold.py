@@ -1,4 +1,4 @@
-"""What hold and sampling make of integrators, in closed form against the sum over images."""
+"""Integrators under hold and sampling: the closed form against the sum over images."""
 
 from __future__ import annotations
 

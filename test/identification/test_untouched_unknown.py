@@ -1,4 +1,4 @@
-"""A value that the data do not touch keeps the whole doubt of its bounds."""
+"""A value that the data do not determine keeps the whole doubt of its bounds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 
-def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_said_so(monkeypatch):
+def test_an_unknown_without_sensitivity_has_the_widest_interval_and_is_reported(monkeypatch):
     """A bound of 2e4 beside priors of 0.01 was cut off as a singular direction: its doubt came out as 0."""
     rig = load_rig("paper_high_impedance")
     command = excitation("multisine", Settings(rate=280.0, duration=4.0, period=4.0))

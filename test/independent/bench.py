@@ -52,7 +52,7 @@ def record_command(bench, command, rng, solver=run_fixed, rate=RATE):
 
 
 def _drive(command, outside, period):
-    """Return what the drive makes of the command before it acts: dead band, limit of rate, saturation."""
+    """Return the command after the drive: dead band, limit of rate, saturation."""
     u = np.where(np.abs(command) < outside.deadband, 0.0, command)
     if np.isfinite(outside.rate_limit):
         u = _rate_limited(u, outside.rate_limit * period)

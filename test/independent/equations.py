@@ -6,7 +6,7 @@ w_h + N (w_g - w_h), so that with J_r = J_m/N^2 it is an inerter between housing
     [J_h + J_r (1-N)^2   J_r N (1-N)] [a_h]   [-T - k_h h - b_h w_h]
     [J_r N (1-N)         J_r N^2    ] [a_g] = [ T - T_gear         ]
 
-T: motor torque less gear friction, T_gear: what the gear output hands on to the chassis. A chassis
+T: motor torque less gear friction, T_gear: torque from the gear output on the chassis. A chassis
 that is rigid with the gear output adds J_sc to the last element and T_gear is the spring's torque.
 """
 
@@ -37,7 +37,7 @@ def deflection(x, p):
 
 @njit(cache=True)
 def spring_torque(t, x, p):
-    """K(t) d (1 + quadratic d + cubic d^2) + b_s d' + Bouc-Wen + stop: what the spring hands on, N m."""
+    """Torque of the spring, N m: K(t) d (1 + quadratic d + cubic d^2) + b_s d' + Bouc-Wen + stop."""
     d, v = deflection(x, p)
     k_s = p.k_s * (1.0 + p.stiffness_drift * t / p.duration)
     torque = k_s * d * (1.0 + p.quadratic * d + p.cubic * d * d) + p.b_s * v + p.bouc_wen * x[Z]
@@ -87,7 +87,7 @@ def friction(t, x, load, p):
 
 @njit(cache=True)
 def waves(x, p):
-    """Torque that goes with the rotor's angle, and with the output's, N m."""
+    """Torque ripple over the rotor's angle and over the output's, N m."""
     angle = x[G] - x[H]
     torque = p.ripple * math.sin(p.ripple_cycles * p.ratio * angle + p.ripple_phase)
     return torque + p.cogging * math.sin(2.0 * math.pi * angle / p.cogging_period)
@@ -141,7 +141,7 @@ def sensor_torques(t, states, p):
 
 @njit(cache=True)
 def move_signals(dx, x, u, spring, p):
-    """States that are no bodies: current, resonance and lag before the sensor, hysteresis, bristle."""
+    """Derivatives of the other states: current, resonance, lag before the sensor, hysteresis, bristle."""
     if p.current_omega > 0.0:
         w = p.current_omega
         dx[CURRENT] = x[DCURRENT]

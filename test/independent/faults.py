@@ -53,7 +53,7 @@ def outliers(record, rng, share=0.01):
 
 
 def clipping(record, _rng, share=0.02):
-    """Let the F/T sensor end its range where `share` of the samples lie beyond."""
+    """Limit the range of the F/T sensor so that `share` of the samples lie beyond."""
     channel = record["ft"]
     limit = float(np.quantile(np.abs(channel.y), 1.0 - share))
     return record.with_channels(ft=Channel(channel.t.copy(), np.clip(channel.y, -limit, limit)))

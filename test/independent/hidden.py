@@ -1,4 +1,4 @@
-"""What can be hidden in the second bench, by name: the contract's effects, and things outside its table."""
+"""Effects that can be hidden in the second bench, by name: those of the contract, and others."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def hide(bench, effect, parameters):
     fields = CATALOGUE[effect]
     values = {fields[name]: value for name, value in parameters.items()}
     if effect == "gear_compliance":
-        values["encoder_on_chassis"] = 1.0  # the encoder reads the gear's output, its compliance is before it
+        values["encoder_on_chassis"] = 1.0  # the encoder reads the gear's output, behind its compliance
     if "resonance_omega" in values:
         values["resonance_omega"] *= 2.0 * np.pi
     return bench.having(**values)

@@ -1,4 +1,4 @@
-"""What the second bench is made of: every value of the machine, in SI, at the gear output.
+"""The values of the second bench, in SI, at the gear output.
 
 This directory shares no code with rsea_ros/model or rsea_ros/effects: it is written from the contract,
 the facts and physics. Every `0.0` (or `inf`) below is an effect that is absent.
@@ -87,7 +87,7 @@ class Plant(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """What is outside the equations of motion: the drive's treatment of a command, and the sensors."""
+    """Values outside the equations of motion: the drive's treatment of a command, and the sensors."""
 
     saturation: float = inf
     deadband: float = 0.0

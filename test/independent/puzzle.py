@@ -28,6 +28,6 @@ def noisy_resonance(seed, duration=160.0):
 
 
 def delayed(seed, duration=160.0):
-    """Record of a bench whose commands act one and a half samples late, with a sensor as it should be."""
+    """Record of a bench whose commands act one and a half samples late, with a good sensor."""
     bench = drawn_bench(np.random.default_rng(seed), "moving_output").having(delay=DELAY)
     return record_run(bench, seed + 1, "white_noise", duration)

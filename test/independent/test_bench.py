@@ -41,7 +41,7 @@ def _change(bench):
     return max(np.sqrt(np.mean((found[k].y - nominal[k].y) ** 2)) / noise for k, noise in NOISE.items())
 
 
-def test_same_seed_same_record_other_seed_other_record():
+def test_a_seed_determines_the_record():
     first, again, other = (record_run(Bench(), seed, duration=2.0) for seed in (1, 1, 2))
     for name in first.channels:
         np.testing.assert_array_equal(first[name].y, again[name].y)
@@ -61,7 +61,7 @@ def test_stamps_say_when_a_hold_began_and_when_it_was_measured():
     assert 1e-8 < np.std(np.diff(record["ft"].t)) < 3e-7
 
 
-def test_benches_differ_by_what_is_no_effect():
+def test_benches_differ_in_their_values_and_not_by_an_effect():
     plants = [drawn_bench(np.random.default_rng(seed)).plant for seed in range(200)]
     for name, spread in (("j_m", 0.15), ("b_m", 0.10), ("k_s", 0.03)):
         ratio = np.array([getattr(p, name) for p in plants]) / getattr(Plant(), name)

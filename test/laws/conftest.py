@@ -1,4 +1,4 @@
-"""Makes the second bench and the effects' bench, which are no tests, importable, and learns each law once."""
+"""Make the second bench and the effects' bench, which are no tests, importable, and learn each law once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECONDS = 8.0
 
 @cache
 def learnt(values: tuple[tuple[str, float], ...], seed: int = 3) -> LawResult:
-    """Return what is learnt of a record of the second bench in which some of its values are hidden."""
+    """Return the law learnt from a record of the second bench with hidden values."""
     from independent.bench import drawn_bench, record_run
 
     bench = drawn_bench(np.random.default_rng(seed)).having(**dict(values))

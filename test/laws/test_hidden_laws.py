@@ -1,4 +1,4 @@
-"""Laws hidden in records of the second bench, which shares no code with the model: regressor and size."""
+"""Laws hidden in records of the second bench, which shares no code with the model, are found and sized."""
 
 from __future__ import annotations
 

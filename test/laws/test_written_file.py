@@ -1,4 +1,4 @@
-"""The file of a law is an effect like any other: it holds their contract and loads from a folder."""
+"""The file of a law is an effect like any other: it keeps the contract and loads from a folder."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SPRING = law("law_of_deflection", ("cubic_spring", 4e6, 0.0), ("hysteresis", 1.0
 
 @pytest.fixture(scope="module", params=[DRAG, SPRING], ids=lambda law: law.name)
 def written(request):
-    """Return an effect as its file makes it, with its measured claims, known to the catalogue."""
+    """Return the effect of a written file, with its measured claims, added to the catalogue."""
     made = request.param
     text = source_of(made, NOTHING, WHERE)
     assert "Source: rsea law" in text

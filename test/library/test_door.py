@@ -68,7 +68,7 @@ def test_every_name_of_the_door_opens_without_ros():
     assert set(rsea.__all__) == set(DOOR)
 
 
-def test_a_name_that_is_not_offered_is_refused_with_those_that_are():
+def test_an_unknown_name_is_refused_with_the_known_ones():
     with pytest.raises(AttributeError, match=r"no attribute 'simulat'; it offers .*simulate"):
         _ = rsea.simulat
 
@@ -121,7 +121,7 @@ def test_stamps_may_count_from_any_epoch():
         (np.array([0, 1], "M8[s]"), {"u": [1, 2]}, "t holds datetime64[s], expected real numbers in s"),
     ],
 )
-def test_arrays_that_make_no_record_are_refused(t, channels, says):
+def test_arrays_that_cannot_be_a_record_are_refused(t, channels, says):
     with pytest.raises(ChannelError) as error:
         rsea.Record.from_arrays(t, **channels)
     assert says in str(error.value)
@@ -198,7 +198,7 @@ def test_a_rig_may_be_given_where_its_name_is_expected():
         ("", "rig '' not found, expected a YAML file or one of"),
     ],
 )
-def test_what_is_no_rig_is_refused(name, says):
+def test_an_object_that_is_not_a_rig_is_refused(name, says):
     with pytest.raises(rsea.RseaError) as error:
         rsea.load_rig(name)
     assert says in str(error.value)

@@ -1,4 +1,4 @@
-"""Makes `random_rigs` and `slow`, which are no tests, importable for the tests of the model."""
+"""Make `random_rigs` and `slow`, which are no tests, importable for the tests of the model."""
 
 import sys
 from pathlib import Path

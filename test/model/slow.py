@@ -1,4 +1,4 @@
-"""The slow and obvious way: energies, states, held commands, and nothing of the step of `rsea_ros.model`."""
+"""The slow and obvious computation: energies, states, held commands; no code of `rsea_ros.model`'s step."""
 
 from __future__ import annotations
 

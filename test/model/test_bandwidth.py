@@ -49,7 +49,7 @@ def test_band_without_an_edge_is_infinite():
 
 
 @pytest.mark.parametrize(("db", "deg"), [(0.0, 10.0), (3.0, 0.0), (3.0, 91.0), (math.nan, 10.0)])
-def test_tolerances_that_are_none_are_refused(db, deg):
+def test_impossible_tolerances_are_refused(db, deg):
     with pytest.raises(ParameterError, match="tolerances"):
         flat_band(end_to_end(PLATFORM), db, deg)
 
@@ -71,7 +71,7 @@ def test_a_falling_response_has_its_peak_at_rest():
     [(PLATFORM, 5.898e-3, 53.20, 43.81), (PROTOTYPE, -6.883e-3, 55.83, 19.87)],
     ids=["platform", "prototype"],
 )
-def test_what_the_rotors_spin_costs(rig, inertia, eq_7, with_spin):
+def test_the_rotors_spin_narrows_the_band_as_the_docs_say(rig, inertia, eq_7, with_spin):
     """The numbers of docs/physics.md: Eq. (7) as printed, and with J_sc + n J_r."""
     k_s = rig["spring.stiffness"]
     assert inner_inertia(rig) == pytest.approx(inertia, rel=1e-4)
@@ -79,7 +79,7 @@ def test_what_the_rotors_spin_costs(rig, inertia, eq_7, with_spin):
     assert float(undamped_band(k_s, inner_inertia(rig))) == pytest.approx(with_spin, abs=5e-3)
 
 
-def test_exact_bands_of_the_physics_page():
+def test_the_exact_bands_are_those_of_the_physics_page():
     bands = [flat_band(end_to_end(rig, "element")) for rig in (PLATFORM, PROTOTYPE)]
     assert bands == pytest.approx([103.1, 19.9], abs=0.05)
     bands = [flat_band(end_to_end(rig), 3.0, 10.0) for rig in (PLATFORM, PROTOTYPE)]

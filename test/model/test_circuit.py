@@ -42,12 +42,12 @@ def test_nodal_analysis_is_the_equations_of_motion(rig):
 
 
 @pytest.mark.parametrize("name", RIG_NAMES)
-def test_the_rigs_of_the_repository(name):
+def test_the_circuit_of_every_shipped_rig_is_its_equations_of_motion(name):
     assert worst(load_rig(name)) < 1e-9
     assert worst(lumped(load_rig(name))) < 1e-9
 
 
-def test_table_1():
+def test_impedances_are_those_of_table_1():
     """K/s is 1/(C s) with C = 1/K, J s is L s, B is R; a gear takes an impedance to its ratio squared."""
     s = 2j * np.pi * 3.0
     for kind, value, expected in (
@@ -75,6 +75,6 @@ def test_an_infinite_impedance_is_an_open_branch_not_a_short_circuit():
     assert abs(nodal_analysis(shorted, s, "gear").voltage["c"]) < 1e-12
 
 
-def test_a_source_that_is_not_there_is_refused():
+def test_an_unknown_source_is_refused():
     with pytest.raises(ParameterError, match="no source 'wind'"):
         circuit_response(load_rig("paper_high_impedance"), HZ, "wind")

@@ -25,34 +25,34 @@ def seen(rig):
     return simulate(rig, Record({"command": WAVE, **dict.fromkeys(("ft", "deflection", "position"), blank)}))
 
 
-def test_it_is_the_torque_over_the_stiffness_where_nothing_damps():
+def test_the_deflection_is_torque_over_stiffness_without_damping():
     rig = load_rig("sea_two_encoders").with_values({"spring.damping": 0.0})
     out = seen(rig)
     assert np.allclose(out["ft"], rig["spring.stiffness"] * out["deflection"], rtol=1e-9, atol=1e-12)
     assert np.allclose(out["deflection"], out["position"], atol=1e-15)  # both ends are clamped
 
 
-def test_behind_play_it_is_the_spring_that_it_sees():
+def test_behind_play_the_deflection_is_that_of_the_spring():
     rig = load_rig("sea_two_encoders").with_values({"spring.damping": 0.0, "chassis.inertia": 1e-3})
     out = seen(rig.with_effect("backlash", gap=1e-3))
     assert np.max(np.abs(out["deflection"] - out["position"])) == pytest.approx(5e-4, rel=1e-3)
     assert np.allclose(out["ft"], rig["spring.stiffness"] * out["deflection"], rtol=1e-6, atol=1e-9)
 
 
-def test_with_a_moving_end_it_is_not_the_position():
+def test_with_a_moving_end_the_deflection_is_not_the_position():
     rig = load_rig("two_moving_outputs")
     out = seen(rig)
     assert np.std(out["deflection"] - out["position"]) > 0.5 * np.std(out["deflection"])
 
 
-def test_only_a_rig_that_lists_it_logs_it():
+def test_only_a_rig_that_lists_the_deflection_logs_it():
     assert "deflection" not in synthesize(load_rig("paper_high_impedance"), WAVE)
     record = synthesize(load_rig("sea_two_encoders"), WAVE, seed=1)
     noise = record["deflection"].y - seen(load_rig("sea_two_encoders"))["deflection"]
     assert np.std(noise) == pytest.approx(2e-5, rel=0.1)
 
 
-def test_a_bag_holds_it(tmp_path):
+def test_a_bag_holds_the_deflection(tmp_path):
     record = synthesize(load_rig("sea_two_encoders"), WAVE)
     write_record(record, tmp_path / "run.mcap")
     again = read_record(tmp_path / "run.mcap")
@@ -63,7 +63,7 @@ def test_a_bag_holds_it(tmp_path):
     assert set(read_record(tmp_path / "d.mcap").channels) == {"command", "deflection"}
 
 
-def test_a_rig_may_say_how_far_a_clock_may_be_off():
+def test_a_rig_may_state_the_doubt_of_a_clock():
     rig = load_rig("sea_two_encoders")
     assert rig.clock_doubt("deflection") == 5e-3
     assert rig.clock_doubt("ft") == 1e-4

@@ -1,4 +1,4 @@
-"""What a record's stamps mean: commands held from theirs, channels read at theirs, on the grid or not."""
+"""The meaning of stamps: commands are held from theirs, channels are read at theirs, on the grid or not."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def test_coarse_stamps_make_no_period_too_many_or_too_few():
     assert drive.step * steps_per_sample(1 / RATE) == pytest.approx(1 / RATE, rel=1e-8)
 
 
-def test_a_command_that_did_not_come_is_held_on():
-    """A dropped command message: the last one goes on acting."""
+def test_after_a_dropped_command_the_last_one_is_held():
+    """A command message is dropped: the previous command goes on acting."""
     stamps, command = np.arange(400) / RATE, white(400)
     kept = np.delete(np.arange(400), [100, 101, 250])
     wanted = stamps + 1 / RATE
@@ -142,7 +142,7 @@ def test_step_is_a_whole_fraction_of_the_period(rate):
         (Channel(np.zeros(20), np.zeros(20)), r"command: median stamp interval 0 s, expected > 0 s"),
     ],
 )
-def test_commands_that_cannot_drive_are_refused(command, message):
+def test_unusable_commands_are_refused(command, message):
     with pytest.raises(IdentificationError, match=message):
         drive_from(Record({"command": command}, source="bag"))
 

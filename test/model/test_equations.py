@@ -32,7 +32,7 @@ def test_matrices_are_those_of_the_energies(rig):
 
 @settings(max_examples=40)
 @given(rigs(gravity=True))
-def test_coordinates_are_what_can_move(rig):
+def test_coordinates_are_the_parts_that_can_move(rig):
     expected = slow.coordinates(rig)
     assert sorted(map(tuple, mechanics(rig).placement.T)) == sorted(map(tuple, expected.T))
 

@@ -1,4 +1,4 @@
-"""Figures of the model never end a node, and what is not a number never says pure."""
+"""The figures of the model never end a node, and values that are not numbers never raise the flag."""
 
 import math
 from itertools import pairwise
@@ -42,7 +42,7 @@ def test_innovations_that_a_late_command_has_taken_back_give_a_figure():
     assert tests["position"].ratio == 0.0 and tests["ft"].ratio > 1.0 and "motor_torque" not in tests
 
 
-def test_commands_after_a_report_never_end_it():
+def test_commands_after_a_report_never_raise():
     observer = Observer(RIG, hold=0.05)
     for k in range(400):
         t = k / 280.0

@@ -1,4 +1,4 @@
-"""What acts between two commands: the last one, a line, or the band-limited curve (rig key `hold`)."""
+"""The command between two samples: the last one, a line, or the band-limited curve (rig key `hold`)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def continuous(u, t):
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.31])
-def test_a_line_between_commands(shift):
+def test_a_line_connects_commands(shift):
     command = np.clip(15 * np.random.default_rng(0).standard_normal(300), -40, 40)
     ours = simulate(replace(RIG, hold="first"), record_of(command, shift))
     fine = np.arange(0.0, 300.0, 0.01) / RATE
@@ -48,7 +48,7 @@ def test_a_line_between_commands(shift):
         assert np.sqrt(np.mean(error**2)) < 0.5 * noise, name
 
 
-def test_a_curve_without_a_frequency_above_half_the_rate():
+def test_a_band_limited_curve_connects_commands():
     """Sines up to 0.35 of the rate: a line between the samples loses a third of the highest."""
     fine = np.arange(0.0, 2.0, 1e-4)
     frequencies = (3.0, 21.0, 55.0, 98.0)
@@ -65,7 +65,7 @@ def test_a_curve_without_a_frequency_above_half_the_rate():
     assert 10.0 * errors["band"] < errors["first"] < errors["zero"], errors
 
 
-def test_a_held_command_is_what_it_was():
+def test_a_held_command_acts_as_before():
     command = np.random.default_rng(1).standard_normal(100)
     drive = drive_from(record_of(command))
     np.testing.assert_array_equal(drive.command, drive_from(record_of(command), hold="zero").command)
@@ -74,7 +74,7 @@ def test_a_held_command_is_what_it_was():
     assert coarser(line) is line
 
 
-def test_the_rig_file_says_it():
+def test_a_rig_file_states_the_hold():
     document = rig_to_document(replace(RIG, hold="band"))
     assert rig_from_document(document).hold == "band" and "hold" not in rig_to_document(RIG)
     with pytest.raises(RigError, match="hold = 'second', expected zero, first, band"):

@@ -62,7 +62,7 @@ def by_scipy(rig, controller, outside):
     ],
     ids=["tracking", "disturbed", "limited"],
 )
-def test_closed_loop_is_that_of_scipy(controller, outside):
+def test_the_closed_loop_is_that_of_scipy(controller, outside):
     rig = replace(load_rig("bare_drive"), controller=controller)
     ours = simulate(rig, record_of(outside))
     for channel, expected in zip(("position", "velocity"), by_scipy(rig, controller, outside), strict=True):

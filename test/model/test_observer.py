@@ -1,4 +1,4 @@
-"""The observer on simulated benches: as sure as it says, whatever order and rhythm the samples come in."""
+"""The observer on simulated benches: its stated uncertainty holds for samples in any order and rhythm."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_the_unlumped_observer_errs_as_it_says_and_the_lumped_one_much_more(name
 
 
 def test_the_order_of_arrival_changes_nothing(moving):
-    """Commands early, samples up to 60 ms late and out of order: the last estimate is that of the order."""
+    """With commands early and samples up to 60 ms late and out of order, the last estimate is the same."""
     rig, record = load_rig("paper_moving_output"), moving.record
     in_order = observe(Observer(rig), record)[1][-1]
     rng, observer, arrivals = np.random.default_rng(3), Observer(rig), []
@@ -167,7 +167,7 @@ def test_a_delayed_command_of_the_model_acts_later():
     assert not observer.consistency()["ft"].broken
 
 
-def test_another_run_begins_anew(moving):
+def test_another_run_starts_afresh(moving):
     observer = Observer(load_rig("paper_moving_output"))
     first = observe(observer, moving.record)[1]
     again = observe(observer, moving.record)[1]

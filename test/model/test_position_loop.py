@@ -1,4 +1,4 @@
-"""Joints that positions command: the loop in the simulated step, against scipy and against what it is for."""
+"""Joints commanded by positions: the loop in the simulated step, against scipy and against its purpose."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_the_loop_is_that_of_its_equation(kind):
     assert np.max(np.abs(position - by_scipy(joint(kind), law))) < 1e-9
 
 
-def test_a_cascade_without_integral_is_the_controller_that_a_record_may_name():
+def test_a_cascade_without_integral_is_the_controller_of_a_logged_torque():
     looped = joint("cascade")
     bare = {n: q for n, q in looped.quantities.items() if not n.startswith("controller.")}
     drive = replace(looped, loop=None, quantities=bare, controller=Controller(8.0, 6.0))
@@ -93,7 +93,7 @@ def test_a_cascade_without_integral_is_the_controller_that_a_record_may_name():
     assert np.allclose(outside, moved(joint("cascade"), steady, refine=12)["position"], atol=1e-12)
 
 
-def test_limits_hold():
+def test_the_limits_of_the_loop_hold():
     limited = moved(joint(torque_limit=4.0))
     assert np.max(np.abs(limited["motor_torque"])) == pytest.approx(4.0)
     slewed = moved(joint(velocity_limit=0.5))
@@ -168,7 +168,7 @@ def test_a_rig_file_keeps_the_loop():
         ({"kind": "pd", "k_p": {"value": -1.0, "unit": "N m/rad"}}, "controller.k_p"),
     ],
 )
-def test_a_loop_that_is_none_is_refused(change, field):
+def test_an_impossible_loop_is_refused(change, field):
     document = rig_to_document(load_rig("pd_joint"))
     with pytest.raises(RigError, match=field):
         rig_from_document({**document, "controller": change})

@@ -1,4 +1,4 @@
-"""A spring and a sensor on the proximal side: their limits, their torque, and what is refused."""
+"""A spring and a sensor on the proximal side: their limits, their torque, and invalid combinations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HZ = np.geomspace(0.1, 100.0, 40)
 RIG = load_rig("separate_stiffnesses")
 
 
-def test_an_endlessly_stiff_one_is_none():
+def test_an_infinitely_stiff_proximal_spring_changes_nothing():
     values = {n: q for n, q in RIG.quantities.items() if not n.startswith("proximal_spring.")}
     without = replace(RIG, quantities=values)
     stiff = RIG.with_values({"proximal_spring.stiffness": 1e11})
@@ -47,7 +47,7 @@ def test_the_sensor_on_the_housing_reads_the_torque_on_that_end():
     assert found == pytest.approx(expected, rel=2e-3)
 
 
-def test_a_file_keeps_it(tmp_path):
+def test_a_rig_file_keeps_the_proximal_spring(tmp_path):
     rig = replace(RIG, ft_end="housing_end")
     save_rig(rig, tmp_path / "rig.yaml")
     assert load_rig(tmp_path / "rig.yaml") == rig

@@ -24,7 +24,7 @@ SIGMA = 0.008
 
 @functools.cache
 def error_model(rate, rig):
-    """What noise makes of the estimates, from an observer that has run for half a second on quiet sensors."""
+    """Return the errors of the estimates by noise, from an observer after half a second on quiet sensors."""
     observer = Observer(load_rig(rig))
     for k in range(round(0.5 * rate)):
         observer.state(k / rate, 0.0, 0.0)
@@ -127,7 +127,7 @@ def test_a_slow_passage_through_the_edge_changes_the_flag_once_each_way():
     assert sum(a != b for a, b in itertools.pairwise(verdicts)) == 2
 
 
-def test_a_torque_that_ceases_is_no_torque():
+def test_after_a_torque_ceases_there_is_no_torque():
     flag = flag_at(280.0)
     feed(flag, *sine(10.0, 0.5, 280.0, 0.0))
     assert flag.verdict == "pure"
@@ -137,7 +137,7 @@ def test_a_torque_that_ceases_is_no_torque():
     assert math.isnan(flag.reading().occupied)
 
 
-def test_noise_of_the_sensors_alone_is_no_torque_and_as_strong_as_foretold():
+def test_sensor_noise_alone_is_no_torque_and_as_strong_as_predicted():
     rig, rate = load_rig("paper_high_impedance"), 280.0
     flag, observer, plant = flag_at(rate), Observer(rig), Plant(rig, rate, seed=11)
     pair, heard = empty_pair(), []
@@ -174,6 +174,6 @@ def test_a_rig_without_a_spring_is_refused():
         PureTorque(load_rig("bare_drive"))
 
 
-def test_a_limit_that_is_no_share_is_refused():
+def test_a_limit_that_is_not_a_share_is_refused():
     with pytest.raises(ParameterError, match=r"limit = 0\.9, expected a share from 0\.05 to 0\.5"):
         Settings(limit=0.9)

@@ -71,7 +71,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_verdict_is_that_of_the_true_error(name):
+def test_the_verdict_is_that_of_the_true_error(name):
     """Issue 13: right in 95 % of the time outside 20 % of the tolerance, at most one change a second."""
     distal, proximal = ends(PLATFORM, CASES[name])
     verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)
@@ -94,7 +94,7 @@ def test_torque_flat_to_100_hz_is_not_pure():
 
 @pytest.mark.parametrize("rig", [PLATFORM, KNEE], ids=lambda rig: rig.name)
 @pytest.mark.parametrize(("before", "after"), [(0.3, 1.3), (1.5, 0.5)])
-def test_latency_is_at_most_the_window(rig, before, after):
+def test_the_latency_is_at_most_the_window(rig, before, after):
     edge = ErrorFlag(rig).edge.hz
     first, second = (ends(rig, tones(2.0, round(2.0 * part * edge) / 2.0)) for part in (before, after))
     verdicts, _ = said(
@@ -105,7 +105,7 @@ def test_latency_is_at_most_the_window(rig, before, after):
     assert np.all(verdicts[late:] == (PURE if after < 1.0 else BEYOND))
 
 
-def test_edge_is_where_a_dense_search_first_leaves_the_tolerance():
+def test_the_edge_is_where_a_dense_search_first_leaves_the_tolerance():
     hz = np.arange(0.01, 100.0, 0.01)
     for rig in (PLATFORM, KNEE):
         function = end_over_end(rig)
@@ -113,7 +113,7 @@ def test_edge_is_where_a_dense_search_first_leaves_the_tolerance():
         assert edge_of(rig, 0.3).hz == pytest.approx(hz[np.argmax(error > 0.3)], abs=0.011)
 
 
-def test_edge_has_the_interval_of_damping_rotor_and_train():
+def test_the_interval_of_the_edge_follows_from_damping_rotor_and_train():
     edge = edge_of(PLATFORM, 0.3)
     hard, soft = (edge_of(PLATFORM.with_values({"spring.damping": b}), 0.3).hz for b in (1.4, 6.5))
     assert edge.low < hard < edge.hz < soft < edge.high
@@ -126,14 +126,14 @@ def test_edge_has_the_interval_of_damping_rotor_and_train():
     assert len(set(edge_of(certain, 0.3))) == 1
 
 
-def test_edge_moves_with_the_damping_as_the_checks_found():
+def test_the_edge_moves_with_the_damping():
     """±3 dB at 44.7 to 89 Hz for b_s of 1 to 6; the error's edge lies in the same order."""
     edges = [edge_of(PLATFORM.with_values({"spring.damping": b}), 0.4).hz for b in (1.0, 2.0, 3.0, 4.5, 6.0)]
     assert edges == sorted(edges)
     assert edges[0] == pytest.approx(52.5, abs=1.5)
 
 
-def test_without_torque_it_says_so_and_begins_again():
+def test_without_torque_the_flag_says_so_and_restarts():
     flag, quiet = ErrorFlag(PLATFORM), np.random.default_rng(1).normal(0.0, 0.007, (4000, 2))
     verdicts, shares = said(flag, quiet[:, 0], quiet[:, 1])
     assert np.all(verdicts == NOTHING)
@@ -146,7 +146,7 @@ def test_without_torque_it_says_so_and_begins_again():
     assert verdicts[-1] == NOTHING
 
 
-def test_a_torque_that_is_heard_but_too_small_to_be_judged_keeps_the_verdict():
+def test_a_torque_too_small_to_judge_keeps_the_verdict():
     flag = ErrorFlag(PLATFORM)
     for k in range(3000):
         size = 5.0 if k < 1000 else 0.01
@@ -157,7 +157,7 @@ def test_a_torque_that_is_heard_but_too_small_to_be_judged_keeps_the_verdict():
     assert math.isnan(flag.share)
 
 
-def test_stamps_that_go_back_a_second_are_of_another_run():
+def test_stamps_that_go_back_a_second_start_another_run():
     distal, proximal = ends(PLATFORM, tones(3.0, 70.0))
     flag = ErrorFlag(PLATFORM)
     assert said(flag, distal, proximal)[0][-1] == BEYOND
@@ -167,7 +167,7 @@ def test_stamps_that_go_back_a_second_are_of_another_run():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_what_is_not_finite_is_left_out(bad):
+def test_values_that_are_not_finite_are_left_out(bad):
     distal, proximal = ends(PLATFORM, tones(2.0, 20.0))
     distal[700:760] = bad
     verdicts, shares = said(ErrorFlag(PLATFORM), distal, proximal)

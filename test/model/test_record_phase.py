@@ -1,4 +1,4 @@
-"""A phase that belongs to a record is found in it; the rest of the model stays as it is."""
+"""A phase that belongs to a record is estimated from it; the rest of the model stays."""
 
 from __future__ import annotations
 

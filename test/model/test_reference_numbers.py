@@ -1,4 +1,4 @@
-"""The paper's numbers, and what follows from them, beside what the code computes."""
+"""The paper's numbers and their consequences, against the code."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ TABLE = [
 @pytest.mark.parametrize(
     ("ours", "printed", "tolerance"), [row[1:] for row in TABLE], ids=[row[0] for row in TABLE]
 )
-def test_reference_number(ours: float, printed: float, tolerance: float) -> None:
+def test_a_reference_number_of_the_paper_is_reproduced(ours: float, printed: float, tolerance: float) -> None:
     assert abs(ours - printed) <= tolerance, f"{ours:.6g}, printed {printed:g}"
 
 

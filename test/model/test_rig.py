@@ -1,4 +1,4 @@
-"""Rig: values by name, what a fit may move, and structures that cannot be."""
+"""Rig: values by name, values that a fit may move, and impossible structures."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_with_values_keeps_spread_and_source():
     assert changed.quantities["spring.stiffness"].source == "Table 2 (measured)"
 
 
-def test_free_are_those_with_a_spread_that_are_not_known():
+def test_values_with_a_spread_that_are_not_known_are_free():
     assert set(PAPER.free()) == {
         "rotor.reflected_inertia",
         "rotor.reflected_damping",
@@ -59,7 +59,7 @@ def test_units_are_si():
 
 
 @pytest.mark.parametrize(("name", "value"), NONSENSE)
-def test_no_field_takes_nonsense(name, value):
+def test_every_field_refuses_nonsense(name, value):
     with pytest.raises(RigError, match=rf"^paper_high_impedance: {name} = \S+ .*expected"):
         PAPER.with_values({name: value})
 
@@ -96,13 +96,13 @@ def test_structures_that_cannot_be_are_refused(changes, message):
 
 
 @pytest.mark.parametrize("name", ["rotor.reflected_inertia", "rotor.reflected_damping", "spring.stiffness"])
-def test_what_every_rig_needs(name):
+def test_a_rig_without_a_required_value_is_refused(name):
     quantities = {n: q for n, q in PAPER.quantities.items() if n != name}
     with pytest.raises(RigError, match=f"{name} is missing"):
         replace(PAPER, quantities=quantities, known=frozenset())
 
 
-def test_a_name_that_is_no_field_is_refused():
+def test_an_unknown_field_is_refused():
     with pytest.raises(
         RigError, match=r"rotor\.mass: no such rig field, expected one of rotor.reflected_inertia"
     ):

@@ -1,8 +1,7 @@
-"""Rig files: what is written is read back; nonsense is one line with file, field, value and expectation."""
+"""Rig files survive a round trip; nonsense is one line with file, field, value and expectation."""
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from hypothesis import given, settings
 from random_rigs import RIG_NAMES, rigs
 
 from rsea_ros.effects.catalogue import catalogue
-from rsea_ros.errors import RigError
 from rsea_ros.model.rig import Controller, EffectSetting, Quantity
 from rsea_ros.model.rig_file import (
     load_rig,
@@ -23,9 +21,6 @@ from rsea_ros.model.rig_file import (
     save_rig,
 )
 from rsea_ros.model.rig_keys import tables
-
-BASE = yaml.safe_load(rig_path("paper_high_impedance").read_text())
-MOVING = yaml.safe_load(rig_path("paper_moving_output").read_text())
 
 
 @pytest.mark.parametrize("name", RIG_NAMES)
@@ -63,206 +58,9 @@ def test_any_rig_survives_its_document(rig):
     assert rig_from_document(yaml.safe_load(yaml.safe_dump(rig_to_document(rig)))) == rig
 
 
-def changed(path, value, base=BASE):
-    """Return a shipped document with one entry changed; DELETE takes it away."""
-    document = copy.deepcopy(base)
-    *folders, last = path
-    place = document
-    for key in folders:
-        place = place.setdefault(key, {})
-    if value is DELETE:
-        del place[last]
-    else:
-        place[last] = value
-    return document
-
-
-DELETE = object()
-INERTIA = ("rotor", "reflected_inertia")
-
-NONSENSE = [
-    (
-        (*INERTIA, "value"),
-        -0.953,
-        "rotor.reflected_inertia = -0.953 kg m^2, expected a finite value > 0 kg m^2",
-    ),
-    ((*INERTIA, "value"), 0, "rotor.reflected_inertia = 0 kg m^2, expected a finite value > 0"),
-    ((*INERTIA, "value"), float("nan"), "rotor.reflected_inertia = nan, expected a number (kg m^2)"),
-    ((*INERTIA, "value"), float("inf"), "rotor.reflected_inertia = inf kg m^2, expected a finite value"),
-    ((*INERTIA, "value"), "heavy", "rotor.reflected_inertia = 'heavy', expected a number (kg m^2)"),
-    ((*INERTIA, "value"), True, "rotor.reflected_inertia = True, expected a number (kg m^2)"),
-    ((*INERTIA, "value"), DELETE, "rotor.reflected_inertia = None, expected a number (kg m^2)"),
-    ((*INERTIA, "value"), 10**400, "rotor.reflected_inertia = "),
-    ((*INERTIA, "unit"), "g cm^2", "rotor.reflected_inertia.unit = 'g cm^2', expected 'kg m^2'"),
-    ((*INERTIA, "unit"), DELETE, "rotor.reflected_inertia.unit = None, expected 'kg m^2'"),
-    (
-        (*INERTIA, "spread"),
-        -0.1,
-        "rotor.reflected_inertia.spread = -0.1, expected a relative one-sigma spread",
-    ),
-    ((*INERTIA, "spread"), float("inf"), "rotor.reflected_inertia.spread = inf, expected a relative"),
-    ((*INERTIA, "colour"), "red", "rotor.reflected_inertia: unknown key 'colour', expected one of ci95"),
-    ((*INERTIA, "source"), 7, "rotor.reflected_inertia.source = 7, expected text"),
-    ((*INERTIA, "ci95"), [0.9], "rotor.reflected_inertia.ci95 = [0.9], expected [low, high] in kg m^2"),
-    ((*INERTIA, "ci95"), 0.9, "rotor.reflected_inertia.ci95 = 0.9, expected [low, high] in kg m^2"),
-    ((*INERTIA, "ci95"), ["a", "b"], "rotor.reflected_inertia.ci95 = 'a', expected a number (kg m^2)"),
-    (INERTIA, 0.953, "rotor.reflected_inertia = 0.953, expected {value: …, unit: kg m^2}"),
-    (INERTIA, None, "rotor.reflected_inertia = None, expected {value: …, unit: kg m^2}"),
-    (INERTIA, DELETE, "rotor.reflected_inertia is missing, expected a value in kg m^2"),
-    (
-        ("rotor", "mass"),
-        {},
-        "rotor: unknown key 'mass', expected one of reflected_damping, reflected_inertia",
-    ),
-    (("rotor",), None, "rotor = None, expected a mapping"),
-    (("rotor",), [1], "rotor = [1], expected a mapping"),
-    (("wheels",), {}, "rig: unknown key 'wheels', expected one of about"),
-    ((7,), {}, "rig: unknown key 7, expected one of about"),
-    (("gear", "ratio", "value"), 0.5, "gear.ratio = 0.5 1, expected a finite value >= 1"),
-    (("gear", "train"), "worm", "gear.train = 'worm', expected one of planetary, star, harmonic_"),
-    (("gear", "train"), ["star"], "gear.train = ['star'], expected"),
-    (("gear", "or"), "star", "gear.or = 'star', expected a list of trains"),
-    (("gear", "or"), ["worm"], "gear.or has 'worm', expected one of planetary, star, harmonic_"),
-    (
-        ("spring", "stiffness"),
-        DELETE,
-        "spring.stiffness is missing, expected a value in N m/rad or `rigid: true`",
-    ),
-    (
-        ("spring", "stiffness", "value"),
-        float("inf"),
-        "spring.stiffness = inf, expected a value in N m/rad or `rigid: true`",
-    ),
-    (("rotor", "reflected_inertia", "value"), float("inf"), "= inf kg m^2, expected a finite value > 0"),
-    (("spring", "rigid"), "yes", "spring.rigid = 'yes', expected true or false"),
-    (("spring", "rigid"), True, "spring rigid and spring_end clamped, expected one of them"),
-    (("spring_end", "clamped"), 1, "spring_end.clamped = 1, expected true or false"),
-    (("spring_end", "clamped"), False, "spring_end.inertia is missing, expected a value in kg m^2"),
-    (("proximal",), "left", "proximal = 'left', expected one of housing_end, spring_end"),
-    (("name",), 5, "name = 5, expected text"),
-    (("known",), "gear.ratio", "known = 'gear.ratio', expected a list of field names"),
-    (
-        ("known",),
-        ["spring_end.inertia"],
-        "known: 'spring_end.inertia', expected a value that this rig states",
-    ),
-    (("known",), [["gear.ratio"]], "known: ['gear.ratio'], expected a value that this rig states"),
-    (("sensors", "sound"), {}, "sensors: unknown key 'sound', expected one of command"),
-    (("sensors",), None, "sensors = None, expected a mapping"),
-    (("sensors", "ft", "unit"), "lbf ft", "sensors.ft.unit = 'lbf ft', expected 'N m'"),
-    (("sensors", "ft", "noise"), -1, "sensors.ft = -1, 0 N m, expected finite values >= 0"),
-    (("sensors", "ft", "noise"), "low", "sensors.ft.noise = 'low', expected a number (N m)"),
-    (("sensors", "ft", "bits"), 16, "sensors.ft: unknown key 'bits', expected one of clock, clock_rate"),
-    (("controller",), 3, "controller = 3, expected a mapping"),
-    (("controller",), {"k_v": 1.0}, "controller.k_p = None, expected a number (1/s)"),
-    (
-        ("controller",),
-        {"k_p": 1.0, "k_v": -1.0},
-        "controller.k_v = -1 N m s/rad, expected a finite value >= 0",
-    ),
-    (("controller",), {"k_p": 1, "k_v": 1, "limit": -5}, "controller.limit = -5 N m, expected a value > 0"),
-    (("controller",), {"k_p": 1.0, "k_v": 1.0, "k_i": 1.0}, "controller: unknown key 'k_i'"),
-    (("effects",), {"name": "x"}, "effects = {'name': 'x'}, expected a list"),
-    (("effects",), [3], "effects[0] = 3, expected a mapping"),
-    (("effects",), [{"name": 4}], "effects[0].name = 4, expected text"),
-    (
-        ("effects",),
-        [{"name": "coulomb_friction", "parameters": {"torque": "big"}}],
-        "effects[0].torque = 'big'",
-    ),
-    (("effects",), [{"name": "coulomb_friction", "size": 3}], "effects[0]: unknown key 'size'"),
-]
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "message"), NONSENSE, ids=lambda item: "deleted" if item is DELETE else str(item)[:40]
-)
-def test_nonsense_is_one_line_that_names_it(path, value, message, tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(changed(path, value)))
-    with pytest.raises(RigError) as error:
-        load_rig(file)
-    text = str(error.value)
-    assert text.startswith(f"{file}: ") and message in text and "\n" not in text
-
-
-def test_a_known_field_must_be_stated(tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_text(yaml.safe_dump(changed(("known",), ["spring_end.inertia"], MOVING)))
-    with pytest.raises(
-        RigError, match=r"known: 'spring_end.inertia', expected a value that this rig states: "
-    ):
-        load_rig(file)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (b"", "holds nothing, expected a mapping with the keys of a rig"),
-        (b"- 1\n", "holds list, expected a mapping"),
-        (b"name: [", "not YAML: "),
-        (b"\xff\xfe\x00", "not YAML: "),
-        (b"name: !!python/object:os.system {}", "not YAML: "),
-    ],
-    ids=["empty", "list", "broken", "binary", "object"],
-)
-def test_files_that_are_no_rig(content, message, tmp_path):
-    file = tmp_path / "bad.yaml"
-    file.write_bytes(content)
-    with pytest.raises(RigError) as error:
-        load_rig(file)
-    assert str(error.value).startswith(f"{file}: {message}") and "\n" not in str(error.value)
-
-
-def test_files_that_are_not_there(tmp_path):
-    with pytest.raises(RigError, match=r"none\.yaml: no such file, expected a rig in YAML"):
-        load_rig(tmp_path / "none.yaml")
-    with pytest.raises(RigError, match=r"rig 'none' not found, expected a YAML file or one of .*bare_drive"):
-        load_rig("none")
-
-
-def test_a_folder_is_no_rig(tmp_path, monkeypatch):
-    (tmp_path / "pendulum").mkdir()
-    monkeypatch.chdir(tmp_path)
-    assert load_rig("pendulum").name == "pendulum"
-    (tmp_path / "folder.yaml").mkdir()
-    with pytest.raises(RigError, match=r": Is a directory, expected a rig in YAML that can be read"):
-        load_rig(tmp_path / "folder.yaml")
-
-
-def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path):
-    with pytest.raises(RigError, match=r"model\.yaml: .*, expected a place that can be written"):
-        save_rig(load_rig("pendulum"), tmp_path / "none" / "model.yaml")
-    assert not list(tmp_path.iterdir())
-
-
-TEXT = rig_path("paper_high_impedance").read_text()
-LINES = {
-    "value: 0.953": ("value: 0x10", "rotor.reflected_inertia.value: '0x10' is hexadecimal"),
-    "value: 23.088": ("value: 1:30", "rotor.reflected_damping.value: '1:30' is sexagesimal"),
-    "value: 502": ("value: .nan", "gear.ratio = nan, expected a number (1)"),
-    "value: 3.0": ("value: yes", "spring.damping = True, expected a number (N m s/rad)"),
-    "noise: 0.03": ("noise: .inf", "sensors.ft = inf, 0 N m, expected finite values >= 0"),
-    "spread: 0.05": ("spread: 2024-01-01", "spring.stiffness.spread: '2024-01-01' is a date"),
-    "proximal: housing_end": ("proximal: left", "rig paper_high_impedance: proximal = 'left'"),
-    "chassis:": ("rotor:", "key 'rotor' stands twice, first in line 7"),
-    "known:": ("knows:", "rig: unknown key 'knows'"),
-}
-
-
-@pytest.mark.parametrize("old", LINES)
-def test_a_mistake_is_named_with_its_line(old, tmp_path):
-    new, message = LINES[old]
-    assert TEXT.count(old) == 1
-    (tmp_path / "rig.yaml").write_text(TEXT.replace(old, new))
-    with pytest.raises(RigError) as caught:
-        load_rig(tmp_path / "rig.yaml")
-    line = TEXT[: TEXT.index(old)].count("\n") + 1
-    assert str(caught.value).startswith(f"{tmp_path}/rig.yaml: line {line}: {message}")
-
-
-def test_units_as_people_write_them(tmp_path):
-    text = TEXT.replace("kg m^2", "kg*m²").replace("N m s/rad", "Nms/rad").replace('"1"', "1")
+def test_units_are_read_as_people_write_them(tmp_path):
+    text = rig_path("paper_high_impedance").read_text().replace("kg m^2", "kg*m²")
+    text = text.replace("N m s/rad", "Nms/rad").replace('"1"', "1")
     (tmp_path / "rig.yaml").write_text(text.replace("N m/rad", "Nm/rad").replace("N m", "Nm"))
     assert load_rig(tmp_path / "rig.yaml") == load_rig("paper_high_impedance")
 
@@ -271,32 +69,6 @@ def test_docs_show_every_key():
     """To mend it: write what `tables()` returns behind the mark in docs/rig.md."""
     page = (Path(__file__).parents[2] / "docs" / "rig.md").read_text(encoding="utf-8")
     assert page.partition("<!-- tables -->\n")[2] == tables()
-
-
-BAD_EFFECTS = [
-    ("backlash", "{gap: -1}", "line 26: effect backlash: gap = -1 rad, expected 0 to 0.1 rad"),
-    ("backlash", "{gap: .inf}", "line 26: effect backlash: gap = inf rad, expected 0 to 0.1 rad"),
-    ("backlash", "{gap: .nan}", "line 25: effects[0].gap = nan, expected a number (SI)"),
-    ("backlash", "{width: 1}", "line 26: effect backlash: unknown parameter 'width', expected gap"),
-    ("backlash", "{}", "line 26: effect backlash: parameter 'gap' is missing"),
-    ("warp", "{}", "line 26: effect 'warp': not in the catalogue"),
-]
-
-
-@pytest.mark.parametrize(("name", "parameters", "message"), BAD_EFFECTS)
-def test_effects_of_a_rig_are_checked(name, parameters, message, tmp_path):
-    text = f"{TEXT}effects:\n- name: {name}\n  parameters: {parameters}\n"
-    (tmp_path / "rig.yaml").write_text(text)
-    with pytest.raises(RigError) as caught:
-        load_rig(tmp_path / "rig.yaml")
-    assert str(caught.value).startswith(f"{tmp_path}/rig.yaml: {message}")
-
-
-def test_an_effect_stands_once_in_a_rig(tmp_path):
-    effect = "- {name: backlash, parameters: {gap: 0.001}}\n"
-    (tmp_path / "rig.yaml").write_text(f"{TEXT}effects:\n{effect}{effect}")
-    with pytest.raises(RigError, match=r"line 26: effect backlash is given twice, expected once"):
-        load_rig(tmp_path / "rig.yaml")
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))

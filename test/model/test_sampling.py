@@ -11,7 +11,7 @@ STEPS = 40
 ENDS = np.arange(STEPS + 1.0)
 
 
-def test_at_the_end_of_a_step_a_channel_is_what_the_step_made_of_it():
+def test_at_the_end_of_a_step_a_channel_is_exact():
     values = np.random.default_rng(1).standard_normal(STEPS + 1)
     command = np.repeat(np.random.default_rng(2).standard_normal(STEPS // 4), 4)
     for name in ("position", "velocity", "ft"):
@@ -36,7 +36,7 @@ def test_a_kink_where_the_command_jumps_is_not_smoothed(after):
     assert sample("velocity", values, at, command) == pytest.approx(jump - after, abs=1e-12)
 
 
-def test_beyond_the_ends_the_ends_hold():
+def test_beyond_its_ends_a_channel_keeps_its_end_values():
     values = ENDS**2
     beyond = sample("ft", values, np.array([-3.0, STEPS + 3.0]), np.ones(STEPS))
     assert np.array_equal(beyond, [0.0, STEPS**2])

@@ -1,4 +1,4 @@
-"""The simulation against independent ways to the same numbers, on rigs of every structure."""
+"""The simulation against independent computations of the same numbers, on rigs of every structure."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ PERIOD = 2240  # samples: lines are 0.5 Hz apart
 
 
 def multisine(rig, seed):
-    """Return a command of LINES, long enough that what it starts with has died away in its last period."""
+    """Return a command of LINES, long enough that the transient has decayed in its last period."""
     phase = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(LINES))
     one = np.cos(2 * np.pi * np.outer(np.arange(PERIOD) / PERIOD, LINES) + phase).sum(axis=1)
     decay = -np.linalg.eigvals(slow.state_matrices(rig)[0]).real

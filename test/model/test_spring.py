@@ -26,7 +26,7 @@ def test_stiffness_is_the_slope_of_the_torque(k, radius, r_s, theta):
 
 
 @given(RATE, LENGTH, LENGTH)
-def test_radius_and_rate_invert_eq_9(k, radius, r_s):
+def test_radius_and_rate_solve_eq_9(k, radius, r_s):
     k_s = eq_9_spring_stiffness(k, radius, r_s)
     assert spring_rate(k_s, radius, r_s) == pytest.approx(k)
     assert spring_radius(k_s, k, radius) ** 2 == pytest.approx(r_s**2, abs=1e-9 * (radius**2 + r_s**2))

@@ -45,7 +45,7 @@ def test_mass_matrix_is_the_energy_of_the_rolling_parts(train):
         assert w @ mechanics(rig).mass @ w == pytest.approx(twice, rel=1e-9)
 
 
-def test_a_harmonic_drive_has_no_positive_maker_s_ratio():
+def test_a_harmonic_drive_never_has_the_makers_ratio_with_a_positive_sign():
     """CPL-25A-160: -160 with the circular spline held, +161 with the flexspline held, never +160."""
     turns = [rotor_turns(t, 160.0) for t in TRAINS if t.startswith("harmonic")]
     assert turns == [-160.0, 161.0]
@@ -60,7 +60,7 @@ def test_a_harmonic_drive_has_no_positive_maker_s_ratio():
         ("harmonic_flexspline_held", 0.00816, 15.35, 2759.0),
     ],
 )
-def test_reference_numbers_of_the_prototype(train, inner, hz, stiffness):
+def test_the_prototype_has_its_reference_numbers(train, inner, hz, stiffness):
     """Found by independent checks; J_m = 1.2 is an estimate."""
     rig = with_train(KNEE, train)
     assert inner_inertia(rig) == pytest.approx(inner, abs=5e-6)

@@ -70,7 +70,7 @@ def test_a_free_end_moves_by_the_torque_on_it(rig):
         agree(frequency_response(rig, outputs.end_torque(rig, end), HZ), held)
 
 
-def test_high_impedance_is_the_paper_but_for_the_rotors_spin():
+def test_the_high_impedance_response_is_the_papers_but_for_the_rotors_spin():
     rig = load_rig("paper_high_impedance")
     j = inner_inertia(rig)
     eq_5 = formulas.eq_5_proximal_per_motor(K_S, 0.953 / 502**2, 23.088 / 502**2, 502, j, B_S)
@@ -169,7 +169,7 @@ def test_the_element_of_a_rigid_spring_is_refused():
         transfer.distal_per_motor(load_rig("bare_drive"), "element")
 
 
-def test_bare_drive_is_one_inertia():
+def test_a_bare_drive_is_one_inertia():
     """Encoder over motor torque: 1 / ((J_m + J_load) s^2 + b_m s)."""
     function = transfer.position_per_motor(load_rig("bare_drive"))
     np.testing.assert_allclose(function.den[0][0] / function.num[0][0][-1], [0.953 + 0.05, 23.088, 0.0])

@@ -1,4 +1,4 @@
-"""What the tests of bags share."""
+"""Shared by the tests of bags."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from rsea_ros.signals import Channel, Record
 
-sys.path.append(str(Path(__file__).parent))  # for `foreign`, which is no test
+sys.path.append(str(Path(__file__).parent))  # for `foreign` and `map_files`, which are no tests
 EPOCH = 1_763_000_000_123_456_789
 
 

@@ -1,4 +1,4 @@
-"""What is refused, each with one line that names file, topic, value and expectation."""
+"""Bags that are refused, each with one line that names file, topic, value and expectation."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_refused(tmp_path, case):
+def test_a_bad_bag_is_refused_in_one_line(tmp_path, case):
     rows, text = REFUSED[case]
     bag = write_foreign(tmp_path / "bag", rows)
     with pytest.raises(BagError, match=text) as caught:
@@ -71,7 +71,7 @@ def test_refused(tmp_path, case):
 
 
 @pytest.mark.parametrize("case", ["no command", "no measurement", "NaN"])
-def test_faults_pass_where_a_diagnosis_asks_for_them(tmp_path, case):
+def test_faults_are_returned_where_a_diagnosis_asks_for_them(tmp_path, case):
     rows, _ = REFUSED[case]
     record = read_record(write_foreign(tmp_path / "bag", rows), strict=False)
     for name, count in (
@@ -94,7 +94,7 @@ def test_repeated_stamps_are_dropped_with_a_note_or_kept(tmp_path):
     assert len(read_record(bag, strict=False)["ft"]) == 5
 
 
-def test_a_joint_that_is_not_there(tmp_path):
+def test_a_missing_joint_is_named_with_those_in_the_bag(tmp_path):
     bag = write_foreign(tmp_path / "bag", run_rows(4))
     with pytest.raises(BagError, match="no joint 'knee', the messages hold joint"):
         read_record(bag, topics=TopicMap(joint="knee"))
@@ -116,7 +116,7 @@ def test_a_joint_that_is_not_there(tmp_path):
         ("a.mcap.zstd", b"nothing of the kind", "Unable to decompress|Unknown frame|decompress"),
     ],
 )
-def test_files_that_are_no_bags(tmp_path, name, content, text):
+def test_files_that_are_not_bags_are_refused(tmp_path, name, content, text):
     file = tmp_path / name
     file.write_bytes(content)
     with pytest.raises(BagError, match=text) as caught:
@@ -124,7 +124,7 @@ def test_files_that_are_no_bags(tmp_path, name, content, text):
     assert str(caught.value).startswith(str(file))
 
 
-def test_directories_that_are_no_bags(tmp_path):
+def test_directories_that_are_not_bags_are_refused(tmp_path):
     with pytest.raises(BagError, match="no bag, expected a directory with"):
         read_record(tmp_path)
     with pytest.raises(BagError, match="no such bag"):
@@ -146,7 +146,7 @@ def test_a_damaged_chunk_is_refused(tmp_path):
         read_record(bag)
 
 
-def test_a_reader_without_permission(tmp_path):
+def test_a_bag_without_read_permission_is_refused(tmp_path):
     bag = write_foreign(tmp_path / "bag", run_rows(4))
     (bag / "bag.mcap").chmod(0)
     load = "import os, sys; from msg_adapters import read_record"
@@ -163,7 +163,7 @@ def test_a_reader_without_permission(tmp_path):
     assert done.stderr.strip().splitlines()[-1].endswith("bag.mcap: no permission to read it")
 
 
-def test_topic_options_that_make_no_sense():
+def test_senseless_topic_options_are_refused():
     with pytest.raises(ParameterError, match="axis 'yaw': expected one of"):
         TopicMap(axis="yaw")
     with pytest.raises(
@@ -172,7 +172,7 @@ def test_topic_options_that_make_no_sense():
         TopicMap().renamed(["wrench=/ft"])
 
 
-def test_a_message_in_another_encoding_is_a_wrong_type(tmp_path):
+def test_a_message_in_another_encoding_is_refused(tmp_path):
     bag = write_foreign(tmp_path / "bag", [("/rsea/ft", EPOCH, make("std_msgs/msg/Bool", data=True))])
     with pytest.raises(
         BagError, match="/rsea/ft is std_msgs/msg/Bool, expected geometry_msgs/msg/WrenchStamped"

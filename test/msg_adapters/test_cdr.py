@@ -52,7 +52,7 @@ def test_wrenches_decode_as_rosbags_does(messages):
 
 
 @pytest.mark.parametrize("little_endian", [True, False])
-def test_both_byte_orders(little_endian):
+def test_both_byte_orders_are_decoded(little_endian):
     message = joint_state(5_000_000_007, ["a"], [1.5], [], [-2.5], "frame")
     (block,) = blocks(
         [bytes(STORE.serialize_cdr(message, JOINT_STATE, little_endian=little_endian))], JOINT_STATE, "here"
@@ -76,7 +76,7 @@ def test_encoded_bytes_equal_those_of_rosbags(name):
     assert encoding.wrenches(at, six) == [bytes(STORE.serialize_cdr(message, WRENCH)) for message in expected]
 
 
-def test_rubbish_in_the_padding_is_no_layout():
+def test_rubbish_in_the_padding_does_not_change_the_layout():
     """Fast CDR leaves whatever was in its buffer between the numbers, and behind the last one."""
     clean = bytes(STORE.serialize_cdr(joint_state(7, ["joint"], [1.0], [2.0], [3.0]), JOINT_STATE))
     dirty = bytearray(clean)

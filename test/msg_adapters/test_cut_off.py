@@ -135,7 +135,7 @@ def test_ctrl_c_completes_the_recording(tmp_path, storage):
     assert record.notes == ()
 
 
-def test_leavings_of_a_killed_recorder_are_not_overwritten(tmp_path):
+def test_files_left_by_a_killed_recorder_are_not_overwritten(tmp_path):
     (tmp_path / "run.partial").mkdir()
     with BagWriter(tmp_path / "run") as bag:
         assert bag.partial == tmp_path / "run.partial1"

@@ -1,4 +1,4 @@
-"""Messages and rows that are not what they should be: left out and told, with counts."""
+"""Damaged messages and rows are left out and reported with counts."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_damaged_messages_are_left_out_and_counted(tmp_path, case, strict):
     assert not strict or told["dropped_samples"].share == pytest.approx(0.1)
 
 
-def test_fields_empty_in_some_messages_are_told(tmp_path):
+def test_fields_empty_in_some_messages_are_reported(tmp_path):
     rows = run_rows(COUNT)
     for k in (7, 8, 30):
         _, at, message = rows[3 * k + 1]
@@ -74,7 +74,7 @@ def test_fields_empty_in_some_messages_are_told(tmp_path):
     assert len(got["velocity"]) == COUNT - 3 and len(got["position"]) == COUNT
 
 
-def test_channels_in_messages_apart_are_no_empty_fields(tmp_path):
+def test_channels_in_separate_messages_are_not_empty_fields(tmp_path):
     rows = [row for row in run_rows(COUNT) if row[0] != "/rsea/joint_states"]
     for k in range(COUNT):
         at = EPOCH + k * 3_571_428
@@ -83,7 +83,7 @@ def test_channels_in_messages_apart_are_no_empty_fields(tmp_path):
     assert read_record(write_foreign(tmp_path / "bag", rows)).faults == ()
 
 
-def test_a_joint_without_utf_8_is_named_all_the_same(tmp_path):
+def test_a_joint_whose_name_is_not_utf_8_can_be_named(tmp_path):
     got, told = _read(tmp_path, lambda raw: raw.replace(b"joint", b"jo\xff\xfet"), "/rsea/ft", True)
     assert told == {} and len(got["ft"]) == COUNT
     encode = lambda k, row: _raw(row).replace(b"joint", b"jo\xff\nt") if k else _raw(row)  # noqa: E731
@@ -118,13 +118,13 @@ NO_TOPIC = ("UPDATE messages SET topic_id = 77 WHERE id IN (4, 5)",)
         (NO_TOPIC, {("damaged_messages", "bag.db3"): 2, ("missing_messages", "/rsea/joint_states"): 1}),
     ],
 )
-def test_rows_that_are_missing_or_damaged_are_told(tmp_path, statements, expected):
+def test_rows_that_are_missing_or_damaged_are_reported(tmp_path, statements, expected):
     got = read_record(_database(tmp_path, *statements))
     told = {(fault.kind, fault.channel): fault.size for fault in got.faults}
     assert expected.items() <= told.items()
 
 
-def test_more_messages_than_the_metadata_say_are_told(tmp_path):
+def test_more_messages_than_the_metadata_say_are_reported(tmp_path):
     bag = write_foreign(tmp_path / "bag", run_rows(COUNT))
     file = bag / "metadata.yaml"
     file.write_text(file.read_text().replace("message_count: 60", "message_count: 55"))
@@ -141,7 +141,7 @@ def test_one_unreadable_file_of_several_is_left_out(tmp_path):
     assert [(f.kind, f.channel) for f in got.faults] == [("damaged_file", "bag_1.mcap")]
 
 
-def test_a_journal_left_behind_is_told(tmp_path):
+def test_a_journal_left_behind_is_reported(tmp_path):
     bag = _database(tmp_path)
     (bag / "bag.db3-journal").write_bytes(b"x" * 600)
     got = read_record(bag)

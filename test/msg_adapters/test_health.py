@@ -1,4 +1,4 @@
-"""What a bag's own /diagnostics tell of the run."""
+"""Faults of a run, read from the /diagnostics in its bag."""
 
 from __future__ import annotations
 
@@ -45,22 +45,22 @@ def test_counts_that_grow_during_the_run_are_faults(tmp_path, key, kind, unit, s
     assert (fault.kind, fault.channel, fault.size, fault.unit) == (kind, "/rsea/node", 3, unit)
 
 
-def test_a_node_that_starts_during_the_run_starts_at_nought(tmp_path):
+def test_counts_of_a_node_that_starts_during_the_run_begin_at_zero(tmp_path):
     assert _told(tmp_path, status(EPOCH + 5 * SECOND, "/n", left_out=4))["commands_left_out", "/n"].size == 4
 
 
-def test_a_node_that_starts_anew_does_so_too(tmp_path):
+def test_counts_of_a_node_that_restarts_begin_at_zero(tmp_path):
     counts = enumerate([10, 12, 0, 3])
     statuses = [status(EPOCH + k * SECOND, "/n", watchdog_trips=count) for k, count in counts]
     assert _told(tmp_path, *statuses)["watchdog_trips", "/n"].size == 5
 
 
-def test_what_happened_before_the_run_is_not_told(tmp_path):
+def test_faults_before_the_run_are_not_reported(tmp_path):
     old = [status(EPOCH + k * SECOND, "/n", left_out=7, fault="none", missed_cycles=k) for k in range(3)]
     assert _told(tmp_path, *old) == {}
 
 
-def test_a_latched_fault_of_the_device_is_told(tmp_path):
+def test_a_latched_fault_of_the_device_is_reported(tmp_path):
     told = _told(tmp_path, status(EPOCH, "/rsea/driver", fault="torque 70 N m\x1b[31m, limit 68 N m"))
     assert told["device_fault", "/rsea/driver"].detail == "torque 70 N m\ufffd[31m, limit 68 N m"
 

@@ -1,4 +1,4 @@
-"""What hostile files may cost: declared sizes hold, nothing is expanded, run or allocated unchecked."""
+"""Limits for hostile files: declared sizes are enforced, nothing is expanded, run or allocated unchecked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from foreign import run_rows, write_foreign
 from mcap_bytes import McapFile, chunk, write
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
-from msg_adapters import compression, read_record
+from msg_adapters import compression, read_record, reading
 from msg_adapters.bags import read_contents
 from rsea_ros.errors import BagError
 
@@ -100,7 +100,7 @@ def test_a_database_with_a_program_of_its_own_is_refused(tmp_path, case):
         read_record(_spoilt(tmp_path, *HOSTILE[case]))
 
 
-def test_a_query_has_an_end(tmp_path, monkeypatch):
+def test_a_query_is_ended_after_its_time(tmp_path, monkeypatch):
     from msg_adapters import sqlite_file
 
     bag = _spoilt(tmp_path)
@@ -132,7 +132,7 @@ BOMB = b"a: &a [x]\n" + b"".join(
         (b"{a: " * 900 + b"1" + b"}" * 900, "nested more than 30 deep"),
     ],
 )
-def test_metadata_that_no_recorder_writes_are_refused(tmp_path, text, expected):
+def test_impossible_metadata_are_refused(tmp_path, text, expected):
     with pytest.raises(BagError, match=expected) as caught:
         read_record(_metadata(tmp_path, text))
     assert "\n" not in str(caught.value)
@@ -158,7 +158,7 @@ ROOT = b"rosbag2_bagfile_information:"
         b"!!python/object/apply:os.system [x]: [",
     ],
 )
-def test_metadata_that_are_not_understood_are_told_and_the_files_read(tmp_path, text):
+def test_metadata_that_are_not_understood_are_reported_and_the_files_read(tmp_path, text):
     got = read_record(_metadata(tmp_path, text))
     assert len(got["ft"]) == 60
     assert [(f.kind, f.channel) for f in got.faults] == [("damaged_metadata", "metadata.yaml")]
@@ -171,7 +171,7 @@ def test_dates_in_the_metadata_are_texts(tmp_path):
     assert read_record(bag).faults == ()
 
 
-def test_messages_of_as_many_layouts_as_messages_are_sorted_once(monkeypatch):
+def test_messages_that_all_differ_in_layout_are_sorted_once(monkeypatch):
     """Comparing each layout with all that is left takes the square of their number."""
     from foreign import STORE, joint_state
 
@@ -187,3 +187,15 @@ def test_messages_of_as_many_layouts_as_messages_are_sorted_once(monkeypatch):
     found = list(cdr.blocks(raw, "sensor_msgs/msg/JointState", "here"))
     assert sorted(int(row) for block in found for row in block.rows) == list(range(400))
     assert sum(compared) <= 400 * 32
+
+
+def test_a_bag_beyond_the_memory_is_refused_in_one_line(tmp_path, monkeypatch):
+    """12 million messages of ten minutes at 8 kHz ended in the last net."""
+
+    def full(*arguments, **options):
+        raise MemoryError
+
+    bag = write(tmp_path / "a.mcap", McapFile().file())
+    monkeypatch.setattr(reading, "record_from", full)
+    with pytest.raises(BagError, match=r"a\.mcap: needs more memory than .*: split it, or record fewer"):
+        read_record(bag)

@@ -56,7 +56,7 @@ def _read_or_refuse(path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_with_a_fault_anywhere(tmp_path, kind):
+def test_a_fault_anywhere_in_a_file_gives_a_record_or_one_line(tmp_path, kind):
     rng = random.Random(kind)
     bag = write_foreign(tmp_path / "bag", run_rows(20), *KINDS[kind])
     file = next(path for path in bag.iterdir() if path.suffix in (".mcap", ".db3"))
@@ -67,7 +67,7 @@ def test_files_with_a_fault_anywhere(tmp_path, kind):
     shutil.rmtree(bag)
 
 
-def test_records_with_a_fault_anywhere_in_chunks_whose_checksums_fit(tmp_path):
+def test_a_fault_anywhere_in_a_chunk_whose_checksum_fits_gives_a_record_or_one_line(tmp_path):
     rng = random.Random(8)
     file = McapFile(run_rows(20))
     sound = list(file.messages)
@@ -80,7 +80,7 @@ def test_records_with_a_fault_anywhere_in_chunks_whose_checksums_fit(tmp_path):
         _read_or_refuse(tmp_path / "a.mcap")
 
 
-def test_metadata_with_a_fault_anywhere(tmp_path):
+def test_a_fault_anywhere_in_the_metadata_gives_a_record_or_one_line(tmp_path):
     rng = random.Random(9)
     bag = write_foreign(tmp_path / "bag", run_rows(20))
     text = (bag / "metadata.yaml").read_bytes()

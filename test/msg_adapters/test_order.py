@@ -1,4 +1,4 @@
-"""Messages out of order in the log: sorted by their stamps; a clock that jumped is another matter."""
+"""Messages out of order in the log are sorted by their stamps, unless a clock has jumped."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _jittered(rows, share, seed=5):
 
 @pytest.mark.parametrize("strict", [True, False])
 @pytest.mark.parametrize("share", [0.5, 3.0])
-def test_jitter_of_the_arrival_changes_nothing(tmp_path, strict, share):
+def test_jitter_of_arrival_changes_nothing(tmp_path, strict, share):
     rows = run_rows(COUNT)
     clean = read_record(write(tmp_path / "clean.mcap", McapFile(rows).file()), strict=strict)
     got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, share)).file()), strict=strict)
@@ -58,8 +58,8 @@ def test_files_of_a_run_come_in_the_order_of_their_log_times(tmp_path):
 
 
 @pytest.mark.parametrize("seconds", [-0.5, 0.5, -86400.0 * 4000])
-def test_a_clock_that_jumped_is_set_right_where_a_model_is_fitted(tmp_path, record, seconds):
-    """Of a bag whose log times are no help: they are made of the stamps."""
+def test_a_clock_that_jumped_is_corrected_where_a_model_is_fitted(tmp_path, record, seconds):
+    """The log times of this bag do not help: they are copies of the stamps."""
     t, y = record["ft"].t.copy(), record["ft"].y
     t[300:] += seconds
     write_record(record.with_channels(ft=Channel(t, y)), tmp_path / "bag")
@@ -75,7 +75,7 @@ def test_a_clock_that_jumped_is_set_right_where_a_model_is_fitted(tmp_path, reco
 
 @pytest.mark.parametrize("at", [0, 150, COUNT - 1])
 @pytest.mark.parametrize("stamp", [0.25 + EPOCH * 1e-9, 17.0, 2.0**31 - 1, -(2.0**31)])
-def test_a_stamp_that_is_not_the_samples_is_left_out(tmp_path, at, stamp):
+def test_a_sample_with_a_damaged_stamp_is_left_out(tmp_path, at, stamp):
     """A bit of the seconds is wrong: no grid may be laid over the years in between."""
     rows = run_rows(COUNT)
     wrong = round(stamp * 1e9)
@@ -88,7 +88,7 @@ def test_a_stamp_that_is_not_the_samples_is_left_out(tmp_path, at, stamp):
     assert got.stop - got.start < 2.0
 
 
-def test_gaps_are_told_where_a_model_is_fitted(tmp_path):
+def test_gaps_are_reported_where_a_model_is_fitted(tmp_path):
     rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
     got = read_record(write_foreign(tmp_path / "bag", rows))
     (fault,) = got.faults
@@ -117,7 +117,7 @@ def _without_stamp(name, message):
 
 
 def test_a_channel_of_another_clock_is_left_out(tmp_path):
-    """A sensor that stamps from its own start on: the simulation went through the years between."""
+    """The sensor stamps from its own start: the simulation went through the years between."""
     rows = run_rows(COUNT)
     for k in range(COUNT):
         rows[3 * k + 2][2].header.stamp.sec -= 1_000_000_000
@@ -131,7 +131,7 @@ def test_a_channel_of_another_clock_is_left_out(tmp_path):
         read_record(write(tmp_path / "b.mcap", McapFile(only).file()))
 
 
-def test_a_gap_is_told_beside_disorder(tmp_path):
+def test_a_gap_is_reported_beside_disorder(tmp_path):
     rows = [row for k, row in enumerate(run_rows(COUNT)) if not (row[0] == "/rsea/ft" and 300 <= k < 360)]
     got = read_record(write(tmp_path / "a.mcap", McapFile(_jittered(rows, 0.5)).file()))
     assert {(f.kind, f.size) for f in got.faults if f.channel == "ft"} >= {("dropped_samples", 20)}

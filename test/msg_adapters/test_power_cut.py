@@ -1,4 +1,4 @@
-"""A power cut, and a disk that fails, under a recording: what was on the disk is there, no more is lost."""
+"""A power cut or a failing disk under a recording: everything that was on the disk is kept."""
 
 import pytest
 
@@ -10,7 +10,7 @@ BOOL = bytes([0, 1, 0, 0, 1])
 
 
 class PowerCut:
-    """The clock of a recording, and what of its file is on the disk."""
+    """The clock of a recording, and the part of its file that is on the disk."""
 
     def __init__(self, monkeypatch, storage):
         self.now, self.safe = 0.0, 0
@@ -24,7 +24,7 @@ class PowerCut:
 
 
 @pytest.mark.parametrize("interval", [0.5, 2.0])
-def test_a_power_cut_costs_an_interval_at_most(tmp_path, monkeypatch, interval):
+def test_a_power_cut_loses_one_interval_at_most(tmp_path, monkeypatch, interval):
     cut = PowerCut(monkeypatch, McapStorage)
     monkeypatch.setattr(McapStorage, "sync", lambda storage: cut.sync(storage))
     with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag", interval=interval) as bag:
@@ -41,7 +41,7 @@ def test_a_power_cut_costs_an_interval_at_most(tmp_path, monkeypatch, interval):
     assert 0.01 * (999 - len(kept)) <= interval + 0.02
 
 
-def test_a_recording_of_which_nothing_comes_any_more_is_flushed(tmp_path, monkeypatch):
+def test_a_recording_without_new_messages_is_flushed(tmp_path, monkeypatch):
     cut = PowerCut(monkeypatch, McapStorage)
     with pytest.raises(RuntimeError), BagWriter(tmp_path / "bag") as bag:
         bag.write("/a", "std_msgs/msg/Bool", 5, BOOL)
@@ -51,7 +51,7 @@ def test_a_recording_of_which_nothing_comes_any_more_is_flushed(tmp_path, monkey
         raise RuntimeError
 
 
-def test_a_disk_that_fails_under_a_recording_is_told_and_the_rest_is_kept(tmp_path, monkeypatch):
+def test_a_disk_that_fails_under_a_recording_is_reported_and_the_rest_is_kept(tmp_path, monkeypatch):
     cut = PowerCut(monkeypatch, McapStorage)
 
     def broken(storage):

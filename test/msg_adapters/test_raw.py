@@ -27,7 +27,7 @@ def test_a_state_is_read_whatever_its_joint_is_called(joint):
     assert STATE.read(raw) == (STAMP, [0.25, -7.5])
 
 
-def test_what_a_message_does_not_have_is_nan():
+def test_a_field_that_a_message_lacks_is_nan():
     stamp, (position, effort) = STATE.read(serialize_message(torque_command_message(STAMP, 4.0)))
     assert stamp == STAMP and math.isnan(position) and effort == 4.0
 
@@ -46,6 +46,23 @@ def test_several_joints_and_damaged_messages_are_refused():
     with pytest.raises(ParameterError, match="expected at least"):
         STATE.read(raw[:30])
     assert STATE.read(raw) == (STAMP, [0.0, 0.0])
+
+
+def test_of_several_joints_the_numbers_of_the_named_one_are_read():
+    raw = serialize_message(efforts_message(STAMP, {"hip": 1.0, "knee": 2.0}))
+    for joint, torque in (("hip", 1.0), ("knee", 2.0)):
+        assert RawReader(JOINT_STATE, [("effort", 0)], joint).read(raw) == (STAMP, [torque])
+    position = RawReader(JOINT_STATE, [("position", 0)], "knee")
+    assert math.isnan(position.read(raw)[1][0])
+    with pytest.raises(ParameterError, match=r"2 joints \(hip, knee\), expected 'ankle' once"):
+        RawReader(JOINT_STATE, [("effort", 0)], "ankle").read(raw)
+
+
+def test_a_joint_that_a_message_names_twice_is_refused():
+    raw = bytearray(serialize_message(efforts_message(STAMP, {"hip": 1.0, "hop": 2.0})))
+    raw[raw.index(b"hop") + 1] = ord("i")
+    with pytest.raises(ParameterError, match="expected 'hip' once"):
+        RawReader(JOINT_STATE, [("effort", 0)], "hip").read(bytes(raw))
 
 
 class Counted(bytes):
@@ -87,7 +104,7 @@ def test_a_frame_is_neither_read_nor_compared():
     assert Counted.cut < 9 * 20
 
 
-def test_what_is_written_is_read_by_rclpy():
+def test_messages_that_are_written_are_read_by_rclpy():
     template = efforts_message(0, {"distal": 0.0, "proximal": 0.0})
     writer = RawWriter(serialize_message(template), JOINT_STATE, "effort")
     written = deserialize_message(writer.write(STAMP, (1.5, -2.5, 9.0)), JointState)

@@ -12,6 +12,7 @@ from foreign import EPOCH, joint_state, make, run_rows, wrench, write_foreign
 from rosbags.rosbag2 import CompressionMode, StoragePlugin
 
 from msg_adapters import TopicMap, iterate, read_record
+from rsea_ros.errors import BagError
 
 MCAP, SQLITE = StoragePlugin.MCAP, StoragePlugin.SQLITE3
 COUNT = 50
@@ -40,7 +41,7 @@ def assert_is_the_run(record, count=COUNT):
         (SQLITE, CompressionMode.FILE),
     ],
 )
-def test_storages_and_compressions(tmp_path, storage, compression):
+def test_every_storage_and_compression_gives_the_same_record(tmp_path, storage, compression):
     bag = write_foreign(tmp_path / "bag", run_rows(COUNT), storage, compression)
     assert_is_the_run(read_record(bag))
     file = next(path for path in bag.iterdir() if path.name != "metadata.yaml")
@@ -51,7 +52,7 @@ def test_storages_and_compressions(tmp_path, storage, compression):
     assert "without metadata.yaml" in bare.notes[0]
 
 
-def test_lz4_chunks(tmp_path):
+def test_lz4_chunks_are_read(tmp_path):
     bag = write_foreign(tmp_path / "bag", run_rows(COUNT))
     file = bag / "bag.mcap"
     file.write_bytes(_with_lz4_chunks(file.read_bytes()))
@@ -74,7 +75,7 @@ def _with_lz4_chunks(data: bytes) -> bytes:
     return out + end + data[:8]
 
 
-def test_other_names_and_foreign_topics(tmp_path):
+def test_other_topic_names_and_unrelated_topics_are_read(tmp_path):
     rows = run_rows(COUNT, "/lab/knee")
     rows = [(name.replace("/lab/knee/ft", "/wrist/wrench"), at, message) for name, at, message in rows]
     rows += [("/rosout_like", EPOCH, make("std_msgs/msg/String", data="hello"))]
@@ -84,6 +85,14 @@ def test_other_names_and_foreign_topics(tmp_path):
     assert_is_the_run(read_record(bag, topics=topics))
 
 
+@pytest.mark.parametrize("strict", [True, False])
+def test_a_topic_that_was_named_must_be_in_the_bag(tmp_path, strict):
+    """Without it a record without F/T torque was identified, and nobody was told."""
+    bag = write_foreign(tmp_path / "bag", run_rows(COUNT))
+    with pytest.raises(BagError, match=r"no topic /rsea/fft for ft, did you mean /rsea/ft\?; the bag holds"):
+        read_record(bag, topics=TopicMap().renamed(["ft=fft"]), strict=strict)
+
+
 def test_split_bags_and_several_files_are_one_run(tmp_path):
     rows = run_rows(COUNT)
     first = write_foreign(tmp_path / "first", rows[:60])
@@ -91,7 +100,7 @@ def test_split_bags_and_several_files_are_one_run(tmp_path):
     assert_is_the_run(read_record([first, second]))
 
 
-def test_the_joint_and_the_axis_asked_for(tmp_path):
+def test_the_requested_joint_and_axis_are_read(tmp_path):
     rows = []
     for k in range(5):
         at = EPOCH + k
@@ -109,7 +118,7 @@ def test_the_joint_and_the_axis_asked_for(tmp_path):
     assert record["ft"].y.tolist() == [0.0, -7.0, -14.0, -21.0, -28.0]
 
 
-def test_a_zero_stamp_gives_way_to_the_log_time_and_is_told(tmp_path):
+def test_a_zero_stamp_is_replaced_by_the_log_time_and_reported(tmp_path):
     rows = run_rows(4)
     rows[2] = ("/rsea/ft", EPOCH + 2000, wrench(0, [0.0] * 6))
     record = read_record(write_foreign(tmp_path / "bag", rows))
@@ -118,7 +127,7 @@ def test_a_zero_stamp_gives_way_to_the_log_time_and_is_told(tmp_path):
 
 
 def test_fields_that_nobody_measures_are_no_channels(tmp_path):
-    """A joint state broadcaster fills what it does not have with NaN, others leave the array empty."""
+    """A joint state broadcaster fills missing fields with NaN, others leave the array empty."""
     rows = run_rows(4)
     for k in range(4):
         _, at, message = rows[3 * k + 1]
@@ -130,7 +139,7 @@ def test_fields_that_nobody_measures_are_no_channels(tmp_path):
     assert "effort: not a number in every message" in record.notes[0]
 
 
-def test_the_reference_of_a_closed_loop(tmp_path):
+def test_the_reference_of_a_closed_loop_is_read(tmp_path):
     rows = run_rows(4)
     rows += [("/rsea/desired_position", at, joint_state(at, position=[1.25])) for _, at, _ in rows[::3]]
     assert read_record(write_foreign(tmp_path / "bag", rows))["reference"].y.tolist() == [1.25] * 4

@@ -1,4 +1,4 @@
-"""Messages for the nodes: numbers in, the same numbers out, and bytes that the reader of bags understands."""
+"""Messages for the nodes: numbers survive them, and the reader of bags understands their bytes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_estimates_carry_their_names():
         ros.effort_of(message)
 
 
-def test_what_a_message_does_not_hold_is_nan():
+def test_a_field_that_a_message_lacks_is_nan():
     _, position, velocity, effort = ros.joint_state_of(ros.torque_command_message(STAMP, 2.0))
     assert math.isnan(position)
     assert math.isnan(velocity)
@@ -54,13 +54,13 @@ def test_diagnostics_hold_level_and_values():
     assert [(pair.key, pair.value) for pair in status.values] == [("bandwidth_hz", "53.2")]
 
 
-def test_types_by_name():
+def test_types_are_found_by_name():
     assert ros.message_type(JOINT_STATE) is ros.JointState
     with pytest.raises(ParameterError, match="message type 'own_msgs/msg/Thing' is not installed"):
         ros.message_type("own_msgs/msg/Thing")
 
 
-def test_bytes_of_fast_cdr_decode():
+def test_bytes_of_fast_cdr_are_decoded():
     messages = [ros.joint_state_message(STAMP + k, k, 2 * k, 3 * k) for k in range(20)]
     (block,) = blocks([serialize_message(message) for message in messages], JOINT_STATE, "here")
     assert block.stamps().tolist() == [STAMP + k for k in range(20)]

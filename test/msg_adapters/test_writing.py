@@ -1,4 +1,4 @@
-"""Bags that we write: others read them, and nothing half-written gets the final name."""
+"""Bags that we write: other programs read them, and no partial bag gets the final name."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_metadata_equal_those_of_rosbags(tmp_path, storage, plugin):
     assert list(iterate(tmp_path / "bag")) == list(iterate(theirs))
 
 
-def test_a_type_that_nobody_knows_is_recorded_all_the_same(tmp_path):
+def test_an_unknown_message_type_is_recorded_too(tmp_path):
     with BagWriter(tmp_path / "bag") as bag:
         bag.write("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")
     assert list(iterate(tmp_path / "bag")) == [("/own", "own_msgs/msg/Thing", 5, b"\x00\x01\x00\x00abc")]
@@ -154,7 +154,7 @@ def test_a_topic_that_ros_cannot_have_is_not_written(tmp_path, record, name):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_recording_has_one_type_a_topic(tmp_path):
+def test_a_recording_has_one_type_for_each_topic(tmp_path):
     says = "/a: is std_msgs/msg/Bool and std_msgs/msg/Int8, expected one type"
     with pytest.raises(BagError, match=says), BagWriter(tmp_path / "bag", recording=False) as bag:
         for kind in ("Bool", "Int8"):
@@ -279,7 +279,7 @@ def test_a_full_disk_is_one_error_and_loses_nothing_recorded(tmp_path, storage, 
         assert len(list(iterate(tmp_path / "bag.partial"))) >= 10_000
 
 
-def test_a_directory_without_permission(tmp_path: Path):
+def test_a_directory_without_write_permission_is_refused(tmp_path: Path):
     with pytest.raises(BagError, match="/proc/nothing"):
         BagWriter("/proc/nothing/bag").__enter__()
 

@@ -1,4 +1,4 @@
-"""A safety monitor beside the motor, which knows goal, enable and one rule, and a driver to watch with it."""
+"""A safety monitor at the motor, which knows goal, enable and one rule, and a driver for it to watch."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Monitor:
 
 
 class FakeMotor:
-    """A device without a wire: it makes what it is told at once. broken: raised by every answer."""
+    """A device without a wire that makes its torque at once. broken: raised by every answer."""
 
     protection = Protection(BUS_WATCHDOG, WATCHDOG)
 
@@ -97,7 +97,7 @@ class FakeMotor:
 
 
 class World:
-    """A driver's cycles on clocks that the test turns. wall - steady: what somebody has set."""
+    """A driver's cycles on clocks that the test sets. wall - steady: how far the system clock was set."""
 
     RATE = 280.0
 
@@ -121,7 +121,7 @@ class World:
         return self.steady + self.off
 
     def poll(self, anchor):
-        """Give the driver what was sent, as a bench does."""
+        """Pass the sent commands to the driver, as a bench does."""
         for stamp, torque, received in self.inbox:
             self.commands.add(stamp, torque, anchor.arrived(received, self.polled))
         self.inbox, self.polled = [], anchor.now()

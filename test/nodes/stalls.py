@@ -1,18 +1,18 @@
-"""What a machine that stands still for a while makes a driver latch: tests of nodes clear it and go on."""
+"""Faults that a driver latches when the machine stalls for a while: tests of nodes clear them and go on."""
 
 import time
 
 STALLS = ("no_reply", "heldup", "ft", "effort", "deflection", "velocity", "power")
-"""How such faults begin; no test that clears them provokes one."""
+"""Beginnings of the texts of such faults; no test that clears them provokes one."""
 
 
 def is_stall(fault):
-    """Return whether a fault, None for none, is one of a machine that stood still."""
+    """Return whether a fault (None for none) comes from a stalled machine."""
     return (fault or "").startswith(STALLS)
 
 
 def every(seconds, act):
-    """Return what may be called at any rate and acts once in so many seconds, the first time after them."""
+    """Return a function that may be called at any rate and acts once in `seconds`, first after them."""
     acted = time.monotonic()
 
     def called():

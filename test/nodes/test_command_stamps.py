@@ -1,4 +1,4 @@
-"""The instant that the controller gives to a command: the next place in the grid of the measurements."""
+"""The stamp of a command of the controller: the next instant in the grid of the measurements."""
 
 from types import SimpleNamespace
 

@@ -52,7 +52,7 @@ def test_a_command_that_arrives_after_its_stamp_but_before_the_cycle_is_not_late
     assert queue.late == 0
 
 
-def test_a_command_without_a_stamp_of_now_takes_effect_on_arrival():
+def test_a_command_without_a_recent_stamp_takes_effect_on_arrival():
     for stamp in (0, NOW - HORIZON - 1, NOW + HORIZON + 1):
         queue = _queue((stamp, 4.0))
         assert queue.take(NOW) == [(NOW, 4.0)]
@@ -83,7 +83,7 @@ def test_zero_commands_do_not_trip_the_watchdog():
     assert queue.expired == 0
 
 
-def test_cleared_is_zero_and_empty():
+def test_after_clear_the_torque_is_zero_and_nothing_waits():
     queue = _queue((NOW, 5.0), (NOW + 10, 6.0))
     queue.take(NOW)
     queue.clear()
@@ -97,7 +97,7 @@ def test_a_command_that_acts_now_overtakes_those_that_came_before_it_and_wait():
     assert queue.take(NOW + 100 * MILLISECOND) == [(NOW, 0.0)]
 
 
-def test_what_came_before_it_was_cleared_is_dropped_whenever_it_is_added():
+def test_a_command_sent_before_the_clear_is_dropped_whenever_it_arrives():
     queue = _queue()
     queue.clear(NOW)
     queue.add(NOW - MILLISECOND, 5.0, NOW - MILLISECOND)

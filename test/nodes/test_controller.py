@@ -95,7 +95,7 @@ def loop(start, listener, model):
 
 
 def test_a_sine_is_followed_through_friction_that_the_model_has(loop):
-    """Without what the model knows of friction no period is below 0.05; a machine that stalls spoils many."""
+    """Without the model's friction no period is below 0.05; a machine that stalls spoils many."""
     errors = loop.sine(3.0)
     while sorted(errors)[2] >= 0.025 and len(errors) < 60:
         errors += loop.sine(3.0)
@@ -111,7 +111,7 @@ def test_a_command_acts_one_sample_after_its_measurement(loop):
     assert np.round(cycles[-1]) <= np.round(heard[-1]) + 2
 
 
-def test_steps_stay_within_the_limit_and_arrive(loop):
+def test_steps_stay_within_the_limit_and_reach_their_value(loop):
     loop.hold(40.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 40.0) < 0.5)
     torques = np.array([effort_of(m)[1] for m in loop.commands])
     assert np.abs(torques).max() == pytest.approx(60.0)
@@ -134,6 +134,6 @@ def test_without_measurements_the_torque_ends_until_the_fault_is_cleared(loop, s
     loop.hold(20.0, lambda: abs(wrench_of(loop.wrenches[-1])[1] - 20.0) < 0.5)
 
 
-def test_it_leaves_zero_torque(loop, listener):
+def test_at_its_end_the_controller_commands_zero(loop, listener):
     assert loop.controller.stop(signal.SIGTERM) == 0
     listener.until(lambda: effort_of(loop.commands[-1])[1] == 0.0)

@@ -55,7 +55,7 @@ class Wire:
                 self.clear(name)
 
     def hold(self, torque, condition):
-        """Ask for a torque until a condition holds; clear what a machine that stands still has latched."""
+        """Request a torque until a condition holds; clear faults from stalls of the machine."""
         clear_now_and_then = every(2.0, self.clear_latched)
 
         def done():
@@ -75,8 +75,8 @@ def wire(tmp_path_factory, start, listener):
         yield made
 
 
-def test_the_controller_lives_on_the_drivers_measurements_and_reaches_the_torque(wire):
-    """It divided by zero at the first late cycle that one in time followed."""
+def test_the_controller_runs_on_the_drivers_measurements_and_reaches_the_torque(wire):
+    """It divided by zero at the first late cycle that was followed by one in time."""
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
     heard = len(wire.wrenches)
     wire.hold(10.0, lambda: len(wire.wrenches) > heard + 1500)
@@ -84,7 +84,7 @@ def test_the_controller_lives_on_the_drivers_measurements_and_reaches_the_torque
     wire.hold(10.0, lambda: abs(wrench_of(wire.wrenches[-1])[1] - 10.0) < 1.0)
 
 
-def test_it_never_swings_up(wire):
+def test_the_controller_never_becomes_unstable(wire):
     """A machine that stalls lets a torque overshoot; none stays off by more than error_limit for error_time.
 
     In half a second of late commands at the limit nearly every sample was off, to 102 N m.

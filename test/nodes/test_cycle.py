@@ -1,4 +1,4 @@
-"""The cycle's stamps are its deadlines, whatever holds it up."""
+"""The stamps of the cycle are its deadlines, whatever delays it."""
 
 import threading
 import time

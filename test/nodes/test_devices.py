@@ -1,4 +1,4 @@
-"""Parameters to limits: of every rig, and refused where the bench cannot tell."""
+"""Limits from parameters: for every rig, and refused where a limit cannot be applied."""
 
 import math
 
@@ -22,7 +22,7 @@ def test_the_default_slew_limit_limits_within_a_cycle():
 
 
 @pytest.mark.parametrize(("rate", "cycles"), [(280.0, 3), (1000.0, 10), (100.0, 3)])
-def test_a_motor_may_be_unheard_as_long_at_any_rate(rate, cycles):
+def test_replies_may_be_lost_for_the_same_time_at_any_rate(rate, cycles):
     """Three cycles at 1 kHz are 3 ms: any stall of the line was a fault, and 1 kHz never drove."""
     assert limits(rate=rate).lost_cycles == cycles
 
@@ -53,6 +53,6 @@ def test_a_limit_that_cannot_be_applied_is_refused(values, told):
         limits(**values)
 
 
-def test_without_these_limits_a_bare_drive_has_the_others():
+def test_a_bare_drive_has_the_limits_that_apply_to_it():
     found = limits(rig="bare_drive", deflection_limit=0.0, ft_limit=0.0, position_limit=0.5)
     assert found.position == 0.5 and math.isinf(found.ft) and math.isfinite(found.velocity)

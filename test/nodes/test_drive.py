@@ -1,4 +1,4 @@
-"""The driver's cycle on clocks that the test turns: no torque by accident, whatever happens to it."""
+"""The driver's cycle on clocks that the test sets: no torque by accident, whatever happens."""
 
 import random
 
@@ -21,8 +21,8 @@ def world():
 
 
 @pytest.mark.parametrize("step", [-HOUR, HOUR, SECOND // 10])
-def test_a_clock_that_is_set_under_torque_is_a_fault_and_nothing_holds(world, step):
-    """The publisher dies with it, as it may: the motor held 10 N m for as long as the step was."""
+def test_a_clock_step_under_torque_is_a_fault_and_ends_the_torque(world, step):
+    """The publisher may die with it: the motor held 10 N m for as long as the clock was set back."""
     world.off += step
     assert world.cycles(5) == [0.0] * 5
     assert str(world.guarded.fault) == f"clock_step: the system clock was set by {step / SECOND:+.3f} s"
@@ -31,7 +31,7 @@ def test_a_clock_that_is_set_under_torque_is_a_fault_and_nothing_holds(world, st
 
 
 @pytest.mark.parametrize("step", [-HOUR, HOUR])
-def test_after_a_step_torque_comes_back_by_clear_fault_alone(world, step):
+def test_after_a_clock_step_only_clear_fault_restores_the_torque(world, step):
     world.off += step
     world.cycles(5, 10.0)
     with world.drive.deaf():
@@ -41,7 +41,7 @@ def test_after_a_step_torque_comes_back_by_clear_fault_alone(world, step):
 
 
 @pytest.mark.parametrize("step", [-HOUR, HOUR])
-def test_a_step_without_torque_is_counted_and_no_fault(step):
+def test_a_clock_step_without_torque_is_counted_and_is_no_fault(step):
     world = World()
     world.activate()
     world.cycles(5)
@@ -68,7 +68,7 @@ def test_a_publisher_that_dies_leaves_no_torque(world, ahead):
 
 
 def test_clear_fault_under_a_stream_lets_nothing_old_act(world):
-    """What arrived while it worked is dropped, and the first command after it begins softly."""
+    """Commands that arrive during clear_fault are dropped, and the first command after it begins softly."""
     world.motor.reading = {"temperature": 90.0}
     world.cycles(3, 60.0)
     world.motor.reading = {}
@@ -88,7 +88,7 @@ def test_clear_fault_under_a_stream_lets_nothing_old_act(world):
     ],
     ids=lambda value: next(iter(value)),
 )  # fmt: skip
-def test_clear_fault_asks_a_reading_first(still):
+def test_clear_fault_takes_a_reading_first(still):
     world = World(current=12.0)
     world.activate()
     world.motor.reading = still

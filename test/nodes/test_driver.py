@@ -55,7 +55,7 @@ def remote(start, listener):
     return Remote(start, listener)
 
 
-def test_configured_it_measures_and_lets_no_command_through(remote):
+def test_a_configured_driver_measures_and_passes_no_command(remote):
     assert remote.change(Transition.TRANSITION_CONFIGURE) == (True, "inactive")
     remote.listener.until(lambda: len(remote.states) > 10)
     count = len(remote.states)
@@ -63,7 +63,7 @@ def test_configured_it_measures_and_lets_no_command_through(remote):
     assert all(abs(m.effort[0]) < 1.0 for m in remote.states[count:])
 
 
-def test_active_it_follows_commands_and_deactivated_the_torque_is_zero(remote):
+def test_an_active_driver_follows_commands_and_a_deactivated_one_makes_no_torque(remote):
     assert remote.change(Transition.TRANSITION_ACTIVATE) == (True, "active")
     remote.push(10.0, lambda: remote.torque() > 9.0)
     remote.push(0.0, lambda: abs(remote.torque()) < 1.0)
@@ -74,7 +74,7 @@ def test_active_it_follows_commands_and_deactivated_the_torque_is_zero(remote):
     assert all(abs(m.effort[0]) < 1.0 for m in remote.states[count:])
 
 
-def test_cleaned_up_it_is_silent_and_can_be_configured_again(remote):
+def test_a_cleaned_up_driver_is_silent_and_can_be_configured_again(remote):
     assert remote.change(Transition.TRANSITION_CLEANUP) == (True, "unconfigured")
     topic = "/rsea/joint_states"
     remote.listener.until(lambda: not remote.listener.node.count_publishers(topic))
@@ -158,7 +158,7 @@ def test_every_transition_out_of_active_writes_zero(spied, way):
     assert spy.written[-1] == 0.0
 
 
-def test_closing_writes_zero_and_lets_go(spied):
+def test_closing_writes_zero_and_releases_the_device(spied):
     spy, program, _ = spied
     program.close()
     assert spy.written[-1] == 0.0 and not spy.opened
@@ -180,7 +180,7 @@ def test_a_fault_of_the_device_zeroes_the_torque_until_it_is_cleared(spied, list
     assert node._state_machine.current_state[1] == "active"
 
 
-def test_an_exception_closes_the_device_at_zero_torque_and_can_be_configured_away(spied, listener):
+def test_after_an_exception_the_device_is_closed_at_zero_torque_and_can_be_configured_again(spied, listener):
     spy, program, node = spied
     spy.fault = ZeroDivisionError("a mistake in the program")
     listener.until(lambda: not spy.opened)
@@ -200,7 +200,7 @@ def _called(client, listener):
     return future.result()
 
 
-def test_two_actuators_side_by_side_take_their_commands_alone(listener, monkeypatch):
+def test_two_actuators_each_follow_only_their_own_commands(listener, monkeypatch):
     """A command for left_knee moved whatever listened."""
     spies = {name: Spy() for name in ("left", "right")}
     monkeypatch.setattr(driver, "DEVICES", {"simulated": lambda values: spies[values["joint"][:-5]]})

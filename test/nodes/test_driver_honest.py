@@ -1,4 +1,4 @@
-"""What the driver tells, whom it obeys, and what a clock that is set does to the real process."""
+"""What the driver reports, whom it obeys, and how a step of the system clock affects the real process."""
 
 import os
 import signal
@@ -105,8 +105,8 @@ def driver(tmp_path_factory, listener):
 
 
 @pytest.mark.parametrize("step", [-3600, 0])
-def test_a_system_clock_that_is_set_ends_the_torque_and_is_told(driver, step):
-    """An hour back, and forward again; nobody commands any more."""
+def test_a_step_of_the_system_clock_ends_the_torque_and_is_reported(driver, step):
+    """The clock goes an hour back and forward again; nobody commands any more."""
     driver.drive()
     driver.set_clock(step)
     driver.listener.until(lambda: driver.bench.torque()[0] == 0)
@@ -115,8 +115,8 @@ def test_a_system_clock_that_is_set_ends_the_torque_and_is_told(driver, step):
     driver.drive()
 
 
-def test_the_clock_was_set_below_every_library(driver):
-    """Else the middleware's own stamps were the true ones."""
+def test_the_test_sets_the_clock_below_every_library(driver):
+    """Otherwise the middleware's stamps would be the true ones."""
     if not driver.preloaded:
         pytest.skip("no C compiler here: the clock was set in Python alone")
     loaded = Path(f"/proc/{driver.process.pid}/maps").read_text()
@@ -135,7 +135,7 @@ def test_another_joint_is_refused_and_named(driver):
     assert driver.status().hardware_id.startswith("H54-200-S500-R, ID 1 on ")
 
 
-def test_stamps_that_are_off_are_told(driver):
+def test_wrong_stamps_are_reported(driver):
     driver.off = 10 * 10**9
     driver.health.clear()
     driver.push(30.0, lambda: driver.told("commands with a stamp that is off"))
@@ -156,7 +156,7 @@ def test_of_two_publishers_the_first_is_obeyed_until_it_is_silent():
     assert obeyed.admit("b", second) and not obeyed.admit("a", second + 1)
 
 
-def test_a_second_publisher_is_told(driver):
+def test_a_second_publisher_is_reported(driver):
     second = driver.listener.node.create_publisher(JointState, "/honest/torque_command", COMMAND)
 
     def both():
@@ -167,8 +167,8 @@ def test_a_second_publisher_is_told(driver):
     driver.listener.node.destroy_publisher(second)
 
 
-def test_a_signal_is_reacted_to_while_the_main_thread_waits(listener):
-    """95 ms passed until the wait was over and the handler ran."""
+def test_a_signal_acts_while_the_main_thread_waits(listener):
+    """The handler ran only after the wait, 95 ms later."""
     reacted = threading.Event()
     before = signal.signal(signal.SIGHUP, lambda number, frame: None)
     alarm = Alarm(reacted.set)

@@ -1,6 +1,5 @@
 """The driver node on the bench on a wire: what it publishes, its services, zero torque on every way out."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -9,83 +8,12 @@ from pathlib import Path
 
 import pytest
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 
-from msg_adapters.ros import DiagnosticArray, JointState, Trigger, WrenchStamped, torque_command_message
+from msg_adapters.ros import DiagnosticArray, JointState, WrenchStamped, torque_command_message
 from rsea_ros.hardware.dynamixel.tables import TABLES
 from rsea_ros.hardware.peer.remote import RemoteBench
 from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
-from test.nodes.stalls import every, is_stall
-
-ROOT = Path(__file__).resolve().parents[2]
-PATIENT = {"rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
-"""A machine that is busy with other tests must not look like a fault."""
-WAIT = 55.0
-"""s for what normally takes one: the driver starts and compiles beside other tests."""
-
-
-class Driven:
-    """A driver on a bench, in a namespace of its own."""
-
-    def __init__(self, bench, listener, name, begin):
-        self.bench, self.name, self._listener = bench, name, listener
-        self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
-        self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
-        self._health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
-        self.cleared = []
-        self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **PATIENT)
-
-    def push(self, condition, torque=10.0):
-        """Command a torque until the condition holds; clear what a busy machine has latched."""
-        begun, clear_now_and_then = time.monotonic(), every(1.5, self._clear_stall)
-
-        def pushed():
-            assert time.monotonic() < begun + WAIT, self.process.output[-5:]
-            self._commands.publish(torque_command_message(0, torque))
-            if not (result := condition()):
-                clear_now_and_then()
-            return result
-
-        self._listener.until(pushed)
-
-    def _clear_stall(self):
-        fault = _value(self._health, self.name, "fault")
-        if is_stall(fault):
-            self.cleared.append(fault)
-            self._clear.call_async(Trigger.Request())
-
-    def drive(self):
-        """Wait until the motor has its torque."""
-        self.push(self._driving)
-
-    def _driving(self):
-        goal, on = self.goal()
-        return goal != 0 and on
-
-    def goal(self):
-        """The goal in counts that the motor got last, and whether its torque is on."""
-        return self.bench.torque()
-
-    def counts(self, torque):
-        """A torque (N m) in counts of the goal, on 54024."""
-        return round(torque / 6.826 / TABLES[54024].ampere)
-
-    def call(self, kind, service, request):
-        """Call a service of the driver; return its answer."""
-        client = self._listener.node.create_client(kind, f"/{self.name}/driver/{service}")
-        self._listener.until(client.service_is_ready)
-        future = client.call_async(request)
-        self._listener.until(future.done)
-        return future.result()
-
-    def trigger(self, service):
-        """Call a Trigger service."""
-        return self.call(Trigger, service, Trigger.Request())
-
-    def change(self, transition):
-        """Ask for a transition of the lifecycle."""
-        request = ChangeState.Request(transition=Transition(id=transition))
-        return self.call(ChangeState, "change_state", request)
+from test.nodes.on_wire import Driven, Script, newest_value
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +37,7 @@ def wire(bench, start, listener):
     return Driven(bench(54024), listener, "main", start)
 
 
-def test_it_publishes_what_the_bench_has_sent_and_follows_commands(wire, listener):
+def test_the_driver_publishes_what_the_bench_sent_and_follows_commands(wire, listener):
     states = listener.hear(JointState, "/main/joint_states", MEASUREMENT)
     wrenches = listener.hear(WrenchStamped, "/main/ft", MEASUREMENT)
     wire.push(lambda: len(states) > 50 and len(wrenches) > 50 and states[-1].effort[0] > 9.0)
@@ -137,7 +65,7 @@ def test_not_a_number_and_strange_stamps_change_nothing_and_are_counted(wire, li
     now = time.time_ns()
     for stamp, torque in ((0, float("nan")), (now - 10**9, 30.0), (now + 10**9, 30.0)):
         wire._commands.publish(torque_command_message(stamp, torque))
-    wire.push(lambda: _value(health, "main", "refused_commands") == "3")
+    wire.push(lambda: newest_value(health, "main", "refused_commands") == "3")
     assert wire.goal()[0] == wire.counts(10.0)
 
 
@@ -149,13 +77,13 @@ def test_zero_ft_is_refused_under_torque_and_takes_the_offset_away_without(wire,
     wire.push(lambda: wire.trigger("zero_ft").success, torque=0.0)  # refused while the load still swings
 
 
-def test_a_fault_is_told_on_diagnostics_and_ends_by_service(wire, listener):
+def test_a_fault_is_published_on_diagnostics_and_ends_by_service(wire, listener):
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     wire.drive()
     wire.bench.ask("set", temperature=90)
     wire.push(lambda: wire.goal() == (0, True))
     told = "temperature: 90 °C, limit 70 °C"
-    wire.push(lambda: _value(health, "main", "fault") == told)
+    wire.push(lambda: newest_value(health, "main", "fault") == told)
     refused = wire.change(Transition.TRANSITION_DEACTIVATE), wire.change(Transition.TRANSITION_ACTIVATE)
     assert [answer.success for answer in refused] == [True, False]
     wire.bench.ask("set", temperature=30)
@@ -178,7 +106,7 @@ def test_a_port_that_comes_back_is_opened_again_by_clear_fault(wire, listener):
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     wire.drive()
     wire.bench.ask("vanish")
-    wire.push(lambda: _value(health, "main", "fault") not in (None, "", "none"))  # the next cycle sees it
+    wire.push(lambda: newest_value(health, "main", "fault") not in (None, "", "none"))  # one cycle later
     answer = wire.trigger("clear_fault")
     assert not answer.success and "port" in answer.message
     wire.bench.ask("appear")
@@ -202,8 +130,8 @@ def _undisturbed(wire):
     return len(wire.cleared) == cleared and answer == "clear_fault: there is no fault; nothing was done"
 
 
-def test_a_listener_that_is_stopped_holds_up_nobody(wire, listener):
-    """Fast DDS waited a second for one that was stopped while it took a message out of shared memory."""
+def test_a_stopped_listener_holds_up_nobody(wire, listener):
+    """Fast DDS waited a second for a listener that was stopped while it read shared memory."""
     program = Path(f"/proc/{wire.process.pid}/maps").read_text()
     assert "/dev/shm/fast" not in program, "a publisher waits for who has locked the shared memory"
     count = listener.node.count_subscribers("/main/joint_states")
@@ -212,21 +140,21 @@ def test_a_listener_that_is_stopped_holds_up_nobody(wire, listener):
         listener.until(lambda: listener.node.count_subscribers("/main/joint_states") > count)
         wire.drive()
         held.send_signal(signal.SIGSTOP)
-        # A busy machine latches a fault now and then; who waits for a stopped listener, each time.
+        # A busy machine latches a fault now and then; a driver that waits for its listener does each time.
         assert any(_undisturbed(wire) for _ in range(3)), wire.cleared
     finally:
         held.kill()
         held.wait()
 
 
-def test_deactivated_the_torque_is_zero_and_off(wire):
+def test_after_deactivation_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.change(Transition.TRANSITION_DEACTIVATE).success
     assert wire.goal() == (0, False)
     assert wire.change(Transition.TRANSITION_ACTIVATE).success
 
 
-def test_sigint_leaves_torque_zero_and_off(wire):
+def test_after_sigint_the_torque_is_zero_and_off(wire):
     wire.drive()
     assert wire.process.stop(signal.SIGINT) == 0
     assert wire.goal() == (0, False)
@@ -246,7 +174,7 @@ def script():
         process.kill()
 
 
-def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener, tmp_path, script):
+def test_after_an_exception_in_the_program_the_torque_is_zero_and_off(bench, listener, tmp_path, script):
     """The real driver, whose code for limits breaks after a while."""
     code = (
         "import sys\nfrom rsea_ros.hardware import limits\nfrom rsea_ros.nodes import driver\n"
@@ -262,7 +190,7 @@ def test_an_exception_in_the_program_leaves_torque_zero_and_off(bench, listener,
     wire.push(lambda: wire.goal() == (0, False))
 
 
-def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, listener):
+def test_after_a_lifecycle_shutdown_the_torque_is_zero_and_off(bench, start, listener):
     wire = Driven(bench(54025), listener, "shutdown", start)
     wire.drive()
     assert wire.change(Transition.TRANSITION_ACTIVE_SHUTDOWN).success
@@ -278,41 +206,9 @@ def test_shut_down_by_its_lifecycle_the_torque_is_zero_and_off(bench, start, lis
         (54025, signal.SIGKILL, -signal.SIGKILL, (0, True)),
     ],
 )
-def test_killed_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
+def test_after_a_kill_the_torque_is_zero_on_the_wire(bench, start, listener, model, number, status, end):
     """By the driver itself; by the supervisor; by the motor's own watchdog, which leaves it on at zero."""
     victim = Driven(bench(model), listener, f"{number.name}_{model}".lower(), start)
     victim.drive()
     assert victim.process.stop(number) == status
     listener.until(lambda: victim.goal() == end)
-
-
-class Script:
-    """A driver made of a script, as `start` gives one."""
-
-    def __init__(self, program, remaps, parameters):
-        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={_text(value)}")]
-        words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
-        self._process = subprocess.Popen(
-            [sys.executable, str(program), "--ros-args", *words],
-            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-
-    output = ()
-
-    def kill(self):
-        """End it without asking."""
-        self._process.kill()
-        self._process.wait()
-
-
-def _text(value):
-    return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _value(health, namespace, key):
-    """The newest value that a driver's diagnostics have."""
-    for message in reversed(health):
-        if message.status[0].name == f"/{namespace}/driver":
-            return {pair.key: pair.value for pair in message.status[0].values}.get(key)
-    return None

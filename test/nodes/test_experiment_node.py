@@ -1,4 +1,4 @@
-"""The experiment node asks before it plays, stops softly at any sample, and learns nothing from that run."""
+"""The experiment node asks before it plays, stops softly at any sample, and ignores a cancelled run."""
 
 import json
 
@@ -22,7 +22,7 @@ LIMIT = 8.0
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    """A bench with a slow current loop, and a bag of it that does not show that."""
+    """A bench with a slow current loop, and a bag that does not show it."""
     folder = tmp_path_factory.mktemp("bench")
     rig = load_rig(RIG).with_effect("current_loop_lag", time_constant=4e-3)
     save_rig(rig, folder / "bench.yaml")
@@ -46,7 +46,7 @@ def ask(listener):
     return call
 
 
-def test_a_run_is_asked_for_and_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):
+def test_a_run_needs_approval_and_can_be_cancelled_at_any_sample(bench, start, listener, ask, tmp_path):
     commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
     health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     start("plant", rig=bench / "bench.yaml")

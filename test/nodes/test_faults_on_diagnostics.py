@@ -1,4 +1,4 @@
-"""What is wrong with the data of a run stands in /diagnostics beside its results."""
+"""Faults in the data of a run are published on /diagnostics beside its results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def run():
     )
 
 
-def test_of_an_identification(run):
+def test_faults_in_the_data_of_an_identification_are_published(run):
     result = rsea.identify(run, "paper_high_impedance").result
     sound, damaged = (
         node.report_of(r, Path("report.html")) for r in (result, replace(result, faults=(FROZEN,)))
@@ -35,7 +35,7 @@ def test_of_an_identification(run):
     assert damaged.summary.startswith("The model fits: ")
 
 
-def test_of_a_diagnosis(run):
+def test_faults_in_the_data_of_a_diagnosis_are_published(run):
     result = replace(rsea.diagnose(run, "paper_high_impedance").result, faults=(FROZEN,))
     report = _diagnosing.report_of(result, Path("report.html"))
     assert (report.level, report.values["verdict"]) == (WARN, "nothing_wrong")

@@ -1,4 +1,4 @@
-"""Sensors that have stopped, by values that never change."""
+"""Frozen sensors are recognised by values that do not change."""
 
 from rsea_ros.nodes._frozen import Frozen
 

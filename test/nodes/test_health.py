@@ -1,4 +1,4 @@
-"""The health node's parts in this process: what it hears, what it keeps, what it says."""
+"""The parts of the health node in this process: inputs, memory and messages."""
 
 import math
 
@@ -69,7 +69,7 @@ def test_events_are_sorted_strangers_are_refused_and_bags_can_be_read(heard, lis
     assert len(list((tmp_path / "kept").iterdir())) == 1
 
 
-def test_stamps_of_another_time_begin_anew(heard, listener):
+def test_stamps_of_another_time_restart_the_watch(heard, listener):
     inputs, _, state, _, _ = heard
     for first in (EPOCH, EPOCH - 3600 * 10**9):
         for k in range(60):

@@ -57,7 +57,7 @@ def ask(listener):
     return call
 
 
-def test_the_answer_is_the_verdict_and_others_are_answered_meanwhile(identify, ask, listener):
+def test_the_answer_is_the_verdict_and_other_calls_are_answered_meanwhile(identify, ask, listener):
     node, out = identify
     heard = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
     first, second = ask("diagnose"), ask("diagnose")

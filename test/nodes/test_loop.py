@@ -1,4 +1,4 @@
-"""excite, plant, record, replay, identify: nothing is lost, and what the bag says has happened so."""
+"""excite, plant, record, replay, identify: nothing is lost, and the bag says what happened."""
 
 import signal
 
@@ -68,7 +68,7 @@ def test_commands_take_effect_at_cycle_starts(recorded):
     assert phase == pytest.approx(np.round(phase), abs=1e-5)
 
 
-def test_what_the_bag_says_is_what_the_plant_did(recorded):
+def test_the_bag_says_what_the_plant_did(recorded):
     """The true rig driven by the bag's commands at their stamps leaves the sensors' noise, nothing else."""
     rig = load_rig(RIG)
     simulated = simulate(rig, recorded)

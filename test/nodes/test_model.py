@@ -83,7 +83,7 @@ def test_a_bag_replayed_gives_an_estimate_for_each_wrench_as_good_as_it_says(
         assert np.median(error) < 0.01  # not the mean: a busy machine delivers some commands late
 
 
-def test_the_flag_rose_and_is_told_to_who_comes_later(heard, listener):
+def test_the_flag_is_latched_for_late_subscribers(heard, listener):
     flags = [m.data for m in heard.flags]
     assert not flags[0] and flags[-1]
     values = listener.until(lambda: heard.values().keys() >= CONTRACT and heard.values())
@@ -95,7 +95,7 @@ def test_the_flag_rose_and_is_told_to_who_comes_later(heard, listener):
     assert [m.data for m in flags] == [True]
 
 
-def test_without_ft_it_goes_on_and_says_so_and_takes_it_back_without_a_jump(heard, truth, listener):
+def test_the_estimate_survives_a_loss_of_ft_and_its_return_without_a_jump(heard, truth, listener):
     node, begin = listener.node, EPOCH + 100_000_000_000
     topics = (("torque_command", JointState), ("joint_states", JointState), ("ft", WrenchStamped))
     command, state, ft = (node.create_publisher(kind, f"/rsea/{t}", RECORD_RELIABLE) for t, kind in topics)
@@ -132,6 +132,6 @@ def test_without_ft_it_goes_on_and_says_so_and_takes_it_back_without_a_jump(hear
     assert doubt < 0.1
 
 
-def test_sigint_ends_it_with_status_0_and_the_flag_down(heard, listener):
+def test_sigint_ends_the_node_with_status_0_and_the_flag_down(heard, listener):
     assert heard.process.stop() == 0
     listener.until(lambda: not heard.flags[-1].data)

@@ -27,7 +27,7 @@ def heard(listener):
     yield inputs, state, ft
 
 
-def test_frozen_joint_states_are_left_out_and_told(heard, listener):
+def test_frozen_joint_states_are_left_out_and_reported(heard, listener):
     inputs, state, ft = heard
     estimates = []
     for k in range(200):

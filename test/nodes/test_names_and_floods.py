@@ -31,7 +31,7 @@ def drive(make_driver):
     return make
 
 
-def test_joint_and_frames_are_parameters_and_quality_of_service_too(drive, listener):
+def test_joint_frames_and_quality_of_service_are_parameters(drive, listener):
     best_effort = Parameter("qos_overrides./named/ft.publisher.reliability", value="best_effort")
     drive("named", [best_effort], joint="left_knee", frame="thigh", ft_frame="shank")
     states = listener.hear(JointState, "/named/joint_states", MEASUREMENT)
@@ -46,7 +46,7 @@ def test_joint_and_frames_are_parameters_and_quality_of_service_too(drive, liste
     assert kinds == {"ft": ReliabilityPolicy.BEST_EFFORT, "joint_states": ReliabilityPolicy.RELIABLE}
 
 
-def test_of_a_flood_a_cycle_takes_a_bounded_number_and_the_newest_acts(listener, monkeypatch):
+def test_a_cycle_takes_a_bounded_number_of_commands_and_the_newest_acts(listener, monkeypatch):
     """20 kHz of commands stopped the cycle for as long as they lasted."""
     names = {parameter.name: parameter.default for parameter in NAMES}
     bench, anchor = Bench(listener.node, names, strict=True), Anchor()

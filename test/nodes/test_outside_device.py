@@ -21,13 +21,13 @@ def drive(make_driver, monkeypatch):
     return lambda **values: make_driver("toy", VALUES | values)
 
 
-def test_without_protection_it_is_not_configured(drive):
+def test_a_device_without_protection_is_not_configured(drive):
     program, node = drive()
     assert node._state_machine.current_state[1] == "unconfigured"
     assert "dead-host protection none" in program.joints[0].report()[1]
 
 
-def test_its_deflection_is_published_and_as_ft_which_says_so(drive, listener):
+def test_the_deflection_is_published_also_as_an_ft_marked_as_such(drive, listener):
     program, _ = drive(allow_no_dead_host_protection=True, axis="-torque.y")
     wrenches = listener.hear(WrenchStamped, "/toy/ft", MEASUREMENT)
     deflections = listener.hear(JointState, "/toy/deflection", MEASUREMENT)
@@ -49,7 +49,7 @@ def test_its_deflection_is_published_and_as_ft_which_says_so(drive, listener):
     assert "toy" in values
 
 
-def test_a_supervised_one_is_configured_and_its_options_arrive(drive):
+def test_a_supervised_device_is_configured_with_its_options(drive):
     program, node = drive(device_options="supervised=yes")
     assert node._state_machine.current_state[1] == "active"
     assert str(program.joints[0].report().values["dead_host_protection"]) == "supervisor, 0.1 s"

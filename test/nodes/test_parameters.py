@@ -1,4 +1,4 @@
-"""Parameters: what does not fit is refused in one line with status 2."""
+"""Parameters: a wrong value is refused in one line with status 2."""
 
 import importlib
 import math
@@ -11,7 +11,9 @@ import pytest
 import yaml
 
 from rsea_ros.errors import ParameterError
+from rsea_ros.interrupts import STOPPING
 from rsea_ros.nodes._parameters import Parameter
+from test.nodes.conftest import written
 
 CONFIG = Path(__file__).resolve().parents[2] / "config" / "nodes"
 NODES = (
@@ -77,13 +79,38 @@ WRONG = {
 }
 
 
-def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(start):
-    processes = {name: start(name, **parameters) for name, (parameters, _) in WRONG.items()}
+PROCESSES = ("controller", "driver", "plant")
+"""Nodes that are started as processes: how they publish and live stays with a process."""
+
+
+def test_a_process_refuses_what_is_wrong_in_one_line_with_status_2(start):
+    processes = {name: start(name, **WRONG[name][0]) for name in PROCESSES}
     for name, process in processes.items():
         assert process.wait() == 2, name
-        assert len(process.output) == 1, process.output
-        assert WRONG[name][1] in process.output[0]
-        assert "FATAL" in process.output[0]
+        refused(name, process.output)
+
+
+def refused(name, lines):
+    assert len(lines) == 1, lines
+    assert WRONG[name][1] in lines[0]
+    assert "FATAL" in lines[0]
+
+
+@pytest.fixture
+def signals():
+    """Restore what signals do, which a node changes."""
+    before = {number: signal.getsignal(number) for number in STOPPING}
+    yield
+    for number, action in before.items():
+        signal.signal(number, action)
+
+
+@pytest.mark.parametrize("name", sorted(WRONG.keys() - set(PROCESSES)))
+def test_every_node_refuses_what_is_wrong_in_one_line_with_status_2(name, signals, monkeypatch, capfd):
+    words = [w for key, value in WRONG[name][0].items() for w in ("-p", f"{key}:={written(value)}")]
+    monkeypatch.setattr(sys, "argv", [name, "--ros-args", *words])
+    assert importlib.import_module(f"rsea_ros.nodes.{name}").main() == 2
+    refused(name, "".join(capfd.readouterr()).splitlines())
 
 
 def test_a_node_that_is_interrupted_while_it_imports_says_so_in_one_line():

@@ -1,4 +1,4 @@
-"""The plant over topics: stamps on its grid, commands acting from theirs, zero when they cease."""
+"""The plant over topics: stamps on its grid, commands act from their stamps, zero torque when they cease."""
 
 import signal
 import time
@@ -85,7 +85,7 @@ def bench(start, listener):
     return Bench(start, listener)
 
 
-def test_stamps_are_evenly_spaced_instants_that_are_over(bench):
+def test_stamps_are_even_and_lie_in_the_past(bench):
     bench.listener.until(lambda: len(bench.states) >= 200)
     stamps = np.array([stamp_of(m.header.stamp) for m in bench.states])
     cycles = (stamps - stamps[0]) / PERIOD
@@ -133,7 +133,7 @@ def test_the_watchdog_zeroes_the_torque_when_commands_cease(bench):
     assert held[-1] - held[0] == pytest.approx(WATCHDOG, abs=2 * PERIOD)
 
 
-def test_impossible_commands_change_nothing_and_are_told(bench):
+def test_impossible_commands_change_nothing_and_are_reported(bench):
     bench.rest()
     two = torque_command_message(0, 5.0)
     two.name, two.effort = ["a", "b"], [5.0, 5.0]
@@ -145,7 +145,7 @@ def test_impossible_commands_change_nothing_and_are_told(bench):
     assert any("2 joints (a, b), expected one" in line for line in bench.process.output)
 
 
-def test_diagnostics_tell_period_and_command_age(bench):
+def test_diagnostics_give_period_and_command_age(bench):
     values = _values(bench.listener.until(lambda: bench.health)[-1])
     assert {"period_mean_ms", "period_p99_ms", "period_max_ms", "missed_cycles", "command_age_ms"} <= set(
         values
@@ -153,7 +153,7 @@ def test_diagnostics_tell_period_and_command_age(bench):
     assert float(values["period_mean_ms"]) > 0.0
 
 
-def test_sigterm_ends_it_with_status_0(bench):
+def test_sigterm_ends_the_plant_with_status_0(bench):
     assert bench.process.stop(signal.SIGTERM) == 0
 
 

@@ -1,4 +1,4 @@
-"""SROS 2 policies: they are what the nodes do, and only those that must may command torque."""
+"""SROS 2 policies: they allow what the nodes do, and only the necessary ones may command torque."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ def test_the_committed_policies_are_those_of_the_nodes():
         ("services", "request", "/rsea/driver/change_state", {"operator"}),
     ],
 )
-def test_who_may_move_the_machine(plural, verb, name, allowed):
+def test_only_listed_nodes_may_move_the_machine(plural, verb, name, allowed):
     profiles = {p.get("node"): p for p in XML.parse(FILE).iter("profile")}
     assert set(profiles) == {*_policies.NODES, _policies.OPERATOR}
 
@@ -37,6 +37,24 @@ def test_who_may_move_the_machine(plural, verb, name, allowed):
         return [e.text for e in profile.iterfind(f"{plural}[@{verb}='ALLOW']/*")]
 
     assert {node for node, profile in profiles.items() if name in named(profile)} == allowed
+
+
+def test_joints_have_nodes_in_namespaces_that_command_their_own_joint_alone(monkeypatch):
+    """A controller of one joint could be allowed the other's commands only by hand."""
+    both = {"/diagnostics", "/rsea/torque_command"}
+    kinds = {("topics", "publish"): both, ("services", "reply"): set()}
+    driver = {("topics", "subscribe"): {"/rsea/hip/torque_command", "/rsea/knee/torque_command"}}
+    monkeypatch.setattr(
+        _policies, "interfaces", lambda name, **given: driver if name == "driver" else dict(kinds)
+    )
+    profiles = _policies._joints(("hip", "knee"))
+    assert set(profiles) == {("rsea", "driver")} | {
+        (f"rsea/{joint}", name) for joint in ("hip", "knee") for name in _policies.OF_A_JOINT
+    }
+    knee = profiles["rsea/knee", "controller"]
+    assert knee["topics", "publish"] == {"/diagnostics", "/rsea/knee/torque_command"}
+    paths = [e.get("path") for e in XML.fromstring(_policies.document(profiles)).iter("enclave")]
+    assert "/rsea/driver" in paths and "/rsea/hip/controller" in paths
 
 
 @pytest.mark.parametrize(("given", "range_"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
@@ -85,8 +103,8 @@ def test_a_node_with_torque_in_hand_publishes_by_sockets_and_stays_on_this_machi
     assert peers == ["127.0.0.1"] and "SHM" not in _sockets.FILE.read_text()
 
 
-def test_a_node_that_cannot_be_secured_as_asked_does_not_start(tmp_path, monkeypatch):
-    """Whether the middleware lacks security (the wheels') or the keys are empty: no node in the open."""
+def test_a_node_that_cannot_be_secured_as_requested_does_not_start(tmp_path, monkeypatch):
+    """Neither without security in the middleware (as in the wheels) nor with empty keys."""
     for name in ("identity_ca.cert.pem", "cert.pem", "key.pem", "permissions_ca.cert.pem", "governance.p7s",
                  "permissions.p7s"):  # fmt: skip
         (tmp_path / "enclaves" / "rsea" / "plant").mkdir(parents=True, exist_ok=True)

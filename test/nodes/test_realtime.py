@@ -4,7 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from bench.bare_loop import permitted
+from bench.bare_wire import outcome
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -36,3 +39,12 @@ def test_one_thread_gets_the_priority_the_others_one_below_and_children_none():
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     expected = "20 19 0 0 0 0" if permitted(20) else "parameter realtime_priority = 20: "
     assert said.stdout.startswith(expected), said.stderr
+
+
+def test_a_wait_for_replies_counts_as_faults_by_the_drivers_rule():
+    """Of eight periods of 1 ms: in time, late, then 12 ms without an answer, and three late ones apart."""
+    took = [0.1, 0.9, 0.1, 12.0, 0.1, 0.9, 0.9, 0.9]
+    begun = 1e6 * np.arange(8.0)
+    cycles = np.stack([begun, begun, begun + 1e6 * np.array(took)], axis=1)
+    assert outcome(cycles, 1000.0, 10) == (0.625, 12.0, 1)
+    assert outcome(cycles, 1000.0, 3) == (0.625, 12.0, 2)

@@ -1,4 +1,4 @@
-"""What a driver with two encoders publishes, as a bag: the angle is a channel, the torque made of it none."""
+"""A bag of a driver with two encoders: the deflection is a channel, the torque computed from it is not."""
 
 import numpy as np
 import pytest

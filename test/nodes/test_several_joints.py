@@ -29,7 +29,7 @@ def values_of(**given):
     return {p.name: p.checked(given.get(p.name, p.default)) for p in table}
 
 
-def test_what_is_not_given_for_a_joint_is_as_for_the_node():
+def test_a_parameter_not_given_for_a_joint_is_that_of_the_node():
     values = values_of(joints=["hip", "knee"], torque_limit=20.0, **{"knee.torque_limit": 5})
     assert (values["hip.torque_limit"], values["knee.torque_limit"]) == (20.0, 5.0)
     assert "hip.rate" not in values and "hip.joint" not in values
@@ -56,7 +56,7 @@ BUS = {"device": "dynamixel_netft", "ft_host": "", "deflection_limit": 0.0, "ft_
         ),
     ],
 )  # fmt: skip
-def test_joints_that_cannot_be_are_refused(listener, given, told):
+def test_impossible_joints_are_refused(listener, given, told):
     node = LifecycleNode("refused", namespace="refused")
     with pytest.raises(ParameterError, match=told):
         driver.Driver(node, values_of(**given))
@@ -78,6 +78,7 @@ class Leg:
         self.process = start("driver", {"__ns": "/leg"}, **known, **patient, **ids, **sensor)
         self.health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
         self.states = {j: listener.hear(JointState, f"/leg/{j}/joint_states", MEASUREMENT) for j in JOINTS}
+        self.combined = listener.hear(JointState, "/leg/joint_states", MEASUREMENT)
         self.clearing = {
             j: listener.node.create_client(Trigger, f"/leg/driver/{j}/clear_fault") for j in JOINTS
         }
@@ -138,17 +139,20 @@ def leg(tmp_path_factory, start, listener):
 TORQUES = {"hip": 0.5, "knee": -1.0, "ankle": 2.0}
 
 
-def test_each_follows_its_commands_in_one_exchange_a_cycle(leg):
+def test_each_joint_follows_its_commands_in_one_exchange_a_cycle(leg):
     leg.push(TORQUES, lambda: all(
         leg.states[j] and abs(leg.states[j][-1].effort[0] - TORQUES[j]) < 0.3 for j in JOINTS
     ))  # fmt: skip
     assert [list(leg.states[j][-1].name) for j in JOINTS] == [[j] for j in JOINTS]
     leg.push(TORQUES, lambda: len(leg.together()) > 20)  # never, where each had a transaction of its own
+    wanted = [TORQUES[joint] for joint in JOINTS]
+    leg.push(TORQUES, lambda: leg.combined and np.allclose(leg.combined[-1].effort, wanted, atol=0.3))
+    assert [*leg.combined[-1].name] == [*JOINTS] and len(leg.combined[-1].position) == len(JOINTS)
     leg.push(TORQUES, lambda: leg.value("knee", "active") == "True")
     leg.push(TORQUES, lambda: leg.value("ankle", "motor") == "XW540-T260")
 
 
-def test_a_fault_of_one_is_its_alone_and_ends_by_its_service(leg):
+def test_a_fault_of_one_joint_stays_its_own_and_ends_by_its_service(leg):
     leg.bench.ask("set", motor=1, temperature=90)
     leg.push(TORQUES, lambda: (leg.value("knee", "fault") or "").startswith("temperature"))
     leg.push(TORQUES, lambda: [np.sign(goal) for goal in leg.goals()] == [1, 0, 1])
@@ -160,7 +164,7 @@ def test_a_fault_of_one_is_its_alone_and_ends_by_its_service(leg):
     leg.push(TORQUES, lambda: leg.value("hip", "fault") == leg.value("ankle", "fault") == "none")
 
 
-def test_stop_is_for_all_and_so_is_clear_fault(leg):
+def test_stop_and_clear_fault_of_the_node_act_on_all_joints(leg):
     assert leg.call("stop").success
     leg.push(TORQUES, lambda: leg.goals() == [0, 0, 0])
     answer = leg.call("clear_fault")
@@ -168,8 +172,8 @@ def test_stop_is_for_all_and_so_is_clear_fault(leg):
     leg.push(TORQUES, lambda: all(leg.goals()))
 
 
-def test_all_are_zero_before_the_first_is_closed(listener, monkeypatch):
-    """A motor that does not answer takes its time to be closed; the others held their torque meanwhile."""
+def test_all_torques_are_zero_before_the_first_motor_is_closed(listener, monkeypatch):
+    """Closing a motor that does not answer takes long; the others held their torque meanwhile."""
     order, spies = [], {"hip": Spy(), "knee": Spy()}
     for name, spy in spies.items():
         monkeypatch.setattr(spy, "write", lambda torque, name=name: order.append((name, torque)))
@@ -185,7 +189,7 @@ def test_all_are_zero_before_the_first_is_closed(listener, monkeypatch):
     assert set(order[2:]) == {("hip", "closed"), ("knee", "closed")}
 
 
-def test_its_end_is_the_end_of_all_torques(leg):
+def test_the_end_of_the_driver_ends_all_torques(leg):
     leg.push(TORQUES, lambda: all(leg.goals()))
     assert leg.process.stop() == 0
     assert leg.goals() == [0, 0, 0]

@@ -78,7 +78,7 @@ def recorded(state):
 
 
 def test_a_page_sees_commands_and_records(bench, listener):
-    """One story, as it is played: look, record, command, stop, be left."""
+    """One session: look, record, command, stop, leave."""
     watch, out = bench
     commands = listener.hear(JointState, "/rsea/torque_command", COMMAND)
 
@@ -111,7 +111,7 @@ def test_a_page_sees_commands_and_records(bench, listener):
     assert record["command"].y.max() == AMPLITUDE
 
 
-def test_nobody_commands_beside_another(bench, listener):
+def test_only_one_page_commands_at_a_time(bench, listener):
     watch, _ = bench
     other = listener.node.create_publisher(JointState, "/rsea/torque_command", COMMAND)
 
@@ -127,7 +127,7 @@ def test_nobody_commands_beside_another(bench, listener):
     listener.node.destroy_publisher(other)
 
 
-def test_it_ends_when_it_is_stopped(bench):
+def test_the_live_view_ends_when_it_is_stopped(bench):
     watch, _ = bench
     assert watch.stop() == 0, watch.output
     assert not any("Traceback" in line for line in watch.output)

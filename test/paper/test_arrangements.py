@@ -18,7 +18,7 @@ LIMITS = limits(load_rig("paper_moving_output"))
 
 @pytest.mark.parametrize("held", ["T-RSEA", "RT-RSEA"])
 @pytest.mark.parametrize("index", range(len(TRAINS)), ids=TRAINS)
-def test_table_of_transfer_functions(index, held):
+def test_the_table_has_the_right_transfer_functions(index, held):
     rig = load_rig("paper_high_impedance")
     row = arrangements(rig)[index]
     rig = replace(rig, train=row.train, proximal="housing_end" if held == "T-RSEA" else "spring_end")
@@ -31,7 +31,7 @@ def test_table_of_transfer_functions(index, held):
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.what)
-def test_limit_is_reached(limit):
+def test_every_limit_is_reached(limit):
     if len(limit.values) == 1:
         assert limit.errors[0] < 1e-12
         return

@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: what agrees, what does not, and every contradiction with its number."""
+"""The paper's numbers beside ours: agreements, disagreements, and every contradiction with its number."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from rsea_ros.paper.findings_bench import clamp_error
 
 
 @pytest.mark.parametrize(("text", "step"), [("3.14", 0.01), ("7", 1.0), ("6.169e-4", 1e-7), ("1e8", 1e8)])
-def test_last_printed_digit(text, step):
+def test_a_number_agrees_to_its_last_printed_digit(text, step):
     assert last_digit(text) == pytest.approx(step)
 
 
-def test_only_what_the_papers_numbers_make_is_counted():
+def test_only_results_of_the_papers_own_numbers_count():
     """No conversions of inches, no number that is not printed, nothing tuned, nothing from other sources."""
     counted = {c.what: c.agrees for c in claims() if c.status == "found"}
     assert counted == {
@@ -35,7 +35,7 @@ def test_only_what_the_papers_numbers_make_is_counted():
     assert not printed & {"1.000", "0.957", "26.088", "127", "114", "50.8"}
 
 
-def test_what_does_not_come_out():
+def test_the_numbers_that_disagree_are_listed():
     off = {c.what: round(100 * c.difference, 1) for c in claims() if not c.agrees}
     assert off["K_s/J_eff, numerator"] == 5.0
     assert off["bandwidth of the prototype"] == 0.6
@@ -72,11 +72,11 @@ def test_findings_carry_their_number(status, where, number):
 
 
 def test_contradictions_are_those_that_hold():
-    """What the paper admits, says of the test platform, or what rests on our J_m, is no contradiction."""
+    """Numbers that the paper admits, of the test platform, or that rest on our J_m are no contradictions."""
     assert sum(f.status == "found" for f in findings()) == 7
 
 
-def test_both_readings_of_the_lumped_model():
+def test_both_readings_of_the_lumped_model_miss_the_resonance():
     """Issue 13: 6.1 Hz against 19.8 Hz; the grounded motor is 62.0 dB off at the pendulum's frequency."""
     unlumped, moving, grounded = readings(load_rig("paper_moving_output")).values()
     assert resonance_hz(unlumped) == pytest.approx(19.8, abs=0.05)
@@ -101,7 +101,7 @@ def test_both_readings_of_the_lumped_model():
         (33.0, -24.7, -31.6),
     ],
 )
-def test_reference_numbers_of_fig_18(hz, unlumped, moving):
+def test_figure_18_has_its_reference_numbers(hz, unlumped, moving):
     rigs = list(readings(load_rig("paper_moving_output")).values())
     for rig, expected in zip(rigs, (unlumped, moving), strict=False):
         h = frequency_response(rig, outputs.end_torque(rig, "spring_end"), np.array([hz]))[0]

@@ -1,4 +1,4 @@
-"""What reports are tested with: an identification made by hand, a real diagnosis, and a browser."""
+"""Inputs for the tests of reports: an identification made by hand, a real diagnosis, and a browser."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ EPOCH = 1_700_000_000_123_456_789
 
 @dataclass(frozen=True)
 class Diagnosed:
-    """A record of a bench with Coulomb friction, what was said of it, and where the files are."""
+    """A record of a bench with Coulomb friction, its diagnosis, and the folder of the files."""
 
     record: Record
     diagnosis: Diagnosis

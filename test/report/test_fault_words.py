@@ -1,4 +1,4 @@
-"""Faults of the data in words: what is the same in several channels once, and masked only what is masked."""
+"""Faults of the data in words: one of several channels is said once; only masked samples are called so."""
 
 from __future__ import annotations
 

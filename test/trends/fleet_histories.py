@@ -51,7 +51,7 @@ def _columns(rng, joint, parameter, day, value, half, warm, told):
 
 
 def recordings(joints=("a",), days=250, causes=None, faults=None):
-    """Return a table of recordings, one a day. causes, faults: what joint and day name."""
+    """Return a table of recordings, one a day. causes, faults: functions of joint and day."""
     rows = [
         {
             "joint": joint, "recording": f"bag{d:05d}", "time_s": START + DAY * (d + 0.5), "outcome": "done",
@@ -69,7 +69,7 @@ def recordings(joints=("a",), days=250, causes=None, faults=None):
 
 
 def cause(name, size, parameter="gap", unit="rad", gain=0.5, doubt=0.02, status="confirmed", probability=0.9):
-    """Return a cause as the store has it."""
+    """Return a cause in the form of the store."""
     sizes = [
         {
             "name": parameter,

@@ -1,4 +1,4 @@
-"""Causes, faults and outliers: what appeared since when, what is usual, and keys that stay."""
+"""Causes, faults and outliers: since when, compared with the fleet, and with stable keys."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_cause_that_all_joints_have_is_no_alarm():
     assert alarms(QUIET, names) == ()
 
 
-def test_a_cause_of_one_joint_from_the_first_recording_on_is_one():
+def test_a_cause_of_one_joint_from_its_first_recording_is_an_alarm():
     names = recordings(JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3)] if j == "b" else [])
     (found,) = fleet_trends(QUIET, names).appearances
     assert found.from_first
@@ -56,7 +56,7 @@ def test_two_days_that_name_it_are_not_enough():
     assert alarms(QUIET, names) == ()
 
 
-def test_a_rival_that_is_not_likely_does_not_count():
+def test_an_unlikely_rival_does_not_count():
     names = recordings(
         JOINTS, 60, causes=lambda j, d: [cause("backlash", 2e-3, status="one_of", probability=0.3)]
     )
@@ -105,7 +105,7 @@ def test_the_key_of_wear_stays_while_its_history_grows():
     assert seen == {"b/spring.stiffness/lower/1"}
 
 
-def test_what_goes_on_comes_before_bad_data():
+def test_an_ongoing_change_comes_before_bad_data():
     names = recordings(
         JOINTS, 60, faults=lambda j, d: ["outliers"] if j == "a" and d >= 30 else [],
         causes=lambda j, d: [cause("backlash", 2e-3)] if j == "h" and d >= 30 else [],

@@ -1,4 +1,4 @@
-"""Steps and ramps of a known date and size are found; what a day or the season does is no change."""
+"""Steps and ramps of known date and size are found; day effects and seasons are no changes."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_too_little_excitation_is_a_result_with_its_reason():
     assert "recordings determine it" in found.reason
 
 
-def test_intervals_as_wide_as_the_value_tell_nothing():
+def test_intervals_as_wide_as_the_value_show_nothing():
     found = trend(0, sd=3.0, days=20)
     assert found.state == "undetermined"
     assert "would show" in found.reason

@@ -1,4 +1,4 @@
-"""A headless Chromium, driven by its DevTools protocol: what it shows, what it logs, what it asks for."""
+"""A headless Chromium, driven by its DevTools protocol: its page, its log, its requests."""
 
 from __future__ import annotations
 

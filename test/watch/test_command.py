@@ -28,12 +28,12 @@ def values(rows):
     return [torque for _, torque in rows]
 
 
-def test_nothing_is_published_until_somebody_holds_it():
+def test_nothing_is_published_until_somebody_holds_the_command():
     assert set(values(played(Commander(BOUNDS), 0.0, 0.5))) == {None}
 
 
 @pytest.mark.parametrize("wish", [Wish("constant", -8.0), Wish("sine", 8.0, 3.0), Wish("chirp", 8.0, 20.0)])
-def test_it_starts_softly_and_stays_within_the_limit(wish):
+def test_the_command_starts_softly_and_stays_within_the_limit(wish):
     rows = values(played(Commander(BOUNDS), 0.0, 45.0, wish))
     assert max(abs(v) for v in rows) == pytest.approx(8.0, rel=0.01)
     for k in range(100):
@@ -52,7 +52,7 @@ def test_without_a_heartbeat_the_torque_is_zero_and_then_ceases(wish):
     assert values(after).count(0.0) >= CLOSING / STEP - 2
 
 
-def test_who_lets_go_is_at_zero_within_the_release():
+def test_after_release_the_torque_reaches_zero_in_time():
     commander = Commander(BOUNDS)
     end = played(commander, 0.0, 2.0, Wish("constant", 8.0))[-1][0]
     commander.release("another")
@@ -89,7 +89,7 @@ def test_another_shape_begins_at_zero():
         (Wish("sine", 9.0, 50.0), "expected at most 2000 N m/s, the driver's slew_limit"),
     ],
 )
-def test_what_may_not_be_commanded_is_refused(wish, message):
+def test_a_forbidden_command_is_refused(wish, message):
     commander = Commander(BOUNDS)
     with pytest.raises(ParameterError, match=message):
         commander.hold("page", wish, 0.0)

@@ -1,4 +1,4 @@
-"""Decimation keeps what a picture shows."""
+"""Decimation keeps the shape of a curve."""
 
 import math
 
@@ -18,5 +18,5 @@ from rsea_ros.watch.decimation import extremes
         ([math.nan, 1.0, math.nan], [1.0]),
     ],
 )
-def test_extremes_in_the_order_in_which_they_came(values, kept):
+def test_extremes_keep_their_order_in_time(values, kept):
     assert [v for _, v in extremes(list(enumerate(values)))] == kept

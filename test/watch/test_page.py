@@ -1,4 +1,4 @@
-"""The page in a real browser: it draws, says nothing wrong, asks nobody else, and lets go of the command."""
+"""The page in a real browser: it draws, logs no error, contacts no other server, and releases the command."""
 
 import time
 
@@ -44,7 +44,7 @@ def held(commander):
         time.sleep(0.01)
 
 
-def test_it_draws_without_an_error_and_asks_only_its_server(page, server):
+def test_the_page_draws_without_an_error_and_contacts_only_its_server(page, server):
     page.until("document.querySelector('#health b')")
     assert page.value(INK % "torque") > 0.01 and page.value(INK % "flag") > 0.2
     assert text(page, "pure") == "pure torque" and "<b>plant" in text(page, "health")
@@ -75,7 +75,7 @@ def test_the_torque_is_zero_when_the_page_is_left(page, commander, leave):
     assert commander.torque(time.monotonic() + RELEASE) in (0.0, None)
 
 
-def test_more_than_the_limit_is_not_even_asked_for(page, commander):
+def test_the_page_never_requests_more_than_the_limit(page, commander):
     page.until("document.getElementById('amplitude').max === '10'")
     page.value("document.getElementById('amplitude').value = '10.5'; document.getElementById('go').click()")
     assert text(page, "go") == "Start" and not commander.active

@@ -1,4 +1,4 @@
-"""The server: who has no token, or comes from another page, gets nothing; who leaves, lets go."""
+"""The server refuses clients without a token or of another page; one that leaves releases the command."""
 
 import asyncio
 import http.client
@@ -39,7 +39,7 @@ def test_without_the_token_nothing_is_served(server, path):
     assert status(server, path, Cookie=f"{server.access.cookie}=wrong")[0] == 403
 
 
-def test_the_printed_address_gives_the_cookie_and_forbids_all_that_is_elsewhere(server):
+def test_the_printed_address_sets_the_cookie_and_forbids_foreign_content(server):
     (address,) = server.addresses
     code, headers = status(server, address.partition(str(server.port))[2])
     assert code == 200
@@ -73,12 +73,12 @@ def test_another_origin_is_refused(origin, host, same):
     assert same_origin(origin, host) is same
 
 
-def test_a_page_in_the_network_is_found_by_its_address():
+def test_a_page_in_the_network_is_reached_by_its_address():
     assert addresses("localhost", 80, "t") == ["http://localhost:80/?token=t"]
     assert addresses("0.0.0.0", 80, "t")[0] == "http://localhost:80/?token=t"
 
 
-def test_a_port_that_is_taken_is_said_in_one_line(server, tmp_path):
+def test_a_port_in_use_is_one_line(server, tmp_path):
     with pytest.raises(RseaError, match=f"page on localhost, port {server.port}: "):
         Server(None, Runs(tmp_path), None, port=server.port)
 
@@ -133,7 +133,7 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
         await page.write_message(json.dumps(HOLD))
         await answer(page, "ft")
         assert commander.holder is not None
-        page.stream.close()  # as a phone that left the network, without a word
+        page.stream.close()  # as a phone that leaves the network
         begun, late = time.monotonic(), 0.0
         while commander.holder is not None and time.monotonic() - begun < 60.0:
             before = time.monotonic()
@@ -158,7 +158,7 @@ def test_a_page_whose_socket_is_lost_lets_go_at_once(server, commander):
         ('{"do": "evaluate", "recording": "../x", "verb": "identify"}', "expected one that is complete"),
     ],
 )
-def test_what_a_page_may_not_is_said_to_it(tmp_path, commander, message, told):
+def test_a_page_is_informed_of_what_it_may_not_do(tmp_path, commander, message, told):
     class Page:
         waiting, got = 0, ""
 

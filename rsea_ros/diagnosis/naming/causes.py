@@ -20,6 +20,7 @@ from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.result import ParameterEstimate
 from rsea_ros.identification.solver import solve
 from rsea_ros.model.rig import CLOCK_DOUBT
+from rsea_ros.normal import Z95
 
 
 def cause_of(
@@ -27,8 +28,8 @@ def cause_of(
 ) -> Cause:
     """Return an accepted cause: its parameters beside all causes, its gain on the test blocks.
 
-    step: the models without and with it. last: the model with all causes. channel: of which its gain speaks
-    where that falls.
+    step: the models without and with it. last: the model with all causes. channel: preferred for its gain
+    where its residual falls.
     """
     (without, with_it), effect = step, effect_named(step[1].added)
     channel = _helped(without.test, with_it.test, channel, rule)
@@ -80,21 +81,21 @@ def sizes(effect: str, estimates: Sequence[ParameterEstimate], rule: SizeSetting
 
 
 def with_model_uncertainty(estimate: ParameterEstimate, rule: SizeSettings) -> Estimate:
-    """Return an estimate whose interval also holds what no residual shows.
+    """Return an estimate whose interval includes errors that no residual shows.
 
-    The fit's interval speaks of noise alone. Two right simulations of one bench differ by about `model_error`
-    in what they make of a parameter (their steps, how they smooth a law), and no time is known better than
-    the sensors' clocks. The interval of the noise alone stands beside the whole one.
+    The fit's interval covers noise only. Two right simulations of one bench differ by about `model_error`
+    in a parameter (by their steps and smoothing of laws), and no time is known better than
+    the sensors' clocks. The interval by noise alone is kept beside the whole one.
     """
     value, sd = estimate.value, rule.model_error * abs(estimate.value)
     if estimate.unit == "s":
         sd = float(np.hypot(sd, CLOCK_DOUBT))
-    low, high = (float(np.hypot(end - value, 1.96 * sd)) for end in estimate.ci95)
+    low, high = (float(np.hypot(end - value, Z95 * sd)) for end in estimate.ci95)
     return Estimate(value, estimate.unit, (value - low, value + high), estimate.ci95, sd)
 
 
 def latest(trials: Sequence[Trial]) -> list[Trial]:
-    """Return each effect's trial that says most: one fitted to everything, else the last."""
+    """Return the most thorough trial of each effect: one fitted to all training blocks, or the last."""
     best: dict[str, Trial] = {}
     for t in trials:
         if t.name not in best or t.is_full or not best[t.name].is_full:
@@ -111,7 +112,7 @@ def rejected_of(trial: Trial, held_out: HeldOut, channel: str) -> Rejected:
 def dropped_of(
     without: Evaluated, with_it: Evaluated, naming: Mapping[str, Named], channel: str
 ) -> Rejected:
-    """Return an effect that was accepted and may not be named, with the gain of what it helps most."""
+    """Return an accepted effect that may not be named, with its gain in the channel that it helps most."""
     named = naming.get(with_it.added)
     if named is None:
         return Rejected(with_it.added, gain(with_it.test, without.test, channel)[0], "leaves_too_much")
@@ -123,7 +124,7 @@ def dropped_of(
 def undetermined_play(
     selection: Selection, causes: Sequence[Cause], rejected: Sequence[Rejected]
 ) -> tuple[Remark, ...]:
-    """Return what a joint's log says of play that is no cause: people ask for it by name."""
+    """Return the remark on play in a joint's log where it is not a cause, because users look for it."""
     if selection.last.problem.rig.loop is None or any(_is_play(cause.name) for cause in causes):
         return ()
     trials = [trial for trial in selection.trials if _is_play(trial.name)]

@@ -21,6 +21,7 @@ from rsea_ros.diagnosis.selection import Selection
 from rsea_ros.diagnosis.settings import DiagnosisSettings
 from rsea_ros.identification.confidence import undetermined
 from rsea_ros.identification.estimates import identified_rig, overlays_of, parameters_of
+from rsea_ros.identification.off_rig import off_rig
 from rsea_ros.identification.problem import Case
 from rsea_ros.identification.remark import Remark
 from rsea_ros.identification.workers import Pools
@@ -44,11 +45,11 @@ def conclude(
 def _diagnosis(
     selection: Selection, outcome: Outcome, examined: Examined, pools: Pools, settings: DiagnosisSettings
 ) -> Diagnosis:
-    """Return the diagnosis of an outcome, with the rivals, what was rejected, and the curves of a report."""
+    """Return the diagnosis of an outcome, with rivals, rejected effects, and the curves of a report."""
     first, last, main = outcome.stages[0], outcome.stages[-1], outcome.channel
     case, records, rig = selection.cases[0], examined.records, examined.rig
     rejected = _rejected(selection, outcome, pools)
-    baseline = parameters_of(first.solution, first.confidence)
+    baseline, final = (parameters_of(s.solution, s.confidence) for s in (first, last))
     return Diagnosis(
         verdict=outcome.verdict,
         channel=main,
@@ -59,7 +60,7 @@ def _diagnosis(
         faults=examined.faults,
         baseline_rig=identified_rig(first.solution, baseline),
         baseline=baseline,
-        extended_rig=identified_rig(last.solution, parameters_of(last.solution, last.confidence)),
+        extended_rig=identified_rig(last.solution, final),
         noise_rms=dict(case.noise),
         residual_rms=_rms(first.test, case),
         fit_percent=_fit(first, selection.cases),
@@ -72,12 +73,16 @@ def _diagnosis(
         rejected=rejected,
         next_experiment=_next_experiment(selection, outcome, records[0], settings),
         remaining=misfits(case, last.outputs[0], main, rig),
-        masked=examined.checked[0].masked,
+        masked={n: ~counted for n, counted in case.mask.items()},
         settings=settings,
         before=overlays_of(case, first.outputs[0]),
         after=overlays_of(case, last.outputs[0]),
         spectra=tuple(spectrum(case, first.outputs[0], last.outputs[0], n) for n in first.test.sums),
-        remarks=(*undetermined_play(selection, outcome.causes, rejected), *_remarks(outcome, case)),
+        remarks=(
+            *off_rig(final),
+            *undetermined_play(selection, outcome.causes, rejected),
+            *_remarks(outcome, case),
+        ),
     )
 
 
@@ -92,7 +97,7 @@ def _alternatives(outcome: Outcome, pools: Pools, settings: DiagnosisSettings) -
 
 
 def _rejected(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rejected, ...]:
-    """Return what was accepted and may not be named, then all others that were tried."""
+    """Return the accepted effects that may not be named, then all others that were tried."""
     decided = {c.name for c in outcome.causes} | {r.name for r in outcome.dropped}
     others = [t for t in latest(selection.trials) if t.name not in decided]
     test_blocks = held_out_of(selection, None)
@@ -101,7 +106,7 @@ def _rejected(selection: Selection, outcome: Outcome, pools: Pools) -> tuple[Rej
 
 
 def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
-    """Return what the data cannot determine and what a reader must know of the extended model."""
+    """Return the remarks on values that the data cannot determine and on the extended model."""
     first, last = outcome.stages[0].solution.problem, outcome.stages[-1].solution.problem
     named = {c.name for c in outcome.causes}
     unnamed = tuple(n for n in last.added if n not in named)
@@ -118,7 +123,7 @@ def _remarks(outcome: Outcome, case: Case) -> list[Remark]:
 def _next_experiment(
     selection: Selection, outcome: Outcome, record: Record, settings: DiagnosisSettings
 ) -> Experiment | None:
-    """Return the run that would decide what these data cannot; None if nothing is open."""
+    """Return the run that would decide an open question; None without one."""
     rate, last = record["command"].rate, outcome.stages[-1]
     for stage in outcome.stages[1:]:
         rivals = selection.rivals_of(stage.added)
@@ -134,7 +139,7 @@ def _rms(test: Score, case: Case) -> dict[str, float]:
 
 
 def _fit(stage: Evaluated, cases: tuple[Case, ...]) -> dict[str, float]:
-    """Return the fit of every channel on all samples that count, %."""
+    """Return the fit of every channel on all valid samples, %."""
     case, out = cases[0], stage.outputs[0]
     keep = {n: case.mask[n] for n in stage.test.sums if n in case.measured}
     return {n: fit_percent((out[n] - case.measured[n])[k], case.measured[n][k]) for n, k in keep.items()}

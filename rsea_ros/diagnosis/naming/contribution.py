@@ -1,4 +1,4 @@
-"""What one cause alone contributes to a model's channels, row by row, beside the residual that is left."""
+"""The contribution of one cause to a model's channels, row by row, beside the residual."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Rows:
-    """The weighted residuals of a model and what one cause contributes to them, row by row, shape (m,).
+    """The weighted residuals of a model and the contribution of one cause, row by row, shape (m,).
 
     others: derivatives by all unknowns but the cause's, shape (m, n). block: number of a row's block, tests:
     whether it takes part in no fit and no choice. runs: rows of one channel of one record, in time.
@@ -34,14 +34,14 @@ class Rows:
 
 
 def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Problem:
-    """Return a problem on all samples of the cases, each channel in units of what `weights` leaves of it."""
+    """Return a problem on all samples of the cases, each channel in units of its residual in `weights`."""
     return replace(problem, cases=tuple(with_misfit_as_noise(c, weights.ratios) for c in cases))
 
 
 def rows_of(
     problem: Problem, theta: FloatArray, name: str, rule: BlockSettings, run: Map = serial
 ) -> Rows | None:
-    """Return a model's residuals and what a cause of it contributes; None where that runs away."""
+    """Return a model's residuals and the contribution of one cause; None where a simulation diverges."""
     error = problem.residual(theta)
     less, rest = without_effect(problem, theta, name)
     without = less.residual(rest)
@@ -78,7 +78,7 @@ def _blocks_of_rows(
 
 
 def projected(rows: Rows, values: FloatArray) -> FloatArray:
-    """Return what is left of rows of values when the other unknowns have done what they can."""
+    """Return rows of values less their best fit by the other unknowns."""
     a = rows.others
     normal = a.T @ a + np.diag(rows.prior**2)
     return np.asarray(values - a @ np.linalg.lstsq(normal, a.T @ values, rcond=None)[0])

@@ -1,7 +1,7 @@
-"""The evidence for a cause: what data that took part in no fit say of it, beside its rivals.
+"""The evidence for a cause and its rivals, from data that took part in no fit.
 
-Computed once for every cause that was accepted and for what does nearly as well in its place; probability.py
-makes a probability of it.
+Computed once for every accepted cause and for rivals that do nearly as well in its place; probability.py
+turns it into a probability.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from rsea_ros.signals import FloatArray
 
 @dataclass(frozen=True)
 class Evidence:
-    """What held-out data say of one named cause.
+    """The evidence of held-out data for one cause.
 
     gain, gain_low: 1 - RMS(with) / RMS(without) of the channel that it helps most, and the lower end of its
     95 % interval. is_sure: the gain pays for the parameters. weight: of this cause among all effects tried in
     its place, 0 to 1. before: the worst channel's residual over its noise without it, left: what its model
-    leaves of the worst channel. at_edge: a parameter ran to a bound. siblings: causes beside it.
+    leaves of the worst channel. at_edge: a parameter is at a bound. siblings: causes beside it.
     """
 
     name: str

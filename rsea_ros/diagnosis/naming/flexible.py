@@ -1,8 +1,8 @@
-"""A flexible law of the same regressors: what it still gains where a cause has been named.
+"""A flexible law of the same regressors: its further gain beside a cause.
 
-Beside the named law a small spline of what that law reads (speed, deflection, command, the torque measured)
-acts at the same place. Were the named law right, the spline would have nothing left to do; a law that the
-catalogue lacks leaves it much. Fitted linearly, with all other unknowns, on all blocks but the test blocks.
+Beside the named law a small spline over its regressor (speed, deflection, command, the measured torque)
+acts at the same place. If the named law is right, the spline gains nothing; a law that the
+catalogue lacks leaves it a gain. Fitted linearly, with all other unknowns, on all blocks but the test blocks.
 
 The responses to the spline's parts are simulated: a torque at the gear or in the spring is a torque beside
 the command, one in the spring also shows in the F/T sensor, and a sensor's own error adds to its channel.
@@ -39,8 +39,8 @@ and far above rounding."""
 
 @dataclass(frozen=True)
 class Flexible:
-    """What the spline gains: share of the residual on test blocks, its 95 % interval, and how much of what
-    the cause itself takes away that is (both as powers)."""
+    """The gain of the spline: share of the residual on test blocks, its 95 % interval, and its ratio to the
+    cause's own gain (both as powers)."""
 
     gain: float
     ci95: tuple[float, float]
@@ -48,7 +48,7 @@ class Flexible:
 
 
 def flexible(problem: Problem, theta: FloatArray, name: str, rows: Rows) -> Flexible | None:
-    """Return what a spline gains beside a cause; None where the cause reads nothing that a spline could."""
+    """Return the gain of a spline beside a cause; None for a cause without a suitable regressor."""
     responses = _responses(problem, theta, effect_named(name))
     if not responses:
         return None
@@ -93,7 +93,7 @@ def _hold(case: Case) -> int:
 
 
 def _signal(case: Case, out: dict[str, FloatArray], effect: Effect) -> FloatArray | None:
-    """Return what the effect reads, on the drive's steps or at the samples of the channel that it adds to."""
+    """Return the effect's regressor, on the drive's steps or at the samples of the channel it adds to."""
     drive = case.drive
     if not isinstance(drive, Drive):
         return drive.v if st.GEAR_VELOCITY in effect.reads else None
@@ -159,7 +159,7 @@ def _kept(base: dict[str, FloatArray], name: str) -> dict[str, FloatArray]:
 
 
 def _seen(case: Case, out: dict[str, FloatArray], pushed: Drive) -> dict[str, FloatArray]:
-    """Return channels in which the F/T sensor feels what was taken from the spring's torque."""
+    """Return channels in which the F/T sensor also measures the torque taken from the spring's."""
     if "ft" not in out or not isinstance(case.drive, Drive):
         return out
     middles = pushed.start + pushed.step * (np.arange(len(pushed.command)) + 0.5)

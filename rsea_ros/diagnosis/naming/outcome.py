@@ -21,10 +21,10 @@ from rsea_ros.signals import MEASURED
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the weighed causes come to.
+    """The outcome of weighing the causes.
 
-    channel: of which verdict and gains speak. stages: models from the nominal one to the extended one.
-    dropped: what was accepted and may not be named. named: by cause what may be said of it.
+    channel: of verdict and gains. stages: models from the nominal one to the extended one.
+    dropped: accepted effects that may not be named. named: by cause its status.
     """
 
     verdict: Verdict
@@ -59,12 +59,12 @@ def outcome_of(weighing: Weighing, examined: Examined, settings: DiagnosisSettin
 
 
 def with_rivals(cause: Cause, selection: Selection) -> Cause:
-    """Return a cause with the names of what does as well in its place."""
+    """Return a cause with the names of the effects that do as well in its place."""
     return replace(cause, confusable_with=tuple(m.newest for m in selection.rivals_of(cause.name)))
 
 
 def naming_of(weighing: Weighing, settings: DiagnosisSettings) -> dict[str, Named]:
-    """Return by cause what may be said of it."""
+    """Return the naming of each cause."""
     first, last = weighing.stages[0].test, weighing.stages[-1].test
     at_floor, most = is_at_floor(last, settings.floor), takes_most(first, last, settings)
     return {n.cause.evidence.name: n for n in named(weighing.places, at_floor, most, settings)}

@@ -1,9 +1,9 @@
-"""The probability that a cause is what it is called: a logistic model of the evidence for it.
+"""The probability that the name of a cause is right: a logistic model of its evidence.
 
     p = 1 / (1 + exp(-(a_0 + sum_i a_i f_i)))
 
-The features f say how far the law's shape fits (signature.py), what a flexible law still gains (flexible.py),
-how it stands among its rivals (rivals.py), and how much it helps. The coefficients are those of
+The features f are the fit of the law's shape (signature.py), the further gain of a flexible law
+(flexible.py), its odds among its rivals (rivals.py), and its gain. The coefficients are those of
 `bench/calibration.py fit`; "none of these" is the mass that a cause and its rivals leave.
 """
 
@@ -14,31 +14,28 @@ from collections.abc import Mapping
 
 from rsea_ros.diagnosis.naming.coefficients import COEFFICIENTS
 from rsea_ros.diagnosis.naming.evidence import Evidence
-from rsea_ros.diagnosis.settings import DEFAULT, EvidenceSettings
-from rsea_ros.identification.result import AT_NOISE
+from rsea_ros.diagnosis.settings import DEFAULT, DiagnosisSettings, EvidenceSettings
 
 INTERCEPT = "intercept"
 _CERTAIN = 30.0
 """Log odds from which no number of this machine differs from certainty."""
 
 
-def features(
-    e: Evidence, preferred: bool, rule: EvidenceSettings = DEFAULT.evidence
-) -> dict[str, float]:
+def features(e: Evidence, preferred: bool, settings: DiagnosisSettings = DEFAULT) -> dict[str, float]:
     """Return the numbers that the logistic model weighs, by name. preferred: the search chose it.
 
-    shape: how far lambda spreads. rivals: log odds among them, less the farther the noise is, for what is
-    left there is no noise, and more parameters always bend a law a little nearer to it. noise: its model
-    leaves only that. flexible: what a spline surely gains beside it. edge: a parameter ran to a bound.
+    shape: spread of lambda. rivals: log odds among them, reduced with the distance from the noise floor,
+    because the residual there is not noise, and more parameters always fit a little of it. noise: its model
+    leaves only noise. flexible: sure gain of a spline beside it. edge: a parameter is at a bound.
     """
-    s, flexible = e.signature, e.flexible
+    s, flexible, rule = e.signature, e.flexible, settings.evidence
     bent = max(s.amplitude, s.time, s.frequency)
     return {
         INTERCEPT: 1.0,
         "shape": 0.5 * (_relative(s.overall, rule) + _relative(bent, rule)),
         "rivals": _log_odds(e.weight, rule.surest) / max(e.left, 1.0),
         "preferred": float(preferred),
-        "noise": float(e.left <= AT_NOISE),
+        "noise": float(e.left <= settings.floor.reached),
         "flexible": flexible.gain if flexible and flexible.ci95[0] > 0.0 else 0.0,
         "edge": float(e.at_edge),
     }
@@ -58,8 +55,8 @@ def probability(
     e: Evidence,
     preferred: bool,
     coefficients: Mapping[str, float] = COEFFICIENTS,
-    rule: EvidenceSettings = DEFAULT.evidence,
+    settings: DiagnosisSettings = DEFAULT,
 ) -> float:
     """Return the probability that the cause is part of the truth under its name, 0 to 1."""
-    odds = sum(coefficients[name] * value for name, value in features(e, preferred, rule).items())
+    odds = sum(coefficients[name] * value for name, value in features(e, preferred, settings).items())
     return 1.0 / (1.0 + math.exp(-min(max(odds, -_CERTAIN), _CERTAIN)))

@@ -1,7 +1,7 @@
-"""Claims: every accepted cause and every rival of it, as a model that held-out data can be asked about.
+"""Claims: every accepted cause and every rival of it, as a model to be tested on held-out data.
 
-Rivals of a cause are the effects that were tried beside the same model and what is said to be confused with
-it and does as well in its place. Each has a weight by what it leaves of the test blocks: pseudo-BMA with the
+Rivals of a cause are the effects that were tried beside the same model and its known look-alikes
+that do as well in its place. Each has a weight by its residual on the test blocks: pseudo-BMA with the
 Bayesian bootstrap,
 
     w_k = mean over bootstraps of softmax_k(-1/2 (sum_b v_b loss_kb + price_k))
@@ -63,7 +63,7 @@ def beside(selection: Selection, model: Candidate) -> list[Trial]:
 def weighed(
     selection: Selection, claim: Claim, tried: Sequence[Trial], held_out: HeldOut, pools: Pools, far: float
 ) -> Contest:
-    """Return a contest of a claim with what was tried beside the same model, or does as well in its place.
+    """Return a contest of a claim with the effects tried beside the same model, or as good in its place.
 
     Another cause that was accepted too is no rival, whichever of the two came first.
     """
@@ -95,7 +95,7 @@ def weighed(
 def _stacked(
     scores: Sequence[Score], priors: Sequence[float], sizes: Sequence[int], far: float
 ) -> list[float]:
-    """Return weights; every number that describes an effect costs the logarithm of the number of blocks.
+    """Return weights; each parameter of an effect costs the logarithm of the number of blocks.
 
     A law that holds another as a special case does as well wherever the other is right (Schwarz, Annals of
     Statistics 6, 1978).

@@ -1,11 +1,11 @@
-"""The signature of a cause: whether its law has the shape of what the data show, and where it has not.
+"""The signature of a cause: whether and where its law has the shape that the data show.
 
     c = y(with) - y(without),   lambda_b = 1 + c.r / c.c   in every block b
 
-c: what the cause alone contributes, r: the residual with it, both over the noise and without what the other
-unknowns can imitate (their derivatives are projected out). lambda_b is the factor by which block b would have
-the contribution larger. A right law leaves 1 in every block; a look-alike is too large in some and too small
-in others, although on the whole it helps. By amplitude, time and frequency lambda says how a law is wrong.
+c: the contribution of the cause, r: the residual with it, both over the noise and without the parts that the
+other unknowns can imitate (their derivatives are projected out). lambda_b is the factor of the contribution
+that block b prefers. A right law gives 1 in every block; a look-alike is too large in some and too small
+in others, although it helps overall. By amplitude, time and frequency lambda shows how a law is wrong.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Signature:
     """Spreads of lambda, weighted by c.c; 0 for a law that fits everywhere.
 
     scale: lambda of all test blocks together. spread: over the test blocks; over all blocks `overall`.
-    chance: what `overall` would be for a residual that has nothing to do with the cause.
+    chance: value of `overall` for a residual unrelated to the cause.
     amplitude, time, frequency: over parts of these. share: c.c / r.r. kept: the share of c.c that no other
     unknown imitates.
     """
@@ -116,7 +116,7 @@ def _over_frequency(rows: Rows, c: FloatArray, r: FloatArray, bands: int) -> flo
 
 
 def _segments(block: IntArray, shortest: int) -> Iterator[tuple[int, IntArray]]:
-    """Yield the length of the usual whole block and the rows of all such, shape (blocks, length).
+    """Yield the length of the usual whole block and the rows of all such blocks, shape (blocks, length).
 
     shortest: rows that a block must have.
     """

@@ -1,9 +1,9 @@
-"""Naming: which causes may be named, with which status, and what stands against each.
+"""Naming: which causes may be named, with which status, and the rivals of each.
 
-A cause and its rivals share the probability that one of them is right; the rest is "none of these". What
-surely takes a part that counts is named unless that is four times as likely; what helps less, where that is
-less likely. Causes that together take most of the residual, or all of it, are always named, but as
-`confirmed` only where they are likely.
+A cause and its rivals share the probability that one of them is right; the rest is "none of these". A cause
+that surely takes a material part is named unless "none of these" is four times as likely; one that helps
+less, where it is likelier than that. Causes that together take most of the residual, or all of it, are always
+named, but as `confirmed` only where they are likely.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def named(
     takes_most: bool,
     settings: DiagnosisSettings = DEFAULT,
 ) -> list[Named]:
-    """Return what may be said of the cause in each place.
+    """Return the naming of the cause in each place.
 
     at_floor, takes_most: all causes together leave only noise, or take most of the residual (criteria.py).
     """
@@ -61,7 +61,7 @@ def probabilities_and_status(
 
     evidence: of the cause, then of its rivals. At most one of them is right: together they have at most 1.
     """
-    likely = [probability(e, k == 0, coefficients, settings.evidence) for k, e in enumerate(evidence)]
+    likely = [probability(e, k == 0, coefficients, settings) for k, e in enumerate(evidence)]
     likely = [p / max(1.0, sum(likely)) for p in likely]
     rivals = [p for p in likely[1:] if p >= settings.naming.rival]
     is_named = at_floor or takes_most or _helps(likely[0] + sum(rivals), evidence[0], settings)
@@ -69,9 +69,9 @@ def probabilities_and_status(
 
 
 def _helps(mass: float, evidence: Evidence, settings: DiagnosisSettings) -> bool:
-    """Return whether a cause surely helps, enough for the probability of it and its rivals.
+    """Return whether a cause surely helps, by enough for the probability of it and its rivals.
 
-    One of whose parameters has run to a bound may bend to something else: it must be likely.
+    A cause with a parameter at a bound may imitate another one, so it must be likely.
     """
     rule = settings.naming
     brings = evidence.gain_low >= settings.acceptance.fall and not evidence.at_edge

@@ -1,8 +1,8 @@
 """Weighing: the evidence for every accepted cause and its rivals, and for one more that surely helps.
 
-A step of the search asks for a tenth of some channel's residual, far from the floor for more. Where several
-small effects overlap none brings so much. What nevertheless surely helps on blocks that took no part is
-promoted: it becomes a cause to be weighed.
+A step of the search requires a tenth of some channel's residual, far from the floor more. Where several
+small effects overlap none gains that much. An effect that nevertheless surely helps on unused blocks is
+promoted to a cause to be weighed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Transactions with one motor: every result and error byte looked at, every failure counted by kind."""
+"""Transactions with one motor: every result and error byte is checked, every failure counted by kind."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Bus:
         self._check(f"write of {value} at {item.address}", result, error)
 
     def patiently(self, transaction: Callable[[], T]) -> T:
-        """Return what a transaction outside the cycle returns: it has time for several attempts."""
+        """Return the result of a transaction outside the cycle, with several attempts."""
         usual, self.latency = self.latency, max(self.latency, PATIENCE)
         try:
             return _repeated(transaction)
@@ -113,7 +113,7 @@ class Bus:
 
 
 def _repeated(transaction: Callable[[], T]) -> T:
-    """Return what a transaction returns, tried again when a reply is lost."""
+    """Return the result of a transaction, repeated when a reply is lost."""
     for _ in range(ATTEMPTS - 1):
         try:
             return transaction()

@@ -42,7 +42,7 @@ def stuffed(payload: bytes) -> bytes:
 
 
 def unstuffed(payload: bytes) -> bytes | None:
-    """Return what was stuffed; None for bytes that `stuffed` never makes."""
+    """Return the bytes before stuffing; None for bytes that `stuffed` never makes."""
     plain = payload.replace(_STUFFED, _PATTERN)
     return plain if stuffed(plain) == payload else None
 

@@ -25,10 +25,10 @@ EMPTY = 11
 
 
 class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK has no types
-    """Protocol 2.0; `receiver.rejected` counts what came in damaged.
+    """Protocol 2.0; `receiver.rejected` counts damaged frames.
 
     expected: parameters of the reply that is waited for; one of another size answers an older request, is
-    left out and counted (`stale`). None: any. A refusal has no parameters and is let through.
+    left out and counted (`stale`). None: any. A refusal has no parameters and is accepted.
     meanwhile: done once while the next reply is on its way.
     """
 
@@ -58,7 +58,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
         return _with_payload(packet, plain)
 
     def txPacket(self, port: Port, txpacket: Sequence[int]) -> int:
-        """Stuff, sign and send a packet; what has come in before is thrown away. Raises PortLost."""
+        """Stuff, sign and send a packet; earlier input is discarded. Raises PortLost."""
         data = frame(txpacket[4], _payload(txpacket))
         if len(data) > LONGEST:
             return int(COMM_TX_ERROR)

@@ -34,8 +34,8 @@ class Answer(NamedTuple):
 class Line:
     """A port with motors of one series. Each joins when it is opened, and gives its goal before `exchange`.
 
-    fast: whether one joint reply is asked for, which newer firmware gives. Those behind a silent motor wait
-    for its reply: it comes last in the next request, and each is asked for a reply of its own.
+    fast: whether to request one joint reply, which newer firmware supports. Motors behind a silent one wait
+    for its reply: it is last in the next request, in which each motor replies separately.
     """
 
     def __init__(self, path: str, baud: int, latency: float, *, fast: bool = False) -> None:
@@ -76,7 +76,7 @@ class Line:
         self._goals[identity] = counts
 
     def exchange(self) -> None:
-        """Write the goals that were set, then read these motors; `answer` has what came."""
+        """Write the goals that were set, then read these motors; `answer` returns the replies."""
         goals, self._goals = self._goals, {}
         if goals:
             with self.port.turns.taken():
@@ -101,7 +101,7 @@ class Line:
         return identity in self._answers
 
     def answer(self, identity: int) -> Answer:
-        """Take what a motor has sent in the last exchange. Raises NoReply, PortLost."""
+        """Return the reply of a motor in the last exchange, once. Raises NoReply, PortLost."""
         answer = self._answers.pop(identity)
         if answer is None:
             raise NoReply(f"motor ID {identity} on {self.port.port_name}: no reply to the sync read")
@@ -110,7 +110,7 @@ class Line:
         return answer
 
     def give_up(self) -> None:
-        """Close all motors, and with them a port that is lost; each has to be opened anew."""
+        """Close all motors and a lost port; each motor must be opened again."""
         for close in list(self._joined.values()):
             close()
 

@@ -27,7 +27,7 @@ class LineMotor(Motor):
         self._line.admit(self._id, self.known, self.bus.return_delay)
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
-        """Return what the exchange has brought, or a reading alone. Raises NoReply, PortLost, Refused."""
+        """Return the reading of the exchange, or a separate one. Raises NoReply, PortLost, Refused."""
         if not self._line.asked(self._id):
             return super().read(meanwhile)
         if meanwhile is not None:
@@ -41,13 +41,13 @@ class LineMotor(Motor):
         self._line.set_goal(self._id, self.counts(torque))
 
     def recover(self) -> None:
-        """Connect again; where the port was lost, every motor of the line must be recovered."""
+        """Reconnect; where the port was lost, every motor of the line must be recovered."""
         try:
             self.bus.patiently(self.bus.ping)
         except PortLost:
             self._line.give_up()
         except DeviceError:
-            pass  # what is wrong with this motor alone is seen to below
+            pass  # a fault of this motor alone is handled below
         super().recover()
 
     def close(self) -> None:

@@ -28,8 +28,8 @@ BOOT_TIME, BOOT_POLL = 5.0, 0.02
 class Motor:
     """One motor on a port, of its own unless one is given, which is then opened and closed by its owner.
 
-    protection: the motor's bus watchdog, or a supervisor for one that has none; known once it is open.
-    torque_constant: N m/A that counts are worth, with its spread; own: what the motor is set to.
+    protection: the motor's bus watchdog, or a supervisor for a motor without; known once it is open.
+    torque_constant: N m/A of the counts, with its spread; own: the motor's settings.
     """
 
     def __init__(self, settings: Settings, port: Port | None = None) -> None:
@@ -52,7 +52,7 @@ class Motor:
 
     @property
     def torque_limit(self) -> float:
-        """What the motor's own limit of the current is worth, N m."""
+        """The torque at the motor's own current limit, N m."""
         return math.nan if self.own is None else self.torque_of(self.own.current)
 
     def open(self) -> None:
@@ -102,12 +102,12 @@ class Motor:
             self._stop()
 
     def read(self, meanwhile: Callable[[], None] | None = None) -> Sample:
-        """Read everything that is measured, once. Raises NoReply, PortLost, Refused.
+        """Read all measurements once. Raises NoReply, PortLost, Refused.
 
         meanwhile: done while the reply is on its way.
 
         After a failure the next read is longer or shorter by a byte: a reply that comes late has the wrong
-        size and cannot be taken for the new one.
+        size and cannot be mistaken for the new one.
         """
         table = self.known
         start, size = table.sample
@@ -124,7 +124,7 @@ class Motor:
         return self.sample(data, instant)
 
     def sample(self, data: bytes, instant: int) -> Sample:
-        """Return what was read, with what the motor complains of; registers have their turn here."""
+        """Return the reading with the motor's errors; watched registers are checked here in turn."""
         table = self.known
         error = error_names(self.bus.get(table.hardware_error)) if self.bus.alert else ""
         return sample_of(table, data, instant, error, "" if error else self._watchlist.look())
@@ -172,7 +172,7 @@ class Motor:
         self.open()
 
     def close(self) -> None:
-        """Zero torque, off, port closed; where the motor does not acknowledge it the supervisor goes on."""
+        """Zero torque, off, port closed; where the motor does not acknowledge it, the supervisor stays."""
         safe = False
         try:
             if self.table is not None:

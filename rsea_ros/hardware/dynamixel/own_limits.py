@@ -1,4 +1,4 @@
-"""What the motor itself is set to: its limits, zero and drive mode, read and compared with the driver's."""
+"""The settings of the motor: its limits, zero and drive mode, read and compared with the driver's."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class OwnLimits:
 
 
 def own_limits(bus: Bus, table: ControlTable) -> OwnLimits:
-    """Read what the motor is set to.
+    """Read the settings of the motor.
 
-    Raises DeviceError, also for a motor whose torque something else than torque_enable switches on.
+    Raises DeviceError, also for a motor whose torque is not switched by torque_enable alone.
     """
     start, size = table.span(READ)
     data = bus.patiently(lambda: bus.read(start, size))

@@ -24,7 +24,7 @@ RETURN_DELAY = 500e-6
 
 
 class Turns:
-    """Who may use a port: one transaction at a time, the next to who waits, not to who has just had one."""
+    """Turns on a port, one transaction each: a waiting thread comes before one that has just finished."""
 
     def __init__(self) -> None:
         self._next, self._used = threading.Lock(), threading.Lock()
@@ -43,7 +43,7 @@ class Turns:
 class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
     """PortHandler of the SDK with a blocking wait and a time-out from baud rate, size and return delay.
 
-    latency: what USB adapter and scheduler may add to the time on the wire, s.
+    latency: allowance for USB adapter and scheduler beside the time on the wire, s.
     return_delay: pause of the motor before it answers, s. Both are those of the transaction under way.
     turns: of the transactions of several motors.
     """
@@ -82,7 +82,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return baudrate if baudrate in BAUD_RATES else -1
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Open the port anew at another rate; return whether it is one of BAUD_RATES."""
+        """Reopen the port at another rate; return whether it is one of BAUD_RATES."""
         if self.getCFlagBaud(baudrate) < 0:
             return False
         self.close()
@@ -100,12 +100,12 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
             raise PortLost(f"port {self.port_name}: {error.strerror} while sending") from None
 
     def clearPort(self) -> None:
-        """Throw away what has come in."""
+        """Discard received bytes."""
         while self._arrived(0.0):
             self._take()
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Begin to wait for a reply of so many bytes, after a request of at most 16."""
+        """Begin to wait for a reply of a number of bytes, after a request of at most 16."""
         on_wire = (packet_length + 16) * BITS_PER_BYTE / self.baudrate
         self.setPacketTimeoutMillis(1e3 * (on_wire + self.return_delay + self.latency))
 
@@ -115,7 +115,7 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
     @property
     def left(self) -> float:
-        """What is left of the wait, s."""
+        """The remaining wait, s."""
         return max(0.0, self._deadline - time.monotonic())
 
     def isPacketTimeout(self) -> bool:
@@ -123,13 +123,13 @@ class Port(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return time.monotonic() > self._deadline
 
     def receive(self) -> bytes:
-        """Return what comes before the deadline, empty after it. Raises PortLost."""
+        """Return the bytes received before the deadline, empty after it. Raises PortLost."""
         return self._take() if self._arrived(self.left) else b""
 
     def _arrived(self, wait: float) -> bool:
-        """Return whether something has come in since it was last looked at, within a time (s).
+        """Return whether bytes have arrived since the last call, within a time (s).
 
-        Edges, not levels: to look into an empty terminal, as select and read do, is to wait for the kernel's
+        Edges, not levels: polling an empty terminal, as select and read do, means waiting for the kernel's
         thread that fills it, whatever the time-out, on a busy machine for a cycle.
         """
         if self._arrivals is None:

@@ -41,14 +41,14 @@ class Receiver:
         while (size := self._size()) is not None:
             found = self._checked(bytes(self._buffer[:size]), raw)
             if found is None:
-                del self._buffer[:1]  # look for a header inside what was not a frame
+                del self._buffer[:1]  # search for a header inside the rejected frame
             else:
                 frames.append(found)
                 del self._buffer[:size]
         return frames
 
     def _size(self) -> int | None:
-        """Drop what comes before a header; return the size of the frame behind it once it is whole."""
+        """Drop the bytes before a header; return the size of the frame behind it once it is whole."""
         buffer = self._buffer
         while True:
             at = buffer.find(HEADER)

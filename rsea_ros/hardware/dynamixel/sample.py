@@ -1,4 +1,4 @@
-"""What one read of a motor holds, in SI units."""
+"""The measurements of one read of a motor, in SI units."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Sample:
     """instant: middle of the transaction, monotonic ns. counts: of the encoder. position rad, velocity rad/s,
     current A, voltage V, temperature °C.
 
-    hardware_error: what the motor complains of. trouble: what its registers are and should not be, in words.
+    hardware_error: errors that the motor reports. trouble: wrong values of its registers, in words.
     """
 
     instant: int
@@ -30,7 +30,7 @@ class Sample:
 def sample_of(
     table: ControlTable, data: bytes, instant: int, hardware_error: str = "", trouble: str = ""
 ) -> Sample:
-    """Return what the bytes of `table.sample` hold; more of them do no harm."""
+    """Return the measurements in the bytes of `table.sample`; further bytes are ignored."""
     start = table.sample[0]
     counts = table.position.value(data, start)
     return Sample(

@@ -10,11 +10,11 @@ SHARE, REST = 0.4, 1e-4
 
 @dataclass(frozen=True)
 class Settings:
-    """Where the motor is and what it is.
+    """Connection and model of the motor.
 
     baud: bit/s. model: number that is expected, 0 for any known. torque_constant: N m at the gear output
-    per A, 0: that of the model's table. latency: what adapter and scheduler may add to the time on the wire,
-    s; a reading gets in addition what the write before it has left of it. watchdog: s without the host after
+    per A, 0: that of the model's table. latency: allowance for adapter and scheduler beside the time on the
+    wire, s; a reading may also use what the write before it has left. watchdog: s without the host after
     which the motor's own watchdog, or the supervisor, takes the torque away. supervisor: socket of one that
     runs as a service; empty: a child of this process.
     """

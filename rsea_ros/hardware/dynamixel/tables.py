@@ -38,7 +38,7 @@ class Item:
 
 @dataclass(frozen=True)
 class TorqueConstant:
-    """Torque at the output for a current, N m/A: value, and what the sources give at least and at most."""
+    """Torque at the output for a current, N m/A: value, and the least and largest of the sources."""
 
     value: float
     low: float
@@ -51,11 +51,11 @@ class TorqueConstant:
 
 @dataclass(frozen=True)
 class ControlTable:
-    """A motor's items, and what counts are worth: A, rad/s, and pulses per revolution of the output.
+    """A motor's items, and the values of a count: A, rad/s, and pulses per revolution of the output.
 
-    bus_watchdog, drive_mode, startup: None on a model that has none. watchdog_firmware: the first that has
-    the bus watchdog. torque_limit and goal_torque are currents, which the maker of later series calls them.
-    torque_constant: None where no source gives one.
+    bus_watchdog, drive_mode, startup: None on a model without. watchdog_firmware: the first with
+    the bus watchdog. torque_limit and goal_torque are currents; later series call them so.
+    torque_constant: None without a source.
     """
 
     model: int
@@ -80,7 +80,7 @@ class ControlTable:
 
     @property
     def sample(self) -> tuple[int, int]:
-        """First address and size of the one read that holds everything that is measured."""
+        """First address and size of the one read with all measurements."""
         return self.span(_MEASURED)
 
     def span(self, names: tuple[str, ...]) -> tuple[int, int]:

@@ -21,13 +21,13 @@ class Watchlist:
         self._looks, self._looked = 0, 0.0
 
     def expect(self, *registers: tuple[str, Item, int]) -> None:
-        """Note what registers shall be from now on: name, item, value; none: look at nothing."""
+        """Set the expected registers from now on: name, item, value; empty: nothing is checked."""
         self._expected = registers
 
     def look(self) -> str:
-        """Read one of them when its turn has come, each once in LOOK; return what is wrong with it.
+        """Read one of them in turn, each once in LOOK; return its fault.
 
-        A lost reply is no news: its turn comes again.
+        A lost reply is ignored: the register is read again later.
         """
         now = time.monotonic()
         if not self._expected or now - self._looked < LOOK / len(self._expected):

@@ -27,7 +27,10 @@ _MOST = 1e12
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a count is worth: N and N m. rate: records a second that the sensor sends, Hz; nan if untold."""
+    """The value of a count: N and N m.
+
+    rate: records a second that the sensor sends, Hz; nan if not stated.
+    """
 
     force: float
     torque: float
@@ -53,7 +56,7 @@ def parse(page: bytes, where: str = "netftapi2.xml") -> Calibration:
 
 
 def fetch(host: str, port: int = 80, timeout: float = 2.0) -> Calibration:
-    """Ask a sensor for its calibration. Raises DeviceError when it has not answered after timeout, s."""
+    """Request the calibration of a sensor. Raises DeviceError without an answer within timeout, s."""
     return parse(get(host, port, "/netftapi2.xml", timeout), f"http://{host}:{port}/netftapi2.xml")
 
 

@@ -1,4 +1,4 @@
-"""A page of a device next door: one request, a time limit for all of it, no redirect, no proxy."""
+"""A page of a local device: one request, one time limit, no redirect, no proxy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LARGEST = 1 << 20
 
 
 def get(host: str, port: int, path: str, limit: float) -> bytes:
-    """Return what a device answers to GET within a limit in s. Raises DeviceError."""
+    """Return the answer of a device to GET within a limit in s. Raises DeviceError."""
     address = f"http://{host}:{port}{path}"
     deadline = time.monotonic() + limit
     try:
@@ -46,14 +46,14 @@ def _answer(connection: socket.socket, deadline: float) -> bytes:
 
 
 class _Source(io.RawIOBase):
-    """Bytes of a connection until a deadline; every wait is cut to what is left of the time."""
+    """Bytes of a connection until a deadline; every wait is limited to the remaining time."""
 
     def __init__(self, connection: socket.socket, deadline: float) -> None:
         self._connection = connection
         self._deadline = deadline
 
     def makefile(self, mode: str) -> io.BufferedReader:
-        """Return a file as HTTPResponse asks for it."""
+        """Return a file for HTTPResponse."""
         return io.BufferedReader(self)
 
     def readable(self) -> bool:

@@ -1,4 +1,4 @@
-"""Drains the socket whenever somebody asks, and by a thread: every record has the stamp of its arrival."""
+"""Drains the socket on request and in a thread: every record has the stamp of its arrival."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class Arrival(NamedTuple):
 
 
 class Receiver:
-    """Ask a sensor for its stream and keep what comes.
+    """Request the stream of a sensor and keep its records.
 
-    sequence: counts of what came and what is gone. refused: datagrams that were not records.
+    sequence: counts of received and lost records. refused: datagrams that were not records.
     """
 
     def __init__(self, host: str, port: int) -> None:
@@ -55,7 +55,7 @@ class Receiver:
         self._thread: threading.Thread | None = None
 
     def open(self) -> None:
-        """Ask for the stream and begin to receive. Raises DeviceError."""
+        """Request the stream and begin to receive. Raises DeviceError."""
         try:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._socket.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -72,7 +72,7 @@ class Receiver:
         self._thread.start()
 
     def send(self, command: int) -> None:
-        """Send a command, then ask for the stream again."""
+        """Send a command, then request the stream again."""
         with contextlib.suppress(OSError):
             self._socket.send(request(command))
             self.sequence.begin()
@@ -88,7 +88,7 @@ class Receiver:
         return taken
 
     def collect(self, seconds: float) -> list[Arrival]:
-        """Return the records of so many seconds from now on, beside those that `take` gives to a cycle."""
+        """Return the records of the next seconds, in addition to those that `take` gives to a cycle."""
         self.drain()
         aside: deque[Arrival] = deque(maxlen=KEPT)
         self._aside = aside
@@ -108,7 +108,7 @@ class Receiver:
             self._thread = None
 
     def _run(self) -> None:
-        """Drain what nobody takes, and ask again where nothing comes: also of a box that was switched off."""
+        """Drain the socket between calls, and repeat the request when nothing comes."""
         asked = time.monotonic()
         while not self._stop.wait(PAUSE):
             self.drain()
@@ -121,7 +121,7 @@ class Receiver:
         if self._thread is None or not self._draining.acquire(blocking=False):
             return
         try:
-            with contextlib.suppress(OSError):  # nothing more is there, or the box is switched off
+            with contextlib.suppress(OSError):  # no more records, or the sensor is off
                 while True:
                     self._keep(*self._socket.recvmsg(SIZE_AND_MORE, ANCILLARY, socket.MSG_DONTWAIT))
         finally:

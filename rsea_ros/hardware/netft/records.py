@@ -1,4 +1,4 @@
-"""RDT: requests, records of 36 bytes, and what their counters show about lost records."""
+"""RDT: requests, records of 36 bytes, and lost records by their counters."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class Record(NamedTuple):
 
 
 def request(command: int, count: int = 0) -> bytes:
-    """Return a request; count: records that are wanted, 0 for ever."""
+    """Return a request; count: requested records, 0 without end."""
     return _REQUEST.pack(0x1234, command, count)
 
 
 def decode(datagram: bytes) -> Record | None:
-    """Return the record of a datagram; None for one that is none."""
+    """Return the record of a datagram; None for another datagram."""
     if len(datagram) != SIZE:
         return None
     sequence, ft_sequence, status, *counts = _RECORD.unpack(datagram)
@@ -45,9 +45,9 @@ def decode(datagram: bytes) -> Record | None:
 
 
 def trouble(status: int) -> str:
-    """Return what status bits complain of: '' nothing, `saturation` or `status`.
+    """Return the error in the status bits: '' none, `saturation` or `status`.
 
-    0x80010000 alone is the condition latch, a memory of an old crossing and no error.
+    0x80010000 alone is the condition latch, the memory of an earlier crossing, not an error.
     """
     if status & SATURATION:
         return "saturation"
@@ -70,11 +70,11 @@ class Sequence:
         self._strays = 0
 
     def begin(self) -> None:
-        """A new stream was asked for: rdt_sequence begins anew, the sensor's own counter goes on."""
+        """A new stream was requested: rdt_sequence restarts, the sensor's own counter continues."""
         self._rdt = None
 
     def forget(self) -> None:
-        """Take whatever comes next for good."""
+        """Accept the next record whatever its counters."""
         self._rdt = self._ft = None
 
     def accept(self, record: Record) -> bool:
@@ -109,9 +109,10 @@ class Sequence:
 
 
 def _ft_kind(step: int, counter: int) -> str:
-    """Return what is wrong with a step of ft_sequence; '' for none, also after a gap.
+    """Return the fault in a step of ft_sequence; '' for none, also after a gap.
 
-    A counter that begins anew at about zero was switched off; any other jump is damage, until it goes on.
+    A counter that restarts near zero means a sensor that was off; any other jump is damage, until it
+    continues.
     """
     if step < LONGEST_GAP:
         return ""
@@ -121,7 +122,7 @@ def _ft_kind(step: int, counter: int) -> str:
 
 
 def _kind(step: int) -> str:
-    """Return what is wrong with a step of rdt_sequence; '' for the next record, also after a gap."""
+    """Return the fault in a step of rdt_sequence; '' for the next record, also after a gap."""
     if step == 0:
         return "duplicate"
     if step < LONGEST_GAP:

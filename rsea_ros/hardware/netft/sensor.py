@@ -1,4 +1,4 @@
-"""An F/T sensor in SI units: records as wrenches, what is wrong with the stream, noise floor and tare."""
+"""An F/T sensor in SI units: records as wrenches, faults of the stream, noise floor and tare."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ class Sensor:
         self._restart_watch()
 
     def gather(self) -> None:
-        """Fetch what has come, so that the next `take` has little to do."""
+        """Fetch received records, so that the next `take` has little to do."""
         self._receiver.drain()
 
     def take(self) -> tuple[list[tuple[int, Wrench]], str]:
-        """Return the records since the last call as (monotonic ns, wrench), and what is wrong: '' nothing."""
+        """Return the records since the last call as (monotonic ns, wrench), and the fault: '' none."""
         arrivals = self._receiver.take()
         wrong = self._silence(arrivals) or self._jump() or _complaint(arrivals)
         return [(a.instant, self._calibration.wrench(a.record.counts)) for a in arrivals], wrong
@@ -80,7 +80,7 @@ class Sensor:
         self._restart_watch()
 
     def _expect_small(self, values: Values, times: float, verb: str, when: str) -> None:
-        """Raise DeviceError when an axis is beyond so many times the noise."""
+        """Raise DeviceError when an axis is beyond a multiple of the noise."""
         quantum = np.array([self._calibration.force] * 3 + [self._calibration.torque] * 3)
         limit = times * (TARED * np.array(self.noise) + quantum)
         axis = int(np.argmax(values / limit))
@@ -89,7 +89,7 @@ class Sensor:
             raise DeviceError(f"F/T sensor: {AXES[axis]} {verb} {values[axis]:.3g} {when}, {expected}")
 
     def recover(self) -> None:
-        """Return when the stream is sound, at once where it goes on. Raises DeviceError when it is not."""
+        """Return when the stream is sound, at once where it continues. Raises DeviceError otherwise."""
         if self._age() > self._settings.timeout * 1e9 or self._complains():
             self._collect()
         if complaint := self._complains():
@@ -97,12 +97,12 @@ class Sensor:
         self._restart_watch()
 
     def _complains(self) -> str:
-        """Return what the newest record complains of."""
+        """Return the error in the newest record."""
         self._receiver.drain()
         return _complaint([self._receiver.newest] if self._receiver.newest else [])
 
     def counts(self) -> dict[str, int]:
-        """Return what came and what is gone, by kind."""
+        """Return the counts of received and lost records, by kind."""
         return {**self._receiver.sequence.counts, **self._receiver.refused}
 
     def close(self) -> None:

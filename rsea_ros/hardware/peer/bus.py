@@ -27,15 +27,18 @@ BOOT_TIME = 300_000_000
 class Bus:
     """A line with motors on it, at `path` (a link to the terminal).
 
-    sent: data of every reply with measurements that went out whole, as (clock in ns, address, bytes).
+    sent: data of every reply with measurements that was sent whole, as (clock in ns, address, bytes), the
+    newest `kept`.
     """
 
-    def __init__(self, path: Path, motors: Sequence[Motor], misbehaviour: Misbehaviour) -> None:
+    def __init__(
+        self, path: Path, motors: Sequence[Motor], misbehaviour: Misbehaviour, kept: int = KEPT
+    ) -> None:
         self._path, self._motors, self._wrong = path, motors, misbehaviour
         self._listener = Listener()
         self._waiting: list[tuple[int, bytes]] = []
         self._busy_until = [0] * len(motors)
-        self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=KEPT)
+        self.sent: deque[tuple[int, int, bytes]] = deque(maxlen=kept)
         self.unknown = 0
         self.descriptor = -1
         self.appear()
@@ -61,7 +64,7 @@ class Bus:
             self._waiting.clear()
 
     def serve(self, now: int) -> None:
-        """Take what the host has sent and answer it."""
+        """Read the host's packets and answer them."""
         try:
             data = os.read(self.descriptor, 4096)
         except OSError:

@@ -1,4 +1,4 @@
-"""What the bench does wrong on request. Shares are probabilities of one packet."""
+"""Misbehaviour of the bench on request. Shares are probabilities for one packet."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Misbehaviour:
         self._random = random.Random(self.seed)
 
     def happens(self, kind: str) -> bool:
-        """Throw the dice for a share or look at a switch, and count what happens."""
+        """Draw for a share or read a switch, and count the event."""
         setting = getattr(self, kind)
         if setting is False or setting == 0.0:
             return False

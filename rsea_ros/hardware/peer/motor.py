@@ -32,14 +32,16 @@ class Plant(Protocol):
 class Motor:
     """One motor. torque_constant: N m at the output per A, 0: its model's. origin: counts at 0 rad.
 
-    history: every change of the torque that acts, as (clock in ns, goal in counts, whether torque is on).
+    history: every write to it, as (clock in ns, goal in counts, whether torque is on), the newest `kept`.
     """
 
-    def __init__(self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234) -> None:
+    def __init__(
+        self, number: int, plant: Plant, torque_constant: float = 0.0, origin: int = 1234, kept: int = KEPT
+    ) -> None:
         self.model, self._plant = MODELS[number], plant
         self._constant, self._origin = torque_constant or self.model.constant, origin
         self.memory = bytearray(TABLE_SIZE)
-        self.history: deque[tuple[int, int, bool]] = deque(maxlen=KEPT)
+        self.history: deque[tuple[int, int, bool]] = deque(maxlen=kept)
         self._touched = 0
         for name, register in self.model.registers.items():
             self.put(name, register.start)
@@ -53,7 +55,7 @@ class Motor:
         return int.from_bytes(raw, "little", signed=register.signed)
 
     def put(self, name: str, value: int) -> None:
-        """Set an item, whatever the rules for hosts say."""
+        """Set an item without the rules for hosts."""
         register = self.model.registers[name]
         modulus = 1 << 8 * register.size
         data = (int(value) % modulus).to_bytes(register.size, "little")
@@ -73,7 +75,7 @@ class Motor:
             self._act(now)
 
     def read(self, now: int, address: int, length: int) -> tuple[int, bytes]:
-        """Return error code and bytes, with what is measured brought up to date."""
+        """Return error code and bytes, with measurements updated."""
         self._touched = now
         if not 0 < length <= TABLE_SIZE - address:
             return LENGTH, b""
@@ -122,7 +124,7 @@ class Motor:
         self._act(now)
 
     def reboot(self, now: int) -> None:
-        """Begin anew: RAM as after power-on, EEPROM kept, torque off."""
+        """Restart: RAM as after power-on, EEPROM kept, torque off."""
         for name, register in self.model.registers.items():
             if register.access is not EEPROM:
                 self.put(name, register.start)

@@ -1,4 +1,4 @@
-"""The motors' control tables as the motor itself knows them: where an item lies, what may be written."""
+"""The control tables in the motors: addresses of items and permitted values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Register:
 
 @dataclass(frozen=True)
 class Model:
-    """A motor: its number, its items by name, and what a count is worth in A, rad/s and rad.
+    """A motor: its number, its items by name, and the value of a count in A, rad/s and rad.
 
     constant: N m at the output per A, as this motor has it.
     """

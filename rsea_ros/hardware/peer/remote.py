@@ -1,4 +1,4 @@
-"""A bench in a process of its own, as whoever started it sees it: where it is, and requests to it."""
+"""A bench in a child process: its addresses, and requests to it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RemoteBench:
         }  # fmt: skip
 
     def hurry(self, priority: int = 50) -> bool:
-        """Let it answer at SCHED_FIFO: it stands for hardware, which has processors of its own.
+        """Let it answer at SCHED_FIFO: it represents hardware, which has its own processors.
 
         Return whether that is permitted.
         """
@@ -58,7 +58,7 @@ class RemoteBench:
         return True
 
     def ask(self, do: str, **values: object) -> dict[str, Any]:
-        """Send a request and return its answer. Raises DeviceError for one that it cannot do."""
+        """Send a request and return its answer. Raises DeviceError for an impossible request."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps({"do": do, **values}).encode() + b"\n")
         self._process.stdin.flush()
@@ -68,7 +68,7 @@ class RemoteBench:
         return answer
 
     def log(self, since: int = 0) -> dict[str, Any]:
-        """Return what the bench has seen and sent since an instant of the monotonic clock, ns."""
+        """Return the bench's log since an instant of the monotonic clock, ns."""
         result: dict[str, Any] = self.ask("log", since=since)["result"]
         return result
 

@@ -54,7 +54,7 @@ class LineRequests:
         }  # fmt: skip
 
     def serve(self, now: int) -> bool:
-        """Do what has arrived; return False at the end of input or on `quit`."""
+        """Execute the requests that have arrived; return False at the end of input or on `quit`."""
         data = os.read(self.descriptor, 65536)
         self._text += data
         *lines, self._text = self._text.split(b"\n")

@@ -1,4 +1,4 @@
-"""The bench as one loop: serial line, F/T stream and requests of whoever runs it, at their instants."""
+"""The bench as one loop: serial line, F/T stream and requests, at their instants."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Requests(Protocol):
     pauses: deque[tuple[int, int]]
 
     def serve(self, now: int) -> bool:
-        """Do what is asked; return False when the bench shall end."""
+        """Execute requests; return False when the bench shall end."""
 
 
 class Station:
     """Runs until its requests say so. Clocks are monotonic, ns.
 
     Where the machine holds it up, it notes in the requests' `pauses` when that ended and how long it was: a
-    motor does not stand still, and what came late then is not the driver's.
+    real motor would not stop, and replies late for that reason are not the driver's fault.
     """
 
     def __init__(

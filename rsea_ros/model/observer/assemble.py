@@ -24,7 +24,7 @@ _GEAR = int(st.Port.GEAR)
 def without_delay(rig: Rig) -> tuple[Rig, float]:
     """Return the rig without a delay of its command, and that delay, s.
 
-    The observer's steps are as long as the stamps ask for; a ring of steps, as the effect keeps one, is not.
+    The observer's steps follow the stamps, so the effect's ring of steps cannot serve.
     The delay moves the commands' stamps instead, which is exact.
     """
     delays = [e for e in rig.effects if "delay" in effect_named(e.name).tags]

@@ -60,9 +60,9 @@ def _run(model, state, t, kind, values, out):  # type: ignore[no-untyped-def]
 
 
 class BatchObserver:
-    """An observer that is given blocks, each for itself. hold: how long a command stays in force, s.
+    """An observer of separate blocks. hold: how long a command stays in force, s.
 
-    duration: over which drifts of the rig come to their full size, s. Not to be confused with `Observer`,
+    duration: over which drifts of the rig reach their full size, s. Not to be confused with `Observer`,
     which takes single samples in any order and gives torques.
     """
 
@@ -75,7 +75,7 @@ class BatchObserver:
         """Return the innovations over their standard deviations, shape (n, 2); nan at a command.
 
         t: s, rising, shape (n,). kind: of log.py. values: as there, shape (n, 2). The filter begins with
-        nothing known, so the innovations of the first tenths of a second are those of its settling.
+        no knowledge, so the innovations of the first tenths of a second come from its settling.
         """
         t = t + np.where(kind == COMMAND, self._delay, 0.0)
         order = np.lexsort((kind, t))

@@ -1,4 +1,4 @@
-"""The innovation test: is what the sensors say of each other what their noise allows?
+"""The innovation test: do the sensors agree within their noise?
 
 Where the model is right nu^2 / S, the squared innovation over its variance, is chi-square distributed with
 one degree of freedom and white: the sum over a window of n samples has n degrees of freedom.
@@ -21,7 +21,10 @@ FALSE_ALARM = 1e-6
 
 
 class Consistency(NamedTuple):
-    """ratio: RMS of the innovations over what it should be. limit: largest. mean: in the channel's unit."""
+    """ratio: RMS of the innovations over its expected value.
+
+    limit: the largest allowed. mean: in the channel's unit.
+    """
 
     ratio: float
     limit: float
@@ -36,7 +39,7 @@ class Consistency(NamedTuple):
 def consistency(score: FloatArray) -> dict[str, Consistency]:
     """Return the test of each channel that had samples. score: sums of nu^2 / S, 1, nu, shape (3, 3).
 
-    A sample that comes late changes innovations that were counted before, so a sum may go back: then to zero.
+    A late sample changes innovations that were already counted, so a sum may decrease: to zero at least.
     """
     return {
         name: Consistency(math.sqrt(max(total, 0.0) / count), _limit(round(count)), sum_ / count)

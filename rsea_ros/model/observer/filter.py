@@ -3,8 +3,8 @@
     predict   z = step(z, u), with the effects of the model as known torques;   P = F P F' + Q + g s_u^2 g'
     update    S = h P h' + r,  K = P h' / S,  z += K nu,  P = (I - K h) P (I - K h)' + K r K'   (Joseph)
 
-F and Q are exact for any time between stamps (transition.py). g is what a motor torque held over that time
-does, s_u the doubt in it. Source: Anderson, Moore, Optimal Filtering, 1979, sections 3.1 and 6.7.
+F and Q are exact for any time between stamps (transition.py). g is the response to a motor torque held for
+that time, s_u its doubt. Source: Anderson, Moore, Optimal Filtering, 1979, sections 3.1 and 6.7.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.effect import compiled
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.observer.transition import exponential, transition
-from rsea_ros.model.step import Calls, Linear, advance
+from rsea_ros.model.step import OUTPUTS, Calls, Linear, advance
 from rsea_ros.signals import FloatArray
 
 POSITION, WRENCH, TORQUE = range(3)
@@ -43,7 +43,7 @@ once: Any = partial(njit, cache=True, nogil=True, error_model="numpy", inline="a
 
 
 class Model(NamedTuple):
-    """What does not change, but for `held`: steps for which linear.phi, f and q hold, s.
+    """The constants of the filter; only `held` changes: step for which linear.phi, f and q hold, s.
 
     measured: rows of position and ft on z, shape (2, n). noise: variances of position, ft, motor torque.
     hold: how long a command stays in force, s.
@@ -88,7 +88,7 @@ class State(NamedTuple):
 
 @compiled
 def disturbance(s, p, x):  # type: ignore[no-untyped-def]
-    """Add the disturbance and what the drive makes beside its command, p[0], to the torque on the gear."""
+    """Add the disturbance and the drive's torque beside its command, p[0], to the torque on the gear."""
     s[st.GEAR_TORQUE] += p[0]
 
 
@@ -114,7 +114,7 @@ def _propagate(model, state, t):  # type: ignore[no-untyped-def]
         transition(model.a, model.walk, model.scale, dt, model.f, model.q)
         model.held[1] = dt
     model.calls.p[0] = state.extra[0] + state.clock[ERROR]
-    command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, 4)), np.empty(0)
+    command, out, none = np.full(count, state.clock[FORCED]), np.empty((count, len(OUTPUTS))), np.empty(0)
     advance(model.linear, model.calls, command, none, none, state.clock[NOW],
             state.x, state.table, state.own, out)  # fmt: skip
     n = len(state.x)
@@ -249,7 +249,7 @@ def _shift(model, state, change):  # type: ignore[no-untyped-def]
 
 @inner
 def weigh_torque(model, state, value):  # type: ignore[no-untyped-def]
-    """Hold the measured motor torque (N m) against the command: what it denies is put right at once."""
+    """Compare the measured motor torque (N m) with the command, and correct a contradiction at once."""
     if not np.isfinite(value) or model.noise[TORQUE] == 0.0:
         return
     error = value - state.predicted[TORQUE]

@@ -1,7 +1,7 @@
 """Many arrays as one argument of a compiled function.
 
 Numba unpacks every array of its arguments at every call from Python, 0.2 us each: for all of the filter's
-it takes longer than the filter. So their addresses and shapes go into one; compiled code makes them again.
+it takes longer than the filter. So one array has their addresses and shapes, and compiled code rebuilds them.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ def _numbers(h, i):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _model(h, reads_load, hold):  # type: ignore[no-untyped-def]
+def _model(h, rest, reads_load, hold):  # type: ignore[no-untyped-def]
     m, v, n = _matrix, _vector, _numbers
-    linear = Linear(m(h, 0), m(h, 1), n(h, 2), m(h, 3), m(h, 4), m(h, 5), v(h, 6), reads_load)
+    linear = Linear(m(h, 0), m(h, 1), n(h, 2), m(h, 3), m(h, 4), m(h, 5), v(h, 6), reads_load, rest)
     calls = Calls(n(h, 7), n(h, 8), n(h, 9), n(h, 10), v(h, 11), True)
     return Model(linear, calls, m(h, 12), v(h, 13), m(h, 14), m(h, 15), v(h, 16), m(h, 17), m(h, 18),
                  m(h, 19), v(h, 20), m(h, 21), m(h, 22), v(h, 23), hold)  # fmt: skip
@@ -96,9 +96,9 @@ def _log(h):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def receive(handle, reads_load, hold, t, kind, a, b, estimate):  # type: ignore[no-untyped-def]
-    """Take in an event; put the estimate behind a measurement, shape (6,), and tell whether there is one."""
-    model, state, log = _model(handle, reads_load, hold), _state(handle), _log(handle)
+def receive(handle, rest, reads_load, hold, t, kind, a, b, estimate):  # type: ignore[no-untyped-def]
+    """Process an event; write the estimate of a measurement, shape (6,); return whether there is one."""
+    model, state, log = _model(handle, rest, reads_load, hold), _state(handle), _log(handle)
     row = take_in(model, state, log, t, kind, a, b)
     if row == NONE:
         return False

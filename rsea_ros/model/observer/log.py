@@ -1,6 +1,6 @@
-"""What has arrived, by stamp, with a checkpoint behind each: what comes late is put in its place.
+"""The events that have arrived, by stamp, with a checkpoint after each; a late event is put in its place.
 
-A late sample goes back to the checkpoint before its stamp, and what came since is worked off again. At one
+After a late sample the filter returns to the checkpoint before its stamp and repeats the later events. At one
 instant measurements come before commands: a command with the stamp of a measurement acts after it.
 """
 
@@ -113,7 +113,7 @@ def _apply(model, state, kind, t, values):  # type: ignore[no-untyped-def]
 
 @once
 def take_in(model, state, log, t, kind, a, b):  # type: ignore[no-untyped-def]
-    """Take in an event, work off all up to the newest measurement, and return its row, or NONE."""
+    """Add an event, process all up to the newest measurement, and return its row, or NONE."""
     at = _insert(log, t, kind, a, b)
     if at == NONE:
         log.place[REFUSED] += 1

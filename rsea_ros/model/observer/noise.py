@@ -1,13 +1,13 @@
-"""What the observer may believe of each signal: all from sensors and what an identification left unexplained.
+"""The noise of each signal for the observer, from the sensors and from the residual of an identification.
 
 The disturbance is a random walk. Its intensity comes from a torque of RMS sigma that keeps for a time tau:
 over times short against tau such an Ornstein-Uhlenbeck process is a random walk of intensity
 
     2 sigma^2 / tau    (N m)^2/s
 
-tau = 1 / |slowest pole| of the actuator between clamped ends: what lasts longer, the filter follows anyhow.
-sigma is what the model left of the F/T signal beyond its noise, and never less than the doubt in the measured
-motor torque: a torque too small for that sensor to tell cannot be denied.
+tau = 1 / |slowest pole| of the actuator between clamped ends: the filter follows anything slower.
+sigma is the residual of the F/T signal beyond its noise, and never less than the doubt in the measured
+motor torque: a torque too small for that sensor cannot be excluded.
 Source: Gardiner, Handbook of Stochastic Methods, 2004, section 3.8.4.
 """
 
@@ -32,7 +32,8 @@ NOTHING: Mapping[str, float] = MappingProxyType({})
 @dataclass(frozen=True)
 class Noise:
     """One sigma of position (rad), ft (N m) and motor torque (N m; 0: not measured); of the disturbance
-    (N m), and how long that keeps, s. A channel that the rig's sensors lack is infinite: it tells nothing.
+    (N m), and its correlation time, s. A channel that the rig's sensors lack is infinite: it adds no
+    information.
     """
 
     position: float
@@ -49,9 +50,9 @@ class Noise:
 
 def noise_of(rig: Rig, noise_rms: Mapping[str, float] = NOTHING,
              residual_rms: Mapping[str, float] = NOTHING) -> Noise:  # fmt: skip
-    """Return the noise of a rig's sensors, or what an identification measured of it, by channel.
+    """Return the noise of a rig's sensors, or that measured by an identification, by channel.
 
-    Raises RigError where neither says anything of a sensor that the rig has.
+    Raises RigError where neither has a sensor of the rig.
     """
     position, ft, torque = (_sigma(rig, n, noise_rms) for n in ("position", "ft", "motor_torque"))
     if math.isinf(position) and math.isinf(ft):

@@ -110,7 +110,7 @@ class Observer:
         self._model, self._state = assemble(self._rig, self._noise, hold=self._hold, duration=self._duration)
         self._log = empty_log(len(self._state.whole))
         self._handle = handle_of(self._model, self._state, self._log)
-        self._reads_load = self._model.linear.reads_load
+        self._rest, self._reads_load = self._model.linear.rest, self._model.linear.reads_load
         self._score, self._newest = np.zeros((3, 3)), math.nan
         self.restarts += 1
 
@@ -121,7 +121,9 @@ class Observer:
             t += self._delay
         elif not t < self._newest:
             self._newest = t
-        there = receive(self._handle, self._reads_load, self._hold, t, kind, a, b, self._estimate)
+        there = receive(
+            self._handle, self._rest, self._reads_load, self._hold, t, kind, a, b, self._estimate
+        )
         return Estimate._make(self._estimate.tolist()) if there else None
 
 

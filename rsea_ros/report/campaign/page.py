@@ -28,7 +28,7 @@ def campaign_page(
     notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
 ) -> str:
-    """Return the page. notes: what a reader has to know of how it was made."""
+    """Return the page. notes: remarks on its making for the reader."""
     played = [(k, r.proposal) for k, r in enumerate(outcome.rounds, 1) if r.proposal is not None]
     blocks: list[Block] = [key_numbers(_keys(outcome)), probability_figure(outcome), _table(outcome)]
     if played:

@@ -1,1 +1,1 @@
-"""What a check says of a record: on a terminal and for programs."""
+"""The findings of a check: on a terminal and for programs."""

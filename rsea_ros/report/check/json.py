@@ -1,4 +1,4 @@
-"""What a check says, for programs (docs/check.md)."""
+"""The findings of a check for programs (docs/check.md)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ SCHEMA = 1
 
 
 def check_json(checks: Sequence[Findings]) -> dict[str, Any]:
-    """Return the contents of the JSON of `rsea check`. No number in it is infinite or NaN: such are null."""
+    """Return the contents of the JSON of `rsea check`; infinite numbers and NaN are null."""
     return {
         "schema": SCHEMA,
         "rig": checks[0].rig_name,
+        "rig_option": checks[0].rig_choice.option or None,
+        "rig_is_default": checks[0].rig_choice.is_default,
         "light": worst([c.light for c in checks]),
         "records": [_record(c) for c in checks],
     }

@@ -1,16 +1,19 @@
-"""What a check says on a terminal: a line for each finding."""
+"""The findings of a check on a terminal, one line each."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from rich.table import Table
 from rich.text import Text
 
 from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.report import words
+from rsea_ros.report.lines import WIDTH, wrapped
+from rsea_ros.report.rig.words import rig_in_brackets
 
+_LIGHT, _KIND, _CHANNEL = 7, 14, 25
+"""Columns."""
 _STYLES = {"green": "green", "amber": "yellow", "red": "bold red"}
 _KINDS = {
     "wrong_rig": "rig fits",
@@ -18,24 +21,34 @@ _KINDS = {
     "clock_offset": "clock offset",
     "clock_drift": "clock drift",
     "identifiability": "determined",
+    "rig_value": "rig's value?",
     "missing_topic": "missing",
 }
 _DOUBTED = {"wrong_rig": "wrong rig?", "identifiability": "undetermined"}
 """Names of kinds whose plain name would say the opposite of an amber or red light."""
-SAID_ELSEWHERE = ("identifiability", "noise", "excitation", "rest")
+SAID_ELSEWHERE = ("identifiability", "rig_value", "noise", "excitation", "rest")
 """Kinds that identify and diagnose speak of in their results anyway."""
 
 
-def check_table(findings: Findings) -> Table:
-    """Return all findings of a record: light, what, value, expected, what would help."""
-    table = Table(box=None, pad_edge=False, header_style="dim", title_justify="left")
-    for name in ("", "what", "channel", "value", "expected", "where, and what would help"):
-        table.add_column(name, no_wrap=name in ("", "what", "channel", "value"))
+def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
+    """Return the findings of a record, each in lines of at most `width` columns: light, kind, channel, value.
+
+    The expected value and the remedy follow where a light is not green.
+    """
+    lines = []
     for f in _each_remedy_once(findings.findings):
-        note = "; ".join(filter(None, (f.detail, f.remedy)))
-        row = (Text(f.light, style=_STYLES[f.light]), kind(f), _channel(f), number(f), f.expected, note)
-        table.add_row(*(cell if isinstance(cell, Text) else Text(cell) for cell in row))
-    return table
+        head = f"{f.light:<{_LIGHT}}{kind(f):<{_KIND}}{_channel(f):<{_CHANNEL}}"
+        text = wrapped(f"{head}{_said(f)}", width, len(head))
+        lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
+    return lines
+
+
+def _said(f: Finding) -> str:
+    value = number(f)
+    said = f"{value} {f.detail}" if f.unit == "1" else ", ".join(filter(None, (value, f.detail)))
+    if f.light == "green":
+        return said
+    return "; ".join(filter(None, (said, f.expected and f"expected {f.expected}", f.remedy)))
 
 
 def warnings(findings: Findings) -> list[str]:
@@ -63,7 +76,7 @@ def sentence(f: Finding) -> str:
 
 
 def kind(f: Finding) -> str:
-    """Return the plain name of what was looked at."""
+    """Return the plain name of a kind of finding."""
     if f.light != "green" and f.kind in _DOUBTED:
         return _DOUBTED[f.kind]
     return _KINDS.get(f.kind, f.kind.replace("_", " "))
@@ -87,4 +100,5 @@ def summary(checks: Sequence[Findings]) -> str:
     """Return one line that counts the lights."""
     lights = [f.light for c in checks for f in c.findings]
     counts = ", ".join(f"{lights.count(light)} {light}" for light in ("red", "amber", "green"))
-    return f"checked against rig {checks[0].rig_name}: {counts}"
+    first = checks[0]
+    return f"checked against {rig_in_brackets(first.rig_name, first.rig_choice)}: {counts}"

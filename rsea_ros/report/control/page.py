@@ -46,7 +46,7 @@ def control_report(study: Study) -> str:
 
 
 def verdict(study: Study) -> str:
-    """Return in a sentence what is reached."""
+    """Return the verdict in a sentence."""
     missed = [f"{t.what} at {at.design.rate:g} Hz" for at in study.rates for t in at.trials if t.met is False]
     slowest = study.rates[0]
     reached = f"Stable on all {slowest.swept.cases} benches of the set, from locked to free"

@@ -18,7 +18,7 @@ _SIGNS = {True: "≥", False: "≤"}
 
 
 def trial_rows(study: Study) -> Rows:
-    """Return each trial with what is asked and its value at every rate; a value that misses it is marked."""
+    """Return each trial with its demand and its value at every rate; a value that misses it is marked."""
     return [
         [trials[0].what, asked(trials[0]), *(value(trial) for trial in trials)]
         for trials in zip(*(at.trials for at in study.rates), strict=True)
@@ -31,7 +31,7 @@ def trial_head(study: Study) -> list[str]:
 
 
 def asked(trial: Trial) -> str:
-    """Return what is asked, in words."""
+    """Return the demand in words."""
     limits = [words.number(limit, 3) for limit in (trial.asked, trial.allowed) if limit is not None]
     if not limits:
         return ""
@@ -40,8 +40,8 @@ def asked(trial: Trial) -> str:
 
 
 def value(trial: Trial) -> str:
-    """Return the value with its unit, that of the worst case behind it, and `missed` in front of one that is
-    not as asked."""
+    """Return the value with its unit and that of the worst case, and `missed` in front of one that
+    misses its demand."""
     missed = "missed: " if trial.met is False else ""
     worst = "" if math.isnan(trial.worst) else f" ({_number(trial.worst)})"
     return f"{missed}{_number(trial.value)}{worst} {_unit(trial.unit)}".strip()

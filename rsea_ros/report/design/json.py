@@ -1,4 +1,4 @@
-"""design.json: what a design says, for programs."""
+"""design.json: a design for programs."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _TOP = 2e4
 
 @dataclass(frozen=True)
 class Demand:
-    """The least K_s (N m/rad) that a demand asks for, at each inertia of the chassis (kg m^2)."""
+    """The least K_s (N m/rad) for a demand, at each inertia of the chassis (kg m^2)."""
 
     name: str
     colour: str

@@ -37,7 +37,7 @@ def _cell(check: Check) -> str:
 
 
 def trains_table(rows: Sequence[WithTrain], d: Design) -> str:
-    """Return the design with every train that the unit may have, and what J_m leaves open."""
+    """Return the design with every possible train of the unit, and the range left by J_m."""
     hz = d.requirement.bandwidth
     head = [
         "Train",

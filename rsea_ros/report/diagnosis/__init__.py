@@ -1,1 +1,1 @@
-"""What a diagnosis says: page, figures, sentences, terminal, diagnosis.json."""
+"""A diagnosis as page, figures, sentences, terminal output and diagnosis.json."""

@@ -1,4 +1,4 @@
-"""The causes of a diagnosis as HTML: what was found with its evidence, and what was tried and rejected."""
+"""The causes of a diagnosis as HTML: named causes with their evidence, and rejected effects."""
 
 from __future__ import annotations
 

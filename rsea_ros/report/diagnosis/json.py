@@ -1,4 +1,4 @@
-"""diagnosis.json: what a diagnosis says, for programs."""
+"""diagnosis.json: a diagnosis for programs."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from rsea_ros.report.diagnosis.sentences import diagnosis_sentence, evidence, ne
 from rsea_ros.report.identification.json import parameter
 from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.json import rig_json
 
 SCHEMA = 1
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return the contents of diagnosis.json. No number in it is infinite or NaN: such are null."""
+    """Return the contents of diagnosis.json; infinite numbers and NaN are null."""
     d = diagnosis
     return {
         "schema": SCHEMA,
         "rig": d.rig_name,
+        **rig_json(d.rig_choice, d.remarks),
         "verdict": d.verdict,
         "channel": d.channel,
         "sentence": diagnosis_sentence(d),

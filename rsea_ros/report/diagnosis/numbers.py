@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.diagnosis.result import Diagnosis, Estimate
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.signals import UNITS
 from rsea_ros.units import in_motion
@@ -59,7 +60,7 @@ def estimate(estimate: Estimate) -> tuple[str, str, str]:
 def model_half_width(estimate: Estimate) -> tuple[str, str]:
     """Return the half-width of the simulation's own error at 95 % and its unit: ("0.0147", "N·m")."""
     factor, prefix = _prefix(estimate)
-    return words.number(1.96 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
+    return words.number(Z95 * estimate.model_sd * factor, 2), prefix + words.unit(estimate.unit)
 
 
 def _prefix(estimate: Estimate) -> tuple[float, str]:

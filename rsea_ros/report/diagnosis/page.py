@@ -25,6 +25,8 @@ from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.page import right_rig_block
+from rsea_ros.report.rig.words import refit_command, rig_named, split_off_rig
 
 
 def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
@@ -39,6 +41,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     """Yield the page from top to bottom: the verdict first, then the evidence."""
     main = d.channel
     yield key_numbers(_keys(d, main))
+    yield right_rig_block(d.remarks, refit_command(d.sources, d.rig_name, d.rig_choice))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'
     yield sketch([c.name for c in d.causes])
@@ -73,11 +76,12 @@ def _keys(d: Diagnosis, main: str) -> list[tuple[str, str]]:
 
 
 def _kicker(d: Diagnosis) -> str:
-    return f"Diagnosis of {d.rig_name} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
+    rig = rig_named(d.rig_name, d.rig_choice)
+    return f"Diagnosis of {rig} · {d.duration:.0f} s of data at {d.rate:.0f} Hz"
 
 
 def _undetermined(d: Diagnosis) -> str:
-    told = [*say.confusions(d), *remark_sentences(d.remarks)]
+    told = [*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])]
     body = bullets(told) if told else paragraph("The data determine every free value.")
     return section("What these data cannot determine", body)
 

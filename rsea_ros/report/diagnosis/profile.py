@@ -37,7 +37,7 @@ class Profile:
 
 
 def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
-    """Return a profile for every respect that the record has the signals for."""
+    """Return a profile over every signal that the record has."""
     before, after = ({o.channel: o for o in overlays} for overlays in (diagnosis.before, diagnosis.after))
     if channel not in before:
         return ()
@@ -55,8 +55,8 @@ def profiles(diagnosis: Diagnosis, channel: str) -> tuple[Profile, ...]:
 
 def _counted(diagnosis: Diagnosis, overlay: Overlay) -> FloatArray:
     """Return which samples count: neither those before the bench has settled nor faulty ones."""
-    faulty = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
-    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~faulty
+    out = np.asarray(diagnosis.masked.get(overlay.channel, np.zeros(len(overlay.t), bool)))
+    good: FloatArray = (overlay.t >= overlay.t[0] + SETTLE) & ~out
     return good
 
 

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Experiment, Verdict
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.fault_kinds import MASKED
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.rig.words import values_off
 from rsea_ros.signals import Fault
 from rsea_ros.wording import listed
 
@@ -26,24 +26,27 @@ def verdict_sentence(
     after: float,
     faults: Sequence[Fault],
     at_floor: bool = False,
+    off: str = "",
 ) -> str:
     """Return the verdict as one sentence.
 
     before, after: held-out residual of the channel over its noise. at_floor: of all channels with all causes.
+    off: how many values are not the rig's, empty for none.
     """
-    name, data = words.channel(channel), _data(faults)
+    name, data = words.channel(channel), (f" {off}." if off else "") + _data(faults)
     named = listed([c.name.replace("_", " ") for c in causes])
     them = "them" if len(causes) > 1 else "it"
     fall = f"with {them} the {name} residual falls from {before:.1f} to"
     silent = [words.channel(n) for n in silent_channels(faults)]
-    if verdict == "unexplained" and silent and before <= AT_NOISE:
+    if verdict == "unexplained" and silent and at_floor:
         return (
             f"The {listed(silent)} measures nothing and is left out; with the model's values re-fitted "
             f"the {name} residual is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "nothing_wrong":
+        fine = "The structure of the model fits" if off else "Nothing is wrong with the model"
         return (
-            f"Nothing is wrong with the model: with its values re-fitted the {name} residual "
+            f"{fine}: with its values re-fitted the {name} residual "
             f"is at the noise floor ({after:.2f} times the noise).{data}"
         )
     if verdict == "unexplained":
@@ -60,9 +63,8 @@ def verdict_sentence(
 def diagnosis_sentence(diagnosis: Diagnosis) -> str:
     """Return the verdict of a diagnosis as one sentence."""
     d, (before, after) = diagnosis, num.times_noise(diagnosis, diagnosis.channel)
-    return verdict_sentence(
-        d.verdict, d.causes, d.channel, before, after, d.faults, at_floor=d.at_noise_floor
-    )
+    off = words.sentence(values_off(d.remarks))
+    return verdict_sentence(d.verdict, d.causes, d.channel, before, after, d.faults, d.at_noise_floor, off)
 
 
 def evidence(cause: Cause) -> str:
@@ -76,7 +78,7 @@ def evidence(cause: Cause) -> str:
 
 
 def next_run(experiment: Experiment) -> str:
-    """Return what a run would decide, or why none is recommended, as one sentence without its stop."""
+    """Return what a run would decide, or why none is recommended, as one sentence without its full stop."""
     rivals = f"{experiment.cause} and {listed(experiment.rivals)}"
     alike = f"{rivals} do as well on these data"
     if experiment.reason == "other_amplitude":

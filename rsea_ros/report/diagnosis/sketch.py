@@ -19,6 +19,8 @@ _OF_PORT = {
     Port.STRUCTURE: "gear",
 }
 _WIDTH, _STEP, _BOX, _HEIGHT = 900, 128, 104, 40
+_ANCHORS = {_PARTS[0]: ("start", 0), _PARTS[-1]: ("end", _BOX)}
+"""Of the names below the outer parts, which the edge would otherwise cut off: anchor, and x in the part."""
 
 
 def sketch(causes: Sequence[str]) -> str:
@@ -47,7 +49,9 @@ def _box(index: int, part: str, culprit: str) -> str:
     centre, name = f"{x + _BOX / 2:g}", escape(culprit.replace("_", " "))
     is_last = part == _PARTS[-1]
     link = "" if is_last else f'<line x1="{x + _BOX}" x2="{x + _STEP}" y1="{middle}" y2="{middle}"/>'
-    under = f'<text class="cause" x="{centre}" y="{_HEIGHT + 28}">{name}</text>' if culprit else ""
+    anchor, at = _ANCHORS.get(part, ("middle", _BOX / 2))
+    place = f'x="{x + at:g}" y="{_HEIGHT + 28}" style="text-anchor:{anchor}"'
+    under = f'<text class="cause" {place}>{name}</text>' if culprit else ""
     return (
         f'<g class="{"culprit" if culprit else "part"}">{link}'
         f'<rect x="{x}" y="4" width="{_BOX}" height="{_HEIGHT}" rx="6"/>'

@@ -14,17 +14,31 @@ from rsea_ros.report.diagnosis.causes import fitted_rivals
 from rsea_ros.report.diagnosis.sentences import next_run
 from rsea_ros.report.diagnosis.standing import standing
 from rsea_ros.report.fault_words import fault_lines
+from rsea_ros.report.lines import LABEL, WIDTH, command_row, row, wrapped
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.words import refit_command, rig_named, right_rig, split_off_rig
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
-_WIDTH = 12
 _MOST = 3
 
 
-def terminal_lines(diagnosis: Diagnosis) -> list[Text]:
-    """Return the verdict and the evidence, one line each."""
-    lines = [Text(say.headline(diagnosis), style=_STYLES.get(diagnosis.verdict, "bold green"))]
-    return [*lines, *(Text.assemble((name.ljust(_WIDTH), "dim"), text) for name, text in _rows(diagnosis))]
+def terminal_lines(diagnosis: Diagnosis, width: int = WIDTH) -> list[Text]:
+    """Return the verdict and the evidence, each in lines of at most `width` columns."""
+    off, _ = split_off_rig(diagnosis.remarks)
+    style = _STYLES.get(diagnosis.verdict, "bold yellow" if off else "bold green")
+    rows = [*_rig(diagnosis, width), *(row(name, text, width) for name, text in _rows(diagnosis))]
+    shown = (Text.assemble((text[:LABEL], "dim"), text[LABEL:]) for text in rows)
+    return [Text(wrapped(say.headline(diagnosis), width), style=style), *shown]
+
+
+def _rig(d: Diagnosis, width: int) -> Iterator[str]:
+    """Yield the rig, and what speaks against it."""
+    yield row("rig", rig_named(d.rig_name, d.rig_choice), width)
+    off, _ = split_off_rig(d.remarks)
+    for sentence in remark_sentences(off):
+        yield row("", sentence, width)
+    if off:
+        yield command_row("", right_rig(), refit_command(d.sources, d.rig_name, d.rig_choice), width)
 
 
 def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
@@ -36,13 +50,13 @@ def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:
         gain, interval = num.percent(cause.gain_holdout), num.percent_range(cause.gain_holdout_ci95)
         yield "gain", f"{gain} of the {words.channel(cause.channel)} residual, held out (95 %: {interval})"
         yield "status", standing(cause, d.alternatives, d.at_noise_floor)
-    if d.misfit:
+    if d.misfit and d.verdict != "nothing_wrong":
         yield "wrong at", "; ".join(say.misfit(m) for m in _worst(d))
     for rival in fitted_rivals(d)[:_MOST]:
         yield "rejected", f"{rival.name}: {say.prose(say.rejection(rival))}"
     if d.rejected:
         yield "tried", f"{len(d.causes) + len(d.rejected)} causes of the catalogue"
-    for sentence in (*say.confusions(d), *remark_sentences(d.remarks)):
+    for sentence in (*say.confusions(d), *remark_sentences(split_off_rig(d.remarks)[1])):
         yield "unclear", sentence
     if d.next_experiment is not None:
         yield "next run" if d.next_experiment.excitation else "decides", _next(d.next_experiment)

@@ -41,7 +41,7 @@ def where_figure(profiles: Sequence[Profile], changed: bool, colour: str = BEFOR
 
 
 def finding(profiles: Sequence[Profile]) -> str:
-    """Return the sentence: on what the residual depends most, and where it is largest.
+    """Return a sentence on the signal that the residual depends on most, and where it is largest.
 
     Time comes last: in a sweep it stands for the frequency.
     """
@@ -57,11 +57,9 @@ def finding(profiles: Sequence[Profile]) -> str:
 
 def _extremes(profile: Profile) -> str:
     k = int(np.nanargmax(profile.before))
-    low, high = (words.number(side, 2) for side in profile.edges[k : k + 2])
+    low, high = profile.edges[k : k + 2]
     most, least = (words.number(v(profile.before), 2) for v in (np.nanmax, np.nanmin))
-    return (
-        f"{most} times the noise from {low} to {high} {words.unit(profile.unit)}, {least} where it is least"
-    )
+    return f"{most} times the noise from {words.span(low, high, profile.unit)}, {least} where it is least"
 
 
 def _traces(profile: Profile, x: str, changed: bool, colour: str) -> list[Json]:

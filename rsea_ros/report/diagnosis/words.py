@@ -1,4 +1,4 @@
-"""What a diagnosis says, in words and numbers for people; page and terminal say the same."""
+"""Words and numbers of a diagnosis, the same for page and terminal."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from rsea_ros.diagnosis.result import Cause, Diagnosis, Misfit, Reason, Rejected
-from rsea_ros.identification.result import AT_NOISE
 from rsea_ros.identification.silent import silent_channels
 from rsea_ros.report import words
 from rsea_ros.report.diagnosis import numbers as num
+from rsea_ros.report.rig.words import values_off
 from rsea_ros.wording import listed
 
 _PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck", "ft": "F/T"}
@@ -71,12 +71,18 @@ def named(causes: Sequence[Cause]) -> str:
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict as one short sentence."""
+    """Return the verdict as one short sentence, and how many values are not the rig's."""
+    return "; ".join(filter(None, (_verdict(diagnosis), values_off(diagnosis.remarks))))
+
+
+def _verdict(diagnosis: Diagnosis) -> str:
     d, n = diagnosis, diagnosis.channel
     channel, (before, _) = words.channel(n), num.times_noise(d, n)
     silent = [words.channel(name) for name in silent_channels(d.faults)]
-    if d.verdict == "unexplained" and silent and before <= AT_NOISE:
+    if d.verdict == "unexplained" and silent and d.at_noise_floor:
         return f"{words.sentence(listed(silent))} measures nothing; in the other channels only noise is left"
+    if d.verdict == "nothing_wrong" and values_off(d.remarks):
+        return "The structure of the simulation fits: with fitted values, only sensor noise is left"
     if d.verdict == "nothing_wrong":
         return "Nothing is wrong with the simulation: with fitted values, only sensor noise is left"
     if d.verdict == "unexplained":
@@ -94,9 +100,8 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def misfit(m: Misfit) -> str:
-    """Return `speed −0.02 to 0 rad/s (48 times)`."""
-    low, high = (words.number(side, 2) for side in (m.low, m.high))
-    return f"{respect(m.what)} {low} to {high} {words.unit(m.unit)} ({_times(m.times_noise)})"
+    """Return `speed −20 to 0 mrad/s (48 times)`."""
+    return f"{respect(m.what)} {words.span(m.low, m.high, m.unit)} ({_times(m.times_noise)})"
 
 
 def confusions(diagnosis: Diagnosis) -> list[str]:

@@ -33,7 +33,7 @@ def advice_json(advice: Advice) -> dict[str, Any]:
 
 
 def proposal_json(p: Proposal) -> Mapping[str, Any]:
-    """Return a run: its shape, what it is expected to separate, its peaks."""
+    """Return a run: its shape, its expected separation, its peaks."""
     pairs = [
         {"true": a, "rival": b, "separation": float(p.table[i, j])}
         for i, a in enumerate(p.names)

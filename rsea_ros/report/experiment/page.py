@@ -83,7 +83,7 @@ def _number(value: float) -> str:
 
 
 def limits_section(p: Proposal, stated: dict[str, float]) -> str:
-    """Return what a run asks of the bench beside what it may."""
+    """Return the peaks of a run beside the limits of the bench."""
     head = ("quantity", "expected", "at level", "limit", "unit")
     return section(
         "Demands on the bench",

@@ -13,12 +13,12 @@ from rsea_ros.wording import listed
 
 
 def plain_name(name: str) -> str:
-    """Return a cause as it stands in a sentence."""
+    """Return the name of a cause for a sentence."""
     return "no cause at all" if name == NOTHING else name.replace("_", " ")
 
 
 def shape_words(p: Proposal) -> str:
-    """Return what a run looks like: `multisine 0.5 to 42 Hz, 0.5 s, up to 18 N·m`."""
+    """Return the shape of a run in words: `multisine 0.5 to 42 Hz, 0.5 s, up to 18 N·m`."""
     s = p.shape
     band = f" {s.low:.2g} to {s.high:.3g} Hz" if s.kind in ("multisine", "chirp") else f" of {s.hold:.2g} s"
     bias = f" around {p.command.mean():.2g} N·m" if abs(s.bias) > 0.02 else ""
@@ -49,7 +49,7 @@ def _narrowed(hypothesis: Hypothesis, p: Proposal) -> str:
 
 
 def proof_words(proof: Proof) -> str:
-    """Return why no run separates a pair, and what would."""
+    """Return why no run separates a pair, and which measurement would."""
     b = proof.bound
     low, high = b.frequency[0], b.frequency[-1]
     head = (

@@ -1,1 +1,1 @@
-"""Figures as plain values in the terms of plotly.js, which every page draws the same way."""
+"""Figures as plain values for plotly.js, drawn the same way by every page."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rsea_ros.identification.result import FrequencyResponse
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.bode_words import caption, finding
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
@@ -12,7 +13,7 @@ from rsea_ros.report.figures.palette import AFTER, MEASURED, QUIET, faint
 from rsea_ros.report.figures.thinned import thinned
 from rsea_ros.signals import UNITS, ComplexArray, FloatArray
 
-_SIDE = 1.96 / np.sqrt(2.0)
+_SIDE = Z95 / np.sqrt(2.0)
 """Half-width of the 95 % interval of a circular complex variable along one direction, in its sd."""
 _ROWS = {"gain": [0.64, 1.0], "phase": [0.39, 0.6], "ratio": [0.165, 0.35], "coherence": [0.0, 0.125]}
 _MOST_DECIBEL = 12.0
@@ -88,7 +89,7 @@ def _ratio(shown: FrequencyResponse, model: ComplexArray | None) -> list[Json]:
 
 
 def _ratio_range(shown: FrequencyResponse, model: ComplexArray | None) -> list[float]:
-    """Return a range in dB that shows the departures of trusted lines and what the band allows."""
+    """Return a range in dB that shows the deviations of trusted lines and the tolerance."""
     if model is None:
         return [-1.0, 1.0]
     trusted = shown.coherence > 0.5
@@ -125,7 +126,7 @@ def _layout(shown: FrequencyResponse, model: ComplexArray | None) -> Json:
 
 
 def _reference(response: FrequencyResponse) -> str:
-    """Return what 0 dB is, where the response has a unit."""
+    """Return the value of 0 dB, for a response with a unit."""
     over = _unit(response)
     return f" re 1 {over}" if over else ""
 

@@ -1,4 +1,4 @@
-"""What a measured response and its model say, in a sentence, and how to read their figure."""
+"""A measured response and its model in a sentence, and how to read their figure."""
 
 from __future__ import annotations
 

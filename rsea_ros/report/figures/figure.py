@@ -110,7 +110,7 @@ def band(x: FloatArray, low: FloatArray, high: FloatArray, colour: str, **parts:
 
 
 def label(text: str, x: float, y: float, colour: str, **parts: Any) -> Json:
-    """Return a label in the colour of what it names, beside it, instead of a legend."""
+    """Return a label in the colour of its curve, beside it, instead of a legend."""
     base: Json = {
         "text": text,
         "x": x,

@@ -1,4 +1,4 @@
-"""Measured against simulated over time, residual beneath. Drawn coarse, and anew from all samples on zoom."""
+"""Measured against simulated over time, residual beneath. Drawn coarse, and from all samples on zoom."""
 
 from __future__ import annotations
 

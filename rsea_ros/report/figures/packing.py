@@ -18,7 +18,7 @@ _LEVEL = 6
 def packed(values: FloatArray, step: float = 0.0) -> dict[str, Any]:
     """Return values for a page: value k = first + slope·k + step·(whole number k).
 
-    step: what may be rounded to, in the unit of the values; 0: as fine as 16 bits are.
+    step: allowed rounding, in the unit of the values; 0: the resolution of 16 bits.
     Not-a-number becomes a gap.
     """
     values = np.asarray(values, dtype=float)

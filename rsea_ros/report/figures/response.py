@@ -36,7 +36,7 @@ class Response:
 
 @dataclass(frozen=True)
 class Mark:
-    """A frequency, Hz, what is there, and which side of the text is at the line."""
+    """A frequency, Hz, its text, and the side of the text at the line."""
 
     hz: float
     text: str

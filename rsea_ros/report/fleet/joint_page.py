@@ -59,7 +59,7 @@ def _blocks(
 
 
 def _pictures(joint: str, trends: Sequence[Trend], fleet: FleetTrends, steps: Steps) -> Iterator[Block]:
-    """Yield what moved and what appeared, then what is steady, usual, and undetermined."""
+    """Yield the figures of changed parameters and new causes, then steady, usual and undetermined ones."""
     sized = [t for (j, p), t in fleet.sizes.items() if j == joint and _is_usual(p, joint, fleet)]
     moved = [t for t in (*trends, *sized) if t.state in ("trending", "changed")]
     yield from (parameter_figure(t, steps) for t in sorted(moved, key=lambda t: -_size(t)))
@@ -75,7 +75,7 @@ def _size(trend: Trend) -> float:
 
 
 def _is_usual(parameter: str, joint: str, fleet: FleetTrends) -> bool:
-    """Return whether nearly every recording names a cause: its size is a parameter like any other then."""
+    """Return whether nearly every recording names a cause, so that its size is a parameter like any other."""
     cause = parameter.partition(".")[0]
     return any(n.joint == joint and n.about == cause and np.mean(n.named) > _USUAL for n in fleet.namings)
 

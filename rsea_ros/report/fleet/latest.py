@@ -14,7 +14,7 @@ _SURE = ("confirmed", "leading")
 
 
 def latest_causes(joints: Sequence[str], recordings: Table) -> Mapping[str, str]:
-    """Return as a text what each joint's latest finished recording names, of joints where it names any."""
+    """Return the causes in each joint's latest finished recording as text, for joints with any."""
     of, outcome = np.asarray(recordings["joint"], str), np.asarray(recordings["outcome"], str)
     time_s = np.asarray(recordings["time_s"], float)
     named = {}

@@ -1,4 +1,4 @@
-"""The page of a fleet: worst joints first, what changed since when, joints × weeks, what is undetermined."""
+"""The page of a fleet: worst joints first, dated changes, joints × weeks, undetermined parameters."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def _course(trend: Trend, factor: float) -> list[Json]:
 
 
 def _ahead(trend: Trend, steps: Steps, factor: float) -> tuple[list[Json], float]:
-    """Return a sure trend drawn on to its limit, or as far as is sensible, and until when (POSIX s)."""
+    """Return a sure trend extrapolated to its limit, or a sensible time, and its end (POSIX s)."""
     if trend.state != "trending" or trend.now is None or trend.per_year is None or trend.curve is None:
         return [], 0.0
     last = float(trend.curve.time_s[-1])

@@ -1,4 +1,4 @@
-"""Tables of a fleet: findings, joints, what could not be determined."""
+"""Tables of a fleet: findings, joints, undetermined parameters."""
 
 from __future__ import annotations
 
@@ -76,13 +76,13 @@ def joint_table(
 
 
 def _state(alarms: Sequence[Alarm], determined: Sequence[Trend], latest: str) -> str:
-    """Return what moved; else what the latest recording names; else whether anything is known."""
+    """Return the changes; without any, the causes in the latest recording, or whether anything is known."""
     kinds = ", ".join(dict.fromkeys(a.kind for a in alarms))
     return kinds or (f"now {latest}" if latest else "steady" if determined else "too few recordings")
 
 
 def parameter_rows(trends: Sequence[Trend]) -> str:
-    """Return a row for each parameter of a joint: level, slope, scatter, what a step must be to be seen."""
+    """Return a row for each parameter of a joint: level, slope, scatter, least detectable step."""
     head = [
         "Parameter", "State", "#Now, 95 %", "#A year", "#Scatter of days", "#Smallest detectable step",
         "#Determined by",
@@ -113,7 +113,7 @@ def undetermined_trends(fleet: FleetTrends) -> list[Trend]:
 
 
 def undetermined_table(undetermined: Sequence[Trend], links: Links) -> str:
-    """Return what could not be determined, and why."""
+    """Return the undetermined parameters with reasons."""
     head = ["Joint", "Parameter", "Why"]
     rows = [
         (links.joint(t.series.joint), escape(name(t.series.parameter)), escape(_why(t))) for t in undetermined

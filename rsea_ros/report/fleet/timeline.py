@@ -1,4 +1,4 @@
-"""What changed since when: a rail for each finding, from the day on which it began."""
+"""A timeline: a bar for each finding from the day on which it began."""
 
 from __future__ import annotations
 

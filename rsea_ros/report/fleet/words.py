@@ -72,7 +72,7 @@ def amount(share: float) -> str:
 
 
 def about(alarm: Alarm) -> str:
-    """Return in a few words what an alarm says, without the date."""
+    """Return an alarm in a few words, without the date."""
     if alarm.kind == "fault":
         return f"{_plain(alarm.about)} in the data"
     if alarm.kind == "cause":
@@ -89,7 +89,7 @@ def about(alarm: Alarm) -> str:
 
 
 def sentence(alarm: Alarm) -> str:
-    """Return what an alarm says, with its date."""
+    """Return an alarm as a sentence, with its date."""
     if alarm.kind == "outlier":
         side = "above" if alarm.relative > 0.0 else "below"
         return f"{name(alarm.about)} is {amount(alarm.relative)} {side} the median of the fleet"

@@ -1,1 +1,1 @@
-"""What an identification says: page, tables, sentences, terminal, identification.json."""
+"""An identification as page, tables, sentences, terminal output and identification.json."""

@@ -1,4 +1,4 @@
-"""identification.json: what an identification says, for programs."""
+"""identification.json: an identification for programs."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from rsea_ros.identification.result import Identification, ParameterEstimate
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.json_values import fault_json, finite, numbers
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.json import rig_json
 
 SCHEMA = 1
 
 
 def identification_json(identification: Identification) -> dict[str, Any]:
-    """Return the contents of identification.json. No number in it is infinite or NaN: such are null."""
+    """Return the contents of identification.json; infinite numbers and NaN are null."""
     i = identification
     return {
         "schema": SCHEMA,
         "rig": i.rig.name,
+        **rig_json(i.rig_choice, i.remarks),
         "verdict": i.verdict,
         "sentence": verdict_sentence(i),
         "next": next_command(i) or None,
@@ -46,7 +48,7 @@ def identification_json(identification: Identification) -> dict[str, Any]:
 
 
 def parameter(p: ParameterEstimate) -> dict[str, Any]:
-    """Return a parameter as it stands in the result files."""
+    """Return a parameter for the result files."""
     return {
         "value": finite(p.value),
         "unit": p.unit,

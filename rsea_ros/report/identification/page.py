@@ -13,13 +13,15 @@ from rsea_ros.report.figures.overlay import Simulated, overlay_figure
 from rsea_ros.report.figures.palette import AFTER, MEASURED
 from rsea_ros.report.figures.spectrum import Curve, density, finding, residual_figure
 from rsea_ros.report.identification.correlation import correlation_section
-from rsea_ros.report.identification.parameters import clock_sentence, how_determined, parameter_table
+from rsea_ros.report.identification.parameters import clock_sentence, parameter_table
 from rsea_ros.report.identification.statics import statics_sentences
 from rsea_ros.report.identification.words import doubt_sentences, next_command, verdict_sentence
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, key_numbers, paragraph, section
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
+from rsea_ros.report.rig.page import right_rig_block
+from rsea_ros.report.rig.words import rig_named, split_off_rig
 from rsea_ros.signals import SENSED, UNITS
 
 
@@ -28,6 +30,7 @@ def identification_report(identification: Identification, provenance: Provenance
     blocks: list[Block] = [
         key_numbers(_keys(identification)),
         _next(identification),
+        right_rig_block(identification.remarks),
         _parameters(identification),
         _statics(identification),
     ]
@@ -70,7 +73,8 @@ def _keys(identification: Identification) -> list[tuple[str, str]]:
 
 def _kicker(identification: Identification) -> str:
     about = identification.rig.about or identification.rig.name.replace("_", " ")
-    return f"Identification of {identification.rig.name} · {about}"
+    rig = rig_named(identification.rig.name, identification.rig_choice)
+    return f"Identification of {rig} · {about}"
 
 
 def _parameters(identification: Identification) -> str:
@@ -92,7 +96,7 @@ def _statics(identification: Identification) -> str:
 
 def _parameter_finding(identification: Identification) -> str:
     physical = [p for p in identification.parameters if not p.name.startswith(CLOCKS)]
-    settled = [p for p in physical if how_determined(p) == "yes"]
+    settled = [p for p in physical if p.determined == "yes"]
     if len(settled) == len(physical):
         return f"The data determine all {len(physical)} parameters"
     return f"The data determine {len(settled)} of {len(physical)} parameters, the others not, or only in part"
@@ -127,7 +131,8 @@ def _over_frequency(identification: Identification, overlay: Overlay) -> Figure:
 
 def _undetermined(identification: Identification) -> str:
     title = "What these data cannot determine"
-    said = (*doubt_sentences(identification), *remark_sentences(identification.remarks))
+    others = split_off_rig(identification.remarks)[1]
+    said = (*doubt_sentences(identification), *remark_sentences(others))
     body = bullets(said) if said else paragraph("The data determine every free value.")
     return section(title, body)
 

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from html import escape
 
 from rsea_ros.identification.result import CLOCKS, ParameterEstimate
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, GRID, QUIET, faint
 from rsea_ros.report.page.table import table_of_rows
 
 _WIDTH, _HEIGHT = 190.0, 26.0
-_TOLD = 0.9
-_UNTOLD = 0.5
 
 
 def parameter_table(parameters: Sequence[ParameterEstimate]) -> str:
@@ -36,19 +35,6 @@ def clock_sentence(parameters: Sequence[ParameterEstimate]) -> str:
         for p in clocks
     ]
     return f"Sensors read later than their stamps by: {'; '.join(parts)}."
-
-
-def how_determined(p: ParameterEstimate) -> str:
-    """Return in words how well the data determine a parameter, relative to the prior and to its size.
-
-    None where the interval reaches as far as the value is large, or where the fit ended at a bound.
-    """
-    share, (low, high) = p.told_by_data, p.ci95
-    at_bound = p.value in p.ci95 and low < high
-    size = math.pi if p.name.endswith(".phase") else abs(p.value)
-    if share < _UNTOLD or at_bound or not max(high - p.value, p.value - low) < size:
-        return "no"
-    return "yes" if share >= _TOLD else "in part"
 
 
 def value_text(p: ParameterEstimate) -> tuple[str, str]:
@@ -80,7 +66,7 @@ def _row(p: ParameterEstimate) -> str:
         f"<tr><td>{escape(words.parameter(p.name))} {_symbol(p.name)}<small>{escape(p.name)}</small></td>"
         f"<td class='number'><b>{value}</b>{doubt}</td><td class='unit'>{escape(words.unit(p.unit))}</td>"
         f"<td>{_interval(p)}</td><td class='number'>{words.number(p.start, 4)}</td>"
-        f"<td class='number'>{change}</td><td>{how_determined(p)}</td></tr>"
+        f"<td class='number'>{change}</td><td>{p.determined}</td></tr>"
     )
 
 
@@ -91,7 +77,7 @@ def _symbol(name: str) -> str:
 
 def _interval(p: ParameterEstimate) -> str:
     """Return a small drawing: prior as a grey bar (95 %), its middle, and the result with its interval."""
-    side = 1.96 * p.spread * abs(p.start)
+    side = Z95 * p.spread * abs(p.start)
     if not (math.isfinite(side) and side > 0.0):
         side = max(abs(p.value - p.start), p.ci95[1] - p.ci95[0]) or 1.0
     reach = 1.15 * max(side, abs(p.value - p.start), *(abs(v - p.start) for v in p.ci95 if math.isfinite(v)))

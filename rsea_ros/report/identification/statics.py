@@ -1,4 +1,4 @@
-"""What slow ramps against a locked output showed, as sentences."""
+"""Results of slow ramps against a locked output, as sentences."""
 
 from __future__ import annotations
 

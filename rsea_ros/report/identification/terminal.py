@@ -8,7 +8,7 @@ from rich.table import Table
 
 from rsea_ros.identification.result import CLOCKS, Identification, ParameterEstimate
 from rsea_ros.report import words
-from rsea_ros.report.identification.parameters import how_determined, value_text
+from rsea_ros.report.identification.parameters import value_text
 
 
 def terminal_table(identification: Identification, truth: Mapping[str, float] | None = None) -> Table:
@@ -32,7 +32,7 @@ def _cells(p: ParameterEstimate, truth: Mapping[str, float] | None) -> list[str]
     cells = [p.name, "".join(value_text(p)), words.unit(p.unit), words.number(p.start, 4)]
     if truth is not None:
         cells += _against(p, truth)
-    return [*cells, how_determined(p)]
+    return [*cells, p.determined]
 
 
 def _against(p: ParameterEstimate, truth: Mapping[str, float]) -> list[str]:

@@ -7,12 +7,18 @@ import shlex
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
+from rsea_ros.report.rig.words import rig_in_brackets, values_off
 from rsea_ros.wording import listed
 
 
 def verdict_sentence(identification: Identification) -> str:
     """Return whether the model fits, by the worst channel's residual over its noise, and the rig by name."""
-    ratios, rig = identification.times_noise, f"rig {identification.rig.name}"
+    return "; ".join(filter(None, (_verdict(identification), values_off(identification.remarks))))
+
+
+def _verdict(identification: Identification) -> str:
+    ratios = identification.times_noise
+    rig = rig_in_brackets(identification.rig.name, identification.rig_choice)
     if not ratios:
         return f"No channel to test the model with ({rig})"
     worst = max(ratios, key=lambda n: ratios[n])
@@ -36,7 +42,7 @@ def next_command(identification: Identification) -> str:
     """Return the command that diagnoses a model that does not fit; empty if it fits."""
     if identification.at_noise:
         return ""
-    rig = identification.rig_option or identification.rig.name
+    rig = identification.rig_choice.option or identification.rig.name
     bags = " ".join(shlex.quote(s) for s in identification.sources)
     return f"rsea diagnose {bags} --rig {shlex.quote(rig)}"
 

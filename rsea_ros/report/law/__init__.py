@@ -1,1 +1,1 @@
-"""The law of what no effect explains: page, sentences, law.json."""
+"""A law that no effect covers: page, sentences, law.json."""

@@ -1,4 +1,4 @@
-"""Figures of a law: the missing torque over what it depends on, with the law in it, and both over time."""
+"""Figures of a law: the missing torque and the law over its variable, and both over time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_ros.laws.result import WrittenLaw
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, label, layout, line, numbers
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, QUIET, faint
@@ -18,7 +19,7 @@ _CURVE = 160
 
 
 def over_figure(written: WrittenLaw) -> Figure:
-    """Return what the simulation lacks over what the law depends on, and the law in it."""
+    """Return the missing torque and the law over the law's variable."""
     shown, law = written.shown, written.law
     x, y, unit = _folded(written), shown.values, "rad" if law.place == "encoder" else "N m"
     centre, low, high = _curve(x, shown.law)
@@ -85,13 +86,13 @@ def _cycles(written: WrittenLaw) -> float:
 
 
 def _folded(written: WrittenLaw) -> FloatArray:
-    """Return what the law is drawn over; a wave's angle within one period."""
+    """Return the variable of the drawing; a wave's angle within one period."""
     cycles, x = _cycles(written), written.shown.x
     return np.mod(x, 2.0 * np.pi / cycles) if cycles else x
 
 
 def _curve(x: FloatArray, law: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return places along x, and the 10 to 90 % of the law there, which spread by what else it reads."""
+    """Return places along x, and the 10 to 90 % range of the law at each, by its other variables."""
     first, last = (float(v) for v in np.quantile(x, [0.002, 0.998]))
     edges = np.linspace(first, last, _CURVE + 1)
     which = np.clip(np.searchsorted(edges, x) - 1, 0, _CURVE - 1)
@@ -112,12 +113,12 @@ def _binned(x: FloatArray, y: FloatArray, centre: FloatArray) -> tuple[FloatArra
     count = np.bincount(which, minlength=len(centre))[: len(centre)]
     mean = np.bincount(which, y, len(centre))[: len(centre)] / np.maximum(count, 1)
     square = np.bincount(which, y * y, len(centre))[: len(centre)] / np.maximum(count, 1)
-    error = 1.96 * np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count, 1))
+    error = Z95 * np.sqrt(np.maximum(square - mean**2, 0.0) / np.maximum(count, 1))
     return np.where(count > 4, mean, np.nan), error
 
 
 def time_figure(written: WrittenLaw) -> Figure:
-    """Return what the simulation lacks and the law over time."""
+    """Return the missing torque and the law over time."""
     shown, unit = written.shown, "rad" if written.law.place == "encoder" else "N m"
     data = [
         line(shown.t, shown.values, "missing", MEASURED, 1.0),

@@ -1,4 +1,4 @@
-"""law.json: a law for what no effect explains, for programs."""
+"""law.json: a law that no effect covers, for programs."""
 
 from __future__ import annotations
 

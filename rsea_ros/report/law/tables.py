@@ -1,10 +1,11 @@
-"""Tables of a law: on what the missing torque depends, what is gained, what else was tried."""
+"""Tables of a law: dependences of the missing torque, gains, other models."""
 
 from __future__ import annotations
 
 from html import escape
 
 from rsea_ros.laws.result import LawResult
+from rsea_ros.normal import Z95
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, QUIET, faint
 from rsea_ros.report.law.words import gain_sentence
@@ -17,14 +18,14 @@ _DEPENDENCE_HEADS = ("A function of", "#", "#explains, held out", "#of the rest"
 
 
 def dependence_section(result: LawResult) -> str:
-    """Return on what the missing torque depends, with the share that each explains."""
+    """Return the dependences of the missing torque, with their explained shares."""
     if not result.dependences:
         return ""
     top = [d for d in result.dependences if d.share > 0.005][:10]
     rows = [
         f"<tr><td>{escape(d.regressor)}<small>{escape(d.place)}</small></td>"
         f"<td data-label='alone'>{_share_bar(d.share)}</td>"
-        f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {196 * d.se:.0f} %</td>"
+        f"<td class='number' data-label='alone'>{100 * min(d.share, 1.0):.0f} ± {100 * Z95 * d.se:.0f} %</td>"
         f"<td class='number' data-label='of what the law leaves'>{100 * max(d.beside, 0.0):.1f} %</td></tr>"
         for d in top
     ]

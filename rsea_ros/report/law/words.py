@@ -41,7 +41,7 @@ def _remaining(result: LawResult) -> str:
 
 
 def depends_on(law: Law, result: LawResult) -> str:
-    """Return what a law depends on, a wave with its period."""
+    """Return the variables of a law, a wave with its period."""
     cycles = [p.shape for p in law.parts if p.term.shape == "cycles_per_revolution"]
     if not cycles:
         return law.regressor

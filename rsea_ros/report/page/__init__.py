@@ -1,1 +1,1 @@
-"""The frame of every report: one HTML file with its style, its script and plotly.js in it."""
+"""The frame of every report: one HTML file that contains its style, its script and plotly.js."""

@@ -21,7 +21,7 @@ Block = Figure | str
 
 
 def page(title: str, kicker: str, blocks: Sequence[Block], footer: Sequence[str]) -> str:
-    """Return the document. title: the verdict in a sentence. kicker: what it is about, above the title."""
+    """Return the document. title: the verdict in a sentence. kicker: the subject, above the title."""
     body, contents = _numbered("\n".join(_block(block, i) for i, block in enumerate(blocks)))
     figures = [block for block in blocks if isinstance(block, Figure)]
     plotly = plotly_for(figures) if figures else ""

@@ -13,7 +13,7 @@ def section(title: str, *blocks: str, caption: str = "") -> str:
 
 
 def folded(title: str, *blocks: str) -> str:
-    """Return a section that opens when its title is clicked, for what few readers need."""
+    """Return a section that opens when its title is clicked, for details."""
     return (
         f'<section class="folded"><details><summary><h2>{escape(title)}</h2></summary>'
         f"{''.join(blocks)}</details></section>"
@@ -21,7 +21,7 @@ def folded(title: str, *blocks: str) -> str:
 
 
 def key_numbers(items: Sequence[tuple[str, str]]) -> str:
-    """Return large numbers in a row: (number, what it is)."""
+    """Return large numbers in a row: (number, meaning)."""
     cells = "".join(f"<div><b>{escape(value)}</b><span>{escape(what)}</span></div>" for value, what in items)
     return f'<div class="keys">{cells}</div>'
 
@@ -37,7 +37,7 @@ def equation(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Return text to be typed as it stands."""
+    """Return text to be typed literally."""
     return f"<code>{escape(text)}</code>"
 
 

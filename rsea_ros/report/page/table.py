@@ -1,4 +1,4 @@
-"""Tables of a page. In every head a title with # in front is that of a column of numbers."""
+"""Tables of a page. A title that begins with # is that of a column of numbers."""
 
 from __future__ import annotations
 

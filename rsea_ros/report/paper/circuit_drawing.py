@@ -149,7 +149,7 @@ def _drawing() -> schemdraw.Drawing:
 
 
 def _svg(d: schemdraw.Drawing, spoken: str) -> str:
-    """Return the drawing as SVG with what stands behind _ as an index."""
+    """Return the drawing as SVG, with text after _ as an index."""
     text = d.get_imagedata("svg").decode("utf-8")
     text = _INDEX.sub(r'\1<tspan dy="4" font-size="10">\2</tspan><tspan dy="-4">​</tspan>', text)
     look = f'style="max-width:100%;height:auto" role="img" aria-label="{spoken}"'

@@ -108,7 +108,7 @@ def figure_18(test: MovingOutput) -> Figure:
 
 
 def figure_18_as_printed() -> Figure:
-    """Return both models with Table 2's values, unfitted, as the paper's simulation had them."""
+    """Return both models with Table 2's values, unfitted, as in the paper's simulation."""
     rig = load_rig("paper_moving_output")
     curves = []
     models = readings(rig)

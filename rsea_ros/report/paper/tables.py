@@ -37,7 +37,7 @@ TABLE_1 = (
 
 
 def claims_table(claims: Sequence[Claim]) -> str:
-    """Return printed beside ours with the difference; only what the paper's numbers alone make is counted."""
+    """Return printed beside our numbers; only results of the paper's own numbers are counted."""
     recomputed = [c for c in claims if c.status == "found"]
     agree = sum(c.agrees for c in recomputed)
     rows = []
@@ -73,7 +73,7 @@ def findings_list(findings: Sequence[Finding]) -> str:
 
 
 def equations_section() -> str:
-    """Return the equations as printed, with what is ours."""
+    """Return the equations as printed, with ours."""
     return section("The equations as printed, and where the equations of motion differ", equation(EQUATIONS))
 
 
@@ -91,7 +91,7 @@ def table_1(drawings: Sequence[tuple[str, str]]) -> str:
 
 
 def table_2(rig_values: Mapping[str, float]) -> str:
-    """Return Table 2 beside what the rigs use."""
+    """Return Table 2 beside the rigs' values."""
     rows = []
     for name, (printed, unit) in TABLE_2.items():
         used = (

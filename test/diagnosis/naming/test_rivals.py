@@ -15,7 +15,7 @@ def test_models_that_do_the_same_share_the_weight():
     assert stacked([LOSS, LOSS], [0.0, 0.0]) == pytest.approx([0.5, 0.5])
 
 
-def test_one_that_loses_more_in_every_block_gets_none():
+def test_a_model_that_loses_more_in_every_block_gets_no_weight():
     assert stacked([LOSS, LOSS + 3.0], [0.0, 0.0])[1] < 1e-6
 
 
@@ -26,6 +26,6 @@ def test_luck_in_a_few_blocks_does_not_decide():
     assert stacked([LOSS, lucky], [0.0, 0.0])[0] > 0.1
 
 
-def test_what_a_prior_costs_counts():
+def test_the_cost_of_the_prior_counts():
     first, second = stacked([LOSS, LOSS], [0.0, 4.0])
     assert first / second == pytest.approx(np.exp(2.0))

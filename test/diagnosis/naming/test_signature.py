@@ -1,4 +1,4 @@
-"""The signature of a cause: 0 for a law of the right shape, and where a law of another shape is wrong."""
+"""The signature of a cause: 0 for a law of the right shape; otherwise it shows where the law is wrong."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_law_of_the_right_shape_and_size_spreads_no_more_than_by_chance():
     assert max(s.amplitude, s.time, s.frequency) < 0.04
 
 
-def test_a_size_that_is_wrong_everywhere_alike_moves_the_scale_and_not_the_spread():
+def test_a_uniformly_wrong_size_moves_the_scale_and_not_the_spread():
     s = signature(rows(0.3 * CONTRIBUTION))
     assert s.scale == pytest.approx(1.3, abs=0.03)
     assert s.overall < 1.5 * s.chance
@@ -62,7 +62,7 @@ def test_what_the_other_unknowns_can_imitate_does_not_count():
     assert signature(imitated).kept < 1e-10
 
 
-def test_a_residual_that_has_nothing_to_do_with_the_cause_is_chance():
+def test_an_unrelated_residual_counts_as_chance():
     other = 20.0 * np.convolve(RNG.normal(size=len(TIME)), np.ones(30) / 30.0, mode="same")
     s = signature(rows(other))
     assert s.chance > 0.02

@@ -1,6 +1,8 @@
-"""What may be named, and as what: the rules between probabilities and the verdict."""
+"""Which causes are named and with which status: the rules between probabilities and the verdict."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -57,8 +59,8 @@ def test_only_what_is_likely_is_confirmed(p, rivals, at_floor):
 
 
 @given(EVIDENCE)
-def test_what_the_data_speak_against_is_not_named(evidence):
-    """Not at the floor and taking less than most: improbable, or no sure help, is no cause."""
+def test_a_cause_that_the_data_speak_against_is_not_named(evidence):
+    """Away from the floor, an effect that takes less than most must be probable and surely useful."""
     (p,), status = probabilities_and_status([evidence], at_floor=False, takes_most=False)
     brings = evidence.gain_low >= 0.1 and not evidence.at_edge
     assert (status is None) == (not evidence.is_sure or p < (0.2 if brings else 0.5))
@@ -74,6 +76,14 @@ def test_evidence_against_a_law_lowers_its_probability():
     for name, value in worse.items():
         assert probability(Evidence(**{**vars(RIGHT), name: value}), True) < probability(RIGHT, True), name
     assert set(features(RIGHT, True)) == set(COEFFICIENTS)
+
+
+def test_the_floor_of_the_settings_is_the_floor_of_a_cause():
+    """It was 1.1 times the noise, whatever `floor.reached` said."""
+    near = replace(RIGHT, left=1.2)
+    wider = replace(DEFAULT, floor=replace(DEFAULT.floor, reached=1.3))
+    assert features(near, True)["noise"] == 0.0
+    assert features(near, True, wider)["noise"] == 1.0
 
 
 def score(**ratios):
@@ -92,7 +102,7 @@ def test_a_verdict_is_explained_only_with_every_cause_confirmed_and_the_floor_re
 
 
 def test_an_unchanged_channel_does_not_take_a_cause_away():
-    """One rounding decided: a channel at 1.53 that rose to 1.5301 made `unexplained` of a gain of 0.92."""
+    """A rise from 1.53 to 1.5301 in one channel turned a gain of 0.92 into `unexplained`."""
     before = score(ft=40.0, position=1.53)
     assert takes_most(before, score(ft=1.2, position=1.5301))
     assert not takes_most(before, score(ft=1.2, position=1.6))

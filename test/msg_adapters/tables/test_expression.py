@@ -1,4 +1,4 @@
-"""Expressions in a map: numbers by hand, and what must never be evaluated."""
+"""Expressions in a map: values worked out by hand, and text that must never be evaluated."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def value(text):
         ("atan2(b, sqrt(1 - b ** 2))", np.arcsin(np.clip(np.sin(9.0 * T), -1, 1))),
     ],
 )
-def test_values(text, expected):
+def test_expressions_have_their_values(text, expected):
     np.testing.assert_allclose(value(text), expected, atol=1e-9)
 
 
@@ -59,7 +59,7 @@ HOSTILE = [
 
 
 @pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
-def test_what_is_no_arithmetic_is_refused_before_it_is_evaluated(text):
+def test_text_that_is_not_arithmetic_is_refused_before_it_is_evaluated(text):
     with pytest.raises(ValueError, match=r"^(has|is|calls) ") as error:
         parse(text)
     assert "\n" not in str(error.value)
@@ -69,7 +69,7 @@ def test_what_is_no_arithmetic_is_refused_before_it_is_evaluated(text):
 @pytest.mark.parametrize(
     "text", ["a * 9**9**9", "9999**9999**9999 * a", "a / 0", "exp(exp(exp(10 * a + 9)))", "a ** 20000"]
 )
-def test_powers_without_end_are_doubles(text):
+def test_endless_powers_are_computed_as_doubles(text):
     began = time.process_time()
     with pytest.raises(ValueError, match=r"cannot be computed|expected a finite number"):
         value(text)
@@ -77,7 +77,7 @@ def test_powers_without_end_are_doubles(text):
 
 
 def test_random_texts_are_refused_or_computed():
-    """What a generator of hostile texts makes of the allowed words ends in numbers or in one line."""
+    """Random hostile texts made of the allowed words give numbers or one line."""
     rng = np.random.default_rng(0)
     words = [*FUNCTIONS, *COLUMNS, "(", ")", ",", "+", "*", "**", "1e9", "-", ".", "[", "]", "__", "'", "0"]
     computed = 0
@@ -111,7 +111,7 @@ def imported(tmp_path):
     return run
 
 
-def test_a_map_with_expressions(imported):
+def test_a_map_may_have_expressions(imported):
     record = imported("derivative(phi)")
     assert np.allclose(record["command"].t, np.arange(9) * 0.25)
     assert np.allclose(record["velocity"].y[1:-1], np.radians(8.0 * np.arange(1, 8)))
@@ -126,6 +126,6 @@ def test_a_map_with_expressions(imported):
         ("1 / (i - i)", "run.csv: '1 / .i - i.' is inf at sample 1, expected a finite number"),
     ],
 )
-def test_mistakes_name_file_and_field(imported, text, message):
+def test_mistakes_are_named_with_file_and_field(imported, text, message):
     with pytest.raises(ImportMapError, match=message):
         imported(text)

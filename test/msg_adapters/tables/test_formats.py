@@ -1,4 +1,4 @@
-"""The same measurement in every format that is read, and what each refuses."""
+"""The same measurement in every format that is read, and the files that each refuses."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def write(tmp_path):
         (".jsonl", ("t", "q[2]")),
     ],
 )
-def test_the_same_numbers_out_of_every_format(write, suffix, columns):
+def test_every_format_gives_the_same_numbers(write, suffix, columns):
     table = read_columns(write(suffix), columns)
     assert np.allclose(table[columns[0]], T)
     assert table[columns[1]].tolist() == Q[:, 2].tolist()
@@ -95,11 +95,11 @@ def refused(file, column, text):
         (".jsonl", "w", "no column 'w', expected one of t, q"),
     ],
 )
-def test_what_is_no_column_is_named(write, suffix, column, text):
+def test_an_unknown_column_is_named(write, suffix, column, text):
     refused(write(suffix), column, text)
 
 
-def test_records_below_other_keys(tmp_path):
+def test_records_nested_below_other_keys_are_read(tmp_path):
     file = tmp_path / "run.json"
     samples = [{"t": 0.0, "motor": {"i": 1}}, {"t": 0.1, "motor": {"i": None}}, {"t": 0.2}]
     file.write_text(json.dumps({"robot": "arm", "log": {"samples": samples}}))
@@ -125,13 +125,13 @@ def test_records_below_other_keys(tmp_path):
         ("", "line 1, column 1: expecting value, expected JSON"),
     ],
 )
-def test_json_that_is_no_table(tmp_path, text, message):
+def test_json_without_a_table_is_refused(tmp_path, text, message):
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(ImportMapError, match=message):
         read_columns(tmp_path / "run.json", ["t"])
 
 
-def test_json_is_not_read_beyond_a_size(tmp_path, monkeypatch):
+def test_json_beyond_a_size_is_refused(tmp_path, monkeypatch):
     (tmp_path / "run.json").write_text(json.dumps({"t": T.tolist()}))
     monkeypatch.setattr(json_file, "LARGEST_FILE", 20)
     with pytest.raises(ImportMapError, match="bytes of JSON, expected fewer than 20"):
@@ -143,13 +143,13 @@ def test_no_pickle_is_opened(tmp_path):
     refused(tmp_path / "run.npz", "q", "array 'q' holds Python objects, expected numbers")
 
 
-def test_the_size_of_an_array_comes_first(tmp_path, monkeypatch):
+def test_the_size_of_an_array_is_checked_before_it_is_read(tmp_path, monkeypatch):
     np.savez(tmp_path / "run.npz", t=T, q=Q)
     monkeypatch.setattr(npz_file, "LARGEST", 10)
     refused(tmp_path / "run.npz", "q[0]", r"array 'q' is float64 \(6, 3\), expected fewer than 10 numbers")
 
 
-def test_an_array_that_promises_more_than_the_file_holds(tmp_path):
+def test_an_array_that_promises_more_than_the_file_holds_is_refused(tmp_path):
     np.savez(tmp_path / "run.npz", t=T)
     data = (tmp_path / "run.npz").read_bytes()
     with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
@@ -161,7 +161,7 @@ def test_an_array_that_promises_more_than_the_file_holds(tmp_path):
 
 
 @pytest.mark.parametrize("header", [b"{'descr': '<f8', 'shape': (6,), ", b"{'descr': ((((((", b"\x00\xff('"])
-def test_a_header_that_is_no_header_is_one_line(tmp_path, header):
+def test_a_damaged_header_is_one_line(tmp_path, header):
     """Damaged files in bench/inputs.py brought an error of the tokenizer that nobody had thought of."""
     with zipfile.ZipFile(tmp_path / "run.npz", "w") as archive:
         text = header.ljust(117) + b"\n"
@@ -170,7 +170,7 @@ def test_a_header_that_is_no_header_is_one_line(tmp_path, header):
         read_columns(tmp_path / "run.npz", ["t"])
 
 
-def test_npy_of_one_matrix_and_of_fields(tmp_path):
+def test_npy_is_read_as_one_matrix_and_as_fields(tmp_path):
     np.save(tmp_path / "run.npy", Q)
     assert read_columns(tmp_path / "run.npy", ["2"])["2"].tolist() == Q[:, 1].tolist()
     refused(tmp_path / "run.npy", "4", "no column '4', expected one of 1, 2, 3")
@@ -178,7 +178,7 @@ def test_npy_of_one_matrix_and_of_fields(tmp_path):
     assert read_columns(tmp_path / "fields.npy", ["n"])["n"].tolist() == [1.0, 2.0]
 
 
-def test_stamps_holes_and_fields_of_parquet(tmp_path):
+def test_stamps_holes_and_fields_of_parquet_are_read(tmp_path):
     stamps = pa.array([0, 5_000_000, None], pa.timestamp("ns"))
     pose = pa.array([{"x": 1.0}, {"x": None}, None], pa.struct([("x", pa.float32())]))
     pq.write_table(pa.table({"t": stamps, "pose": pose, "word": ["a", "b", "c"]}), tmp_path / "run.parquet")
@@ -196,7 +196,7 @@ def test_a_missing_reader_of_parquet_is_one_line(write, monkeypatch):
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".parquet", ".json"])
 @pytest.mark.parametrize("content", [b"", b"PAR1 and no", b"PK\x03\x04 cut", b"\x93NUMPY\x01\x00\xff\xff{"])
-def test_files_that_are_none(tmp_path, suffix, content):
+def test_files_of_another_format_are_refused(tmp_path, suffix, content):
     (tmp_path / f"run{suffix}").write_bytes(content)
     with pytest.raises(ImportMapError, match=r"run\."):
         read_columns(tmp_path / f"run{suffix}", ["t"])
@@ -219,6 +219,6 @@ def test_a_first_line_with_a_hole_is_data_where_the_map_says_so(tmp_path, header
     assert len(table["2"]) == (2 if header is None else 3)
 
 
-def test_the_second_of_two_columns_of_a_name(tmp_path):
+def test_the_second_of_two_columns_with_one_name_can_be_read(tmp_path):
     (tmp_path / "run.csv").write_text("t,q,q\n0,1,2\n1,3,4\n")
     assert read_columns(tmp_path / "run.csv", ["t", "3"])["3"].tolist() == [2.0, 4.0]

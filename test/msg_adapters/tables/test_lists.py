@@ -28,7 +28,7 @@ def motion(tmp_path):
     return place
 
 
-def test_a_joint_of_two_files(motion):
+def test_a_joint_is_read_from_two_files(motion):
     record = import_record(motion, load_map(MAPS / "so101.yaml"), 1)
     assert set(record.channels) == {"reference", "position"}
     assert np.allclose(record["reference"].y, -np.arange(40) - 1.5)
@@ -46,18 +46,18 @@ def test_a_joint_of_two_files(motion):
         (3, r"control.csv: line 2, column 'positions\[3\]' .* a list of 3 numbers, expected more than 3"),
     ],
 )
-def test_a_joint_that_is_not_there(motion, index, words):
+def test_a_missing_joint_is_named(motion, index, words):
     with pytest.raises(ImportMapError, match=words):
         import_record(motion, load_map(MAPS / "so101.yaml"), index)
 
 
-def test_a_cell_that_is_no_list(motion):
+def test_a_cell_that_is_not_a_list_is_refused(motion):
     (motion / "control.csv").write_text(TARGETS.replace('"[3.0, -4.5, 7]"', "3.0"))
     with pytest.raises(ImportMapError, match=r"line 5, .* expected a list of numbers in brackets"):
         import_record(motion, load_map(MAPS / "so101.yaml"), 0)
 
 
-def test_a_file_where_a_directory_is_expected(motion):
+def test_a_file_in_place_of_a_directory_is_refused(motion):
     with pytest.raises(ImportMapError, match=r"expected the one that holds control\.csv, state_motor\.csv"):
         import_record(motion / "control.csv", load_map(MAPS / "so101.yaml"), 0)
 
@@ -69,7 +69,7 @@ def test_a_map_names_only_files_of_the_directory(tmp_path):
         load_map(tmp_path / "map.yaml")
 
 
-def test_by_the_verb(motion, tmp_path, capsys):
+def test_the_verb_imports_lists(motion, tmp_path, capsys):
     out = str(tmp_path / "joint.mcap")
     assert main(["import", str(motion), "--map", "so101", "--index", "0", "--out", out]) == 0
     assert "positions[0] [rad]" in capsys.readouterr().out

@@ -11,7 +11,7 @@ from msg_adapters.tables.files import read_columns
 from rsea_ros.errors import ImportMapError
 
 
-def test_vectors_of_any_orientation_and_type(tmp_path):
+def test_vectors_of_any_orientation_and_type_are_read(tmp_path):
     file = tmp_path / "run.mat"
     savemat(file, {"t": np.arange(5)[:, None] * 0.1, "x": np.arange(5, dtype=np.int16)[None, :], "gain": 3.0})
     table = read_columns(file, ["x", "t"])
@@ -32,7 +32,7 @@ def test_vectors_of_any_orientation_and_type(tmp_path):
         ("cell", r"variable 'cell' is struct .*, expected a vector of numbers"),
     ],
 )
-def test_variables_that_are_no_channel(tmp_path, column, text):
+def test_variables_that_cannot_be_a_channel_are_refused(tmp_path, column, text):
     file = tmp_path / "run.mat"
     broken = np.array([0.0, 1.0, 2.0, np.inf, 4.0])
     content = {"t": np.arange(5.0), "short": np.arange(4.0), "word": "hello", "table": np.eye(2, 3)}
@@ -45,7 +45,7 @@ def test_variables_that_are_no_channel(tmp_path, column, text):
 @pytest.mark.parametrize(
     "content", [b"", b"no MAT file at all, but a text that goes on for more than its header" * 4]
 )
-def test_files_that_are_no_mat(tmp_path, content):
+def test_files_that_are_not_mat_are_refused(tmp_path, content):
     file = tmp_path / "run.mat"
     file.write_bytes(content)
     with pytest.raises(ImportMapError, match=str(file)):
@@ -53,7 +53,7 @@ def test_files_that_are_no_mat(tmp_path, content):
 
 
 @pytest.mark.parametrize("content", [b"no gzip", b"\x1f\x8b\x08\x00\x00\x00\x00\x00\x00\x03cut"])
-def test_files_that_are_no_gzip(tmp_path, content):
+def test_files_that_are_not_gzip_are_refused(tmp_path, content):
     file = tmp_path / "run.csv.gz"
     file.write_bytes(content)
     with pytest.raises(ImportMapError, match=str(file)):
@@ -101,7 +101,7 @@ def test_a_reader_that_fails_is_one_line(tmp_path, monkeypatch, program, message
         read_columns(tmp_path / "run.mat", ["x"])
 
 
-def test_a_file_that_asks_for_all_memory(tmp_path):
+def test_a_file_that_declares_more_than_memory_is_refused(tmp_path):
     """A vector of a hundred million numbers that the file does not hold, declared in its header."""
     savemat(tmp_path / "run.mat", {"x": np.arange(5.0)})
     data = (tmp_path / "run.mat").read_bytes()

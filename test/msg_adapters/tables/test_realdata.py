@@ -1,4 +1,4 @@
-"""The maps of this repository on the measurements that they are for."""
+"""The shipped maps on the measurements that they are made for."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_cycloidal_current_limit_shows_in_the_long_ramps():
     assert 24.0 < record["motor_torque"].y.max() < 27.0
 
 
-def test_pendulum_gravity_is_that_of_the_read_me():
+def test_the_pendulums_gravity_is_that_of_the_readme():
     record = _imported("pendulum/gravity_compensation.measured.csv.gz", "pendulum")
     torque, position = record["command"].y, record["position"].y
     sine = np.sin(position)
@@ -88,7 +88,7 @@ def test_sea_gamma_has_one_spring_behind_two_sensors():
 
 @pytest.mark.parametrize("joint", range(6))
 def test_so101_joints_hold_what_their_targets_ask(joint):
-    """A joint begins where a regression along its motion says, and explains most of a slow run."""
+    """A fit of a joint that begins from a regression along its motion explains most of a slow run."""
     mapping = load_map(REPOSITORY / "config" / "imports" / "so101.yaml")
     rig = load_rig("so101_joint")
     record = commanded(import_record(REAL / "so101" / "friction_gravity", mapping, joint), rig)

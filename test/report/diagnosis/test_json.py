@@ -26,7 +26,7 @@ def strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
-def test_all_files_are_there_and_nothing_else(diagnosed) -> None:
+def test_all_files_are_written_and_nothing_else(diagnosed) -> None:
     assert sorted(p.name for p in diagnosed.out.iterdir()) == sorted(DIAGNOSIS)
     assert (diagnosed.out / "report.html").stat().st_size < 8_000_000
 
@@ -64,8 +64,8 @@ def test_json_names_the_cause_with_size_and_gain(diagnosed) -> None:
     assert isinstance(cause["confusable_with"], list)
 
 
-def test_json_keeps_the_noise_and_the_simulation_s_own_error_apart(diagnosed) -> None:
-    """0.25 % of the simulation made nearly every interval, and neither file nor page said so."""
+def test_json_separates_the_noise_from_the_error_of_the_simulation(diagnosed) -> None:
+    """The simulation's 0.25 % dominated nearly every interval, and neither file nor page said so."""
     (cause,) = strict((diagnosed.out / "diagnosis.json").read_text(encoding="utf-8"))["causes"]
     torque = cause["parameters"]["torque"]
     noise = torque["statistical_ci95"][1] - torque["value"]
@@ -74,7 +74,7 @@ def test_json_keeps_the_noise_and_the_simulation_s_own_error_apart(diagnosed) ->
     assert "of which the simulation ±" in (diagnosed.out / "report.html").read_text(encoding="utf-8")
 
 
-def test_what_is_not_a_number_is_null(diagnosed) -> None:
+def test_not_a_number_is_written_as_null(diagnosed) -> None:
     unbounded = replace(
         diagnosed.diagnosis.causes[0],
         parameters={"torque": Estimate(3.0, "N m", (-np.inf, np.inf))},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import xml.etree.ElementTree as ET
@@ -14,6 +15,7 @@ from rosbags.highlevel import AnyReader
 LAYOUTS = Path(__file__).resolve().parents[3] / "config" / "layouts"
 
 
+@functools.cache
 def messages(path: Path) -> dict[str, list[Any]]:
     """Return the messages of a bag by topic, read by rosbags itself."""
     found: dict[str, list[Any]] = {}

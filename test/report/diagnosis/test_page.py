@@ -1,4 +1,4 @@
-"""The page of a diagnosis, whatever the verdict; and files of which none is ever half there."""
+"""The page of a diagnosis for every verdict; files are complete or absent."""
 
 from __future__ import annotations
 

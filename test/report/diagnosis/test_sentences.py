@@ -36,10 +36,10 @@ SAID = {
 
 
 @pytest.mark.parametrize("reason", get_args(ExperimentReason))
-def test_every_reason_is_said(reason):
+def test_every_reason_has_a_sentence(reason):
     experiment, sentence = SAID[reason]
     assert next_run(experiment) == sentence
 
 
-def test_without_a_run_no_multisine_is_spoken_of():
+def test_without_a_run_no_multisine_is_mentioned():
     assert "at half the amplitude; what scales" in next_run(Experiment("amplitude_series", amplitude=0.5))

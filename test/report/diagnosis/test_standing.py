@@ -37,14 +37,14 @@ CONSTANT = Alternative(
 )
 
 
-def test_a_leading_cause_says_its_size_interval_and_probability():
+def test_a_leading_cause_has_size_interval_and_probability():
     assert standing(DELAY) == (
         "leading: command_delay 9.10 ms [8.40, 9.80], probability 0.87; "
         "it certainly helps on held-out data, but part of the misfit remains"
     )
 
 
-def test_one_of_names_what_stands_against_it_with_its_size():
+def test_one_of_names_its_rival_with_its_size():
     assert standing(GAIN, (CONSTANT,)) == (
         "one of: ft_gain_error 0.891 [0.886, 0.896], probability 0.55 or "
         "torque_constant_error 1.12 [1.11, 1.13], probability 0.40; these data do not distinguish them"

@@ -1,4 +1,4 @@
-"""Figures hold what the values say, and no number that JSON cannot hold."""
+"""Figures show the values, and hold no number that JSON cannot hold."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_density_of_white_noise_is_its_rms_over_the_root_of_half_the_rate() -> N
     assert 0.0 < frequency[0] < frequency[-1] < 140.0
 
 
-def test_finding_names_the_band_above_the_noise() -> None:
+def test_the_title_names_the_band_above_the_noise() -> None:
     t = np.arange(60_000) / 280.0
     residual = 0.1 * np.random.default_rng(3).standard_normal(len(t))
     floor = 0.1 / np.sqrt(140.0)
@@ -39,7 +39,7 @@ def test_finding_names_the_band_above_the_noise() -> None:
     assert "most at 33 Hz" in loud
 
 
-def test_thinning_keeps_the_response(identification: Identification) -> None:
+def test_thinning_keeps_the_shape_of_the_response(identification: Identification) -> None:
     measured, model = identification.responses[0], identification.models[0]
     shown, shown_model = thinned(measured, model)
     assert shown_model is not None
@@ -49,7 +49,7 @@ def test_thinning_keeps_the_response(identification: Identification) -> None:
     assert np.abs(shown_model)[inside] == pytest.approx(there[inside], rel=0.02)
 
 
-def test_bode_title_says_where_a_wrong_model_parts(identification: Identification) -> None:
+def test_the_bode_title_says_where_a_wrong_model_deviates(identification: Identification) -> None:
     measured, model = identification.responses[0], identification.models[0]
     bump = 1.0 + 2.0 * np.exp(-((measured.frequency - 33.0) ** 2))
     right, wrong = bode_figure(measured, model), bode_figure(measured, model * bump)
@@ -69,7 +69,7 @@ def test_long_traces_keep_their_extremes() -> None:
     assert np.all(np.diff(keep) > 0)
 
 
-def test_before_after_and_noise_in_one_figure() -> None:
+def test_before_after_and_noise_are_in_one_figure() -> None:
     frequency = np.linspace(0.1, 139.0, 500)
     curves = [Curve("before", BEFORE, 1.0 / frequency), Curve("after", AFTER, np.full(500, 2e-3))]
     figure = residual_figure("The cause takes it to the noise", "ft", frequency, curves, noise=2e-3)
@@ -78,7 +78,7 @@ def test_before_after_and_noise_in_one_figure() -> None:
     as_json(figure)
 
 
-def test_overlay_of_two_simulations() -> None:
+def test_the_overlay_shows_two_simulations() -> None:
     t = np.arange(3000) / 280.0
     simulations = [Simulated("before", BEFORE, np.cos(t)), Simulated("after", AFTER, np.sin(t))]
     figure = overlay_figure("Before and after", "ft", t, np.sin(t), simulations)

@@ -1,4 +1,4 @@
-"""Packed traces come back, as fine as they were asked for."""
+"""Packed traces are restored to the requested resolution."""
 
 import base64
 import gzip
@@ -10,7 +10,7 @@ from rsea_ros.report.figures.packing import packed
 
 
 def unpacked(values):
-    """Do what page.js does."""
+    """Unpack as page.js does."""
     planes = np.frombuffer(gzip.decompress(base64.b64decode(values["data"])), np.uint8).astype(int)
     low, high = np.split(planes, 2)
     whole = low + 256 * high

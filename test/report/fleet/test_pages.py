@@ -1,4 +1,4 @@
-"""The pages of a fleet: what they say first, where they lead, and that a browser draws them."""
+"""The pages of a fleet: their first sentence, their links, and that a browser draws them."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ def test_the_first_sentence_names_how_many_and_the_worst(pages):
     assert "<h1>knee &lt;left&gt;: Spring stiffness has been falling since 1" in worn
 
 
-def test_what_cannot_be_told_is_said_with_its_reason(pages):
+def test_a_joint_that_cannot_be_judged_is_listed_with_its_reason(pages):
     assert "One course cannot be determined" in pages["index.html"]
     assert "Spring stiffness: not enough excitation to tell" in pages["joint-elbow.html"]
     assert "0 of 200 recordings determine it" in pages["joint-elbow.html"]
 
 
-def test_what_the_latest_recording_names_is_news_before_there_is_a_trend(tmp_path):
-    """Two recordings of two joints, one worn: it was listed as steady."""
+def test_a_cause_in_the_latest_recording_is_reported_before_a_trend_exists(tmp_path):
+    """Of two recordings of two joints, one worn, the worn joint was listed as steady."""
     joints = ("left", "right")
     made = history(np.random.default_rng(1), joints=joints, days=2)
     worn = recordings(joints, 2, causes=lambda j, d: [cause("backlash", 4e-3)] if j == "right" and d else [])
@@ -81,11 +81,11 @@ def test_links_lead_to_the_joints_and_to_the_diagnosis_that_shows_it(pages, tabl
     assert f'href="../store0/{first.artefacts}/diagnosis.json"' in pages["index.html"]
 
 
-def test_names_of_others_are_escaped(pages):
+def test_foreign_names_are_escaped(pages):
     assert not any("<left>" in text for text in pages.values())
 
 
-def test_a_map_has_a_cell_for_each_week_that_was_recorded_and_a_word_for_it(pages):
+def test_a_map_has_a_cell_and_a_word_for_each_recorded_week(pages):
     weeks = 15
     cells = re.findall(r"<title>(hip|elbow), ([^:]*): ([^<]*)</title>", pages["index.html"])
     stiffness = [c for c in cells if "recordings" not in c[2]]
@@ -121,7 +121,7 @@ def test_joints_whose_names_become_alike_have_pages_of_their_own():
 @pytest.mark.parametrize(
     ("share", "text"), [(-0.1512, "−15 %"), (0.021, "+2.1 %"), (-0.00034, "−0.03 %"), (1e-9, "0 %")]
 )
-def test_changes_read_as_people_write_them(share, text):
+def test_changes_are_written_as_people_write_them(share, text):
     assert percent(share) == text
 
 

@@ -20,7 +20,7 @@ from rsea_ros.report.identification.json import identification_json
 from rsea_ros.report.identification.terminal import terminal_table
 
 
-def test_files_are_all_there_and_none_is_partial(identification: Identification, tmp_path: Path) -> None:
+def test_all_files_are_written_and_none_is_partial(identification: Identification, tmp_path: Path) -> None:
     report = results.write_results(identification, tmp_path / "new" / "out")
     assert report.name == "report.html"
     assert {p.name for p in report.parent.iterdir()} == {"identification.json", "model.yaml", "report.html"}

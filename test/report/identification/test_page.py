@@ -46,13 +46,13 @@ def test_report_needs_no_network_and_stays_small(identification: Identification)
     assert len(html.encode()) <= LARGEST
 
 
-def test_text_of_others_is_escaped(identification: Identification) -> None:
+def test_foreign_text_is_escaped(identification: Identification) -> None:
     html = identification_report(identification)
     assert "bench &amp; &lt;friends&gt;" in html
     assert "<friends>" not in html
 
 
-def test_verdict_names_the_channel_that_is_above_its_noise(identification: Identification) -> None:
+def test_the_verdict_names_the_channel_above_its_noise(identification: Identification) -> None:
     assert re.fullmatch(
         r"The model fits: .* (0|1)\.\d\d times the noise \(rig paper_high_impedance\)",
         verdict_sentence(identification),

@@ -1,4 +1,4 @@
-"""The table of parameters: what counts as told, and how a lopsided interval is shown."""
+"""The table of parameters: which values count as determined, and how an asymmetric interval is shown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_ros.identification.result import ParameterEstimate
-from rsea_ros.report.identification.parameters import how_determined, parameter_table, value_text
+from rsea_ros.report.identification.parameters import parameter_table, value_text
 
 
 def estimate(
@@ -23,8 +23,8 @@ def estimate(
      (estimate(3.0, -np.inf, np.inf), "no"), (estimate(0.01, -0.02, 0.04), "no"),
      (estimate(0.01, -0.02, 0.04, name="torque_ripple.phase"), "yes")],
 )  # fmt: skip
-def test_a_value_less_than_its_doubt_or_at_its_bound_is_not_told(p: ParameterEstimate, answer: str) -> None:
-    assert how_determined(p) == answer
+def test_a_value_within_its_doubt_or_at_a_bound_is_not_determined(p: ParameterEstimate, answer: str) -> None:
+    assert p.determined == answer
 
 
 @pytest.mark.parametrize(

@@ -15,15 +15,15 @@ def script(*types):
     return gzip.decompress(base64.b64decode(plotly_for([figure])))
 
 
-def test_the_plane_bundle_is_npms_and_of_plotlys_version():
+def test_the_two_dimensional_bundle_is_npms_and_of_plotlys_version():
     assert hashlib.sha256(script("scatter", "bar", "heatmap")).hexdigest() == SHA256
     assert get_plotlyjs_version() == VERSION
     assert f"v{VERSION}".encode() in script("scatter")[:200]
 
 
-def test_its_licence_lies_beside_it():
+def test_the_licence_of_the_bundle_is_shipped():
     assert "MIT License" in (VENDOR / "plotly-cartesian.LICENSE").read_text()
 
 
-def test_only_what_it_lacks_takes_the_whole_bundle():
+def test_only_pages_with_3d_carry_the_whole_bundle():
     assert len(script("scatter", "surface")) > 3 * len(script("scatter"))

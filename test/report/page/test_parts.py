@@ -23,7 +23,7 @@ from rsea_ros.report.provenance import provenance_of
 from ..conftest import Diagnosed
 
 
-def test_every_section_stands_in_the_contents_and_can_be_reached():
+def test_every_section_is_in_the_contents_and_can_be_reached():
     html = page("t", "k", [section("One & two"), folded("Three", "<p>x</p>")], [])
     links = re.findall(r'<a href="#(part-\d)">(.*?)</a>', html)
     assert links == [("part-1", "One &amp; two"), ("part-2", "Three")]
@@ -42,7 +42,7 @@ def test_a_page_says_which_software_made_it_from_which_files(identification: Ide
     assert with_provenance({"schema": 1}, provenance)["provenance"]["sha256"] == provenance.files
 
 
-def test_the_pair_that_is_told_apart_least_is_named():
+def test_the_most_correlated_pair_is_named():
     matrix = np.array([[1.0, -0.97, 0.2], [-0.97, 1.0, np.nan], [0.2, np.nan, 1.0]])
     names = ["rotor.reflected_damping", "spring.damping", "spring.stiffness"]
     said = finding(names, matrix)
@@ -78,6 +78,15 @@ def test_the_culprit_is_marked_where_it_sits(name, part):
     assert part_of(catalogue()[name]) == part
     drawing = sketch([name])
     assert drawing.count('class="culprit"') == 1 and f"{name} at the {part}" in drawing
+
+
+@pytest.mark.parametrize("name", catalogue())
+def test_the_name_of_a_culprit_stays_within_the_drawing(name):
+    """`command delay` lost its first letter at the left edge."""
+    x, anchor = re.search(r'class="cause" x="([\d.]+)".*?text-anchor:(\w+)', sketch([name])).groups()
+    width = 8.7 * len(name)  # units a letter of bold text
+    left = float(x) - {"start": 0.0, "middle": width / 2.0, "end": width}[anchor]
+    assert 0.0 <= left <= 900.0 - width
 
 
 def test_nothing_is_marked_without_a_cause():

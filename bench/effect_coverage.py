@@ -1,7 +1,7 @@
 """Which effects are found, by kind of work and by severity, on a plant that shares no code with the project.
 
-    python bench/coverage.py play --log coverage.jsonl [--severity medium] [--sample 60]     resumes
-    python bench/coverage.py table --log coverage.jsonl
+    python bench/effect_coverage.py play --log coverage.jsonl [--severity medium] [--sample 60]     resumes
+    python bench/effect_coverage.py table --log coverage.jsonl
 
 A cell counts where its effect shows: where the rig alone, fitted, leaves more than the noise in some channel.
 Found: the effect is named, alone or among the rivals of a cause.
@@ -18,7 +18,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from coverage_records import COMMANDS, made
+from effect_coverage_records import COMMANDS, made
 from independent.severities import SEVERITIES, SIZES
 from json_log import append_to_log, read_log
 

@@ -1,0 +1,46 @@
+"""`rsea call`: call a running node without `ros2 service` and `ros2 lifecycle`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rsea_ros.cli._numbers import positive
+from rsea_ros.cli._ros import need_ros
+
+if TYPE_CHECKING:
+    from rsea_ros.nodes._caller import Caller
+
+HELP = "call a running node: activate, deactivate, clear_fault, stop …"
+EXAMPLE = "rsea call driver configure activate"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the node and what it shall do."""
+    add = parser.add_argument
+    add("node", nargs="?", default="", help="node: driver or /rsea/driver; without it, all are listed")
+    add("action", nargs="*", help="actions, in this order; without one, those that it offers are listed")
+    add("--seconds", type=positive, default=1.0, help="time to look for nodes, s (default %(default)s)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """List, or call."""
+    need_ros()
+    from rsea_ros.nodes._caller import Caller
+    from rsea_ros.nodes._visitor import visiting
+
+    with visiting("rsea_call") as node:
+        caller = Caller(node)
+        for action in args.action:
+            print(caller.call(args.node, action), flush=True)
+        if not args.action:
+            _list(caller, [caller.found(args.node)] if args.node else caller.callable_nodes(args.seconds))
+    return 0
+
+
+def _list(caller: Caller, nodes: Sequence[str]) -> None:
+    from rsea_ros.cli._columns import columns
+
+    rows = [(node, caller.state(node) or "-", ", ".join(caller.actions(node))) for node in nodes]
+    print(columns([("node", "state", "actions"), *rows]) if rows else "no node that can be called")

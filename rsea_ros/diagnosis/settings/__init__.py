@@ -1,0 +1,75 @@
+"""Every number that steers a verdict: its meaning, its unit, and why it has this value.
+
+data.py: blocks, pieces, levels of a residual; search.py: acceptance and fits; causes.py: names and sizes;
+next_run.py: the recommended run. No setting changes the numbers of noise and data, which stand with their
+reasons in identification/noise.py, noise_level.py, coloured.py and in checks/.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+
+from rsea_ros.diagnosis.settings.causes import EvidenceSettings, NamingSettings, SizeSettings
+from rsea_ros.diagnosis.settings.data import BlockSettings, FloorSettings, PieceSettings
+from rsea_ros.diagnosis.settings.next_run import NextRunSettings
+from rsea_ros.diagnosis.settings.number import Setting
+from rsea_ros.diagnosis.settings.search import AcceptanceSettings, FitSettings, ForwardSettings
+from rsea_ros.errors import ParameterError
+
+MOST_CAUSES = 4
+__all__ = [
+    "DEFAULT",
+    "MOST_CAUSES",
+    "AcceptanceSettings",
+    "BlockSettings",
+    "DiagnosisSettings",
+    "EvidenceSettings",
+    "FitSettings",
+    "FloorSettings",
+    "ForwardSettings",
+    "NamingSettings",
+    "NextRunSettings",
+    "PieceSettings",
+    "Setting",
+    "SizeSettings",
+]
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """Effects and numbers of a diagnosis: what is tried, and everything that steers its verdict.
+
+    max_causes: the most causes, 1 or more; the search ends earlier where only noise is left. Four causes
+    leave too little of the benchmark's records unexplained for a fifth.
+    without: effects of the catalogue that are not tried.
+    Raises ParameterError for a number below 1.
+    """
+
+    max_causes: int = MOST_CAUSES
+    without: tuple[str, ...] = ()
+    blocks: BlockSettings = field(default_factory=BlockSettings)
+    floor: FloorSettings = field(default_factory=FloorSettings)
+    acceptance: AcceptanceSettings = field(default_factory=AcceptanceSettings)
+    fits: FitSettings = field(default_factory=FitSettings)
+    pieces: PieceSettings = field(default_factory=PieceSettings)
+    forward: ForwardSettings = field(default_factory=ForwardSettings)
+    evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
+    naming: NamingSettings = field(default_factory=NamingSettings)
+    sizes: SizeSettings = field(default_factory=SizeSettings)
+    next_run: NextRunSettings = field(default_factory=NextRunSettings)
+
+    def __post_init__(self) -> None:
+        if self.max_causes < 1:
+            raise ParameterError(f"max_causes = {self.max_causes}, expected 1 or more")
+        object.__setattr__(self, "without", tuple(self.without))
+
+    def listed(self) -> Iterator[Setting]:
+        """Yield every number of the groups with its meaning, unit and reason."""
+        for group in (f.name for f in fields(self) if f.name not in ("max_causes", "without")):
+            values = getattr(self, group)
+            for f in fields(values):
+                yield Setting(f"{group}.{f.name}", getattr(values, f.name), **f.metadata)
+
+
+DEFAULT = DiagnosisSettings()

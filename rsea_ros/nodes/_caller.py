@@ -1,0 +1,119 @@
+"""Call the services of running nodes: transitions of a lifecycle, and triggers such as clear_fault."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from rclpy.node import Node
+
+from msg_adapters.ros import ChangeState, GetAvailableTransitions, GetState, Trigger
+from rsea_ros.errors import ParameterError, RseaError
+from rsea_ros.nodes._visitor import DISCOVERY, POLL, absolute, spin
+from rsea_ros.wording import did_you_mean
+
+_TRIGGER, _CHANGE_STATE = "std_srvs/srv/Trigger", "lifecycle_msgs/srv/ChangeState"
+_PATIENCE = 60.0
+"""s that an answer may take: a driver that configures talks to its devices."""
+
+
+class Refused(RseaError):
+    """A node that answered, and did not do what was asked."""
+
+
+class Caller:
+    """Finds what nodes offer, and calls it. node: the visitor by which it calls."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    def callable_nodes(self, seconds: float) -> list[str]:
+        """Return the full names of the nodes that offer an action; looks for some seconds."""
+        time.sleep(seconds)
+        return [name for name in self._nodes() if self.actions(name)]
+
+    def actions(self, name: str) -> tuple[str, ...]:
+        """Return what a node would do now: its triggers, and the transitions that its state allows."""
+        return (*self._transitions(name), *self._triggers(name))
+
+    def state(self, name: str) -> str:
+        """Return the state of a node with a lifecycle; empty for others."""
+        if not self._has_lifecycle(name):
+            return ""
+        return str(self._ask(GetState, f"{name}/get_state", GetState.Request()).current_state.label)
+
+    def call(self, name: str, action: str) -> str:
+        """Do one action of a node and return its answer.
+
+        Raises ParameterError for an unknown node or action, Refused when the node does not do it.
+        """
+        name = self.found(name)
+        if action in self._transitions(name):
+            return self._change(name, action)
+        if action in self._triggers(name):
+            return self._trigger(name, action)
+        offered = self.actions(name)
+        state = f" while {self.state(name)}" if self._has_lifecycle(name) else ""
+        near = did_you_mean(action, offered)
+        raise ParameterError(f"{name}: {action!r}{state}, expected one of: {', '.join(offered)}{near}")
+
+    def _change(self, name: str, transition: str) -> str:
+        request = ChangeState.Request()
+        request.transition.id = self._transitions(name)[transition]
+        if not self._ask(ChangeState, f"{name}/change_state", request).success:
+            raise Refused(f"{name}: {transition} failed, it is {self.state(name)}: its log says why")
+        return f"{name}: {self.state(name)}"
+
+    def _trigger(self, name: str, service: str) -> str:
+        answer = self._ask(Trigger, f"{name}/{service}", Trigger.Request())
+        if not answer.success:
+            raise Refused(f"{name}: {service} was refused: {answer.message}")
+        return f"{name}: {answer.message or service}"
+
+    def found(self, name: str) -> str:
+        """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
+        name = absolute(name)
+        deadline = time.monotonic() + DISCOVERY
+        while time.monotonic() < deadline:
+            if name in self._nodes() and self.actions(name):
+                return name
+            time.sleep(POLL)
+        near = did_you_mean(name, self._nodes())
+        raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
+
+    def _nodes(self) -> list[str]:
+        pairs = self._node.get_node_names_and_namespaces()
+        return sorted({f"{space.rstrip('/')}/{name}" for name, space in pairs})
+
+    def _services(self) -> dict[str, list[str]]:
+        return dict(self._node.get_service_names_and_types())
+
+    def _triggers(self, name: str) -> tuple[str, ...]:
+        start, services = f"{name}/", self._services().items()
+        return tuple(s[len(start) :] for s, kinds in services if s.startswith(start) and _TRIGGER in kinds)
+
+    def _has_lifecycle(self, name: str) -> bool:
+        return _CHANGE_STATE in self._services().get(f"{name}/change_state", ())
+
+    def _transitions(self, name: str) -> Mapping[str, int]:
+        """Return the transitions that a node's state allows: number by name."""
+        if not self._has_lifecycle(name):
+            return {}
+        request = GetAvailableTransitions.Request()
+        answer = self._ask(GetAvailableTransitions, f"{name}/get_available_transitions", request)
+        return {each.transition.label: each.transition.id for each in answer.available_transitions}
+
+    def _ask(self, kind: type, name: str, request: Any) -> Any:
+        """Return the answer of a service. Raises Refused when none comes."""
+        client: Any = self._node.create_client(kind, name)
+        try:
+            if not client.wait_for_service(DISCOVERY):
+                raise Refused(f"{name}: nobody serves it")
+            future = client.call_async(request)
+            spin(self._node, _PATIENCE, future.done)
+            if not future.done():
+                raise Refused(f"{name}: no answer within {_PATIENCE:g} s")
+            return future.result()
+        finally:
+            self._node.destroy_client(client)

@@ -1,0 +1,46 @@
+"""Which rig a result was made with, and what speaks against it, in words."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+from rsea_ros.identification.remark import Remark
+from rsea_ros.model.rig_choice import RigChoice
+
+
+def rig_named(name: str, choice: RigChoice) -> str:
+    """Return `my_bench`, `my_bench (fitted/model.yaml)`, or that a rig is the default."""
+    if choice.is_default:
+        return f"{name} (the default: no --rig was given)"
+    return f"{name} ({choice.option})" if choice.option not in ("", name) else name
+
+
+def rig_in_brackets(name: str, choice: RigChoice) -> str:
+    """Return the same for brackets: `rig my_bench, fitted/model.yaml` or `default rig …`."""
+    if choice.is_default:
+        return f"default rig {name}"
+    return f"rig {name}, {choice.option}" if choice.option not in ("", name) else f"rig {name}"
+
+
+def split_off_rig(remarks: Sequence[Remark]) -> tuple[list[Remark], list[Remark]]:
+    """Return the remarks on values that are far from the rig's, and the others."""
+    return [r for r in remarks if r.code == "off_rig"], [r for r in remarks if r.code != "off_rig"]
+
+
+def values_off(remarks: Sequence[Remark]) -> str:
+    """Return `2 values differ from the rig` of remarks; empty for none."""
+    count = len(split_off_rig(remarks)[0])
+    return f"{count} value{'s differ' if count > 1 else ' differs'} from the rig" if count else ""
+
+
+def right_rig(fitted: str = "") -> str:
+    """Return the question whether the rig is right, and what to do. fitted: a rig with the fitted values."""
+    values = f"continue with --rig {shlex.quote(fitted)}" if fitted else "make a rig of the fitted ones:"
+    return f"Is this the right rig? If not, name yours with --rig; if only its values are old, {values}"
+
+
+def refit_command(sources: Sequence[str], name: str, choice: RigChoice) -> str:
+    """Return the command that makes a rig of the fitted values."""
+    bags = " ".join(shlex.quote(s) for s in sources)
+    return f"rsea identify {bags} --rig {shlex.quote(choice.option or name)}"

@@ -1,0 +1,48 @@
+"""Drives and joints without a spring: the torque that they lack, and its ripple over the rotor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_ros import simulate
+from rsea_ros.diagnosis.diagnose import diagnose
+from rsea_ros.diagnosis.residual_peaks import missing_torque
+from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.effects.signal_table import Port
+from rsea_ros.identification.problem import case_from
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+
+
+def test_the_missing_torque_of_a_rigid_joint_is_that_of_rotor_and_link():
+    """A diagnosis from targets and encoder ended in a traceback: zero motion times an infinite stiffness."""
+    rig = load_rig("pd_joint")
+    kept = {n: q for n, q in rig.quantities.items() if not n.startswith(("spring.", "chassis."))}
+    rigid = replace(rig, quantities=kept, rigid_spring=True)
+    t = np.arange(800) / 100.0
+    record = synthesize(rigid, Channel(t, 0.5 * np.sin(2.0 * t)), seed=1)
+    case = case_from(replace(record, channels={n: record[n] for n in ("reference", "position")}), rigid)
+    error = 1e-3 * np.sin(5.0 * case.t["position"])
+    _, torque = missing_torque(case, rigid, {"position": case.measured["position"] - error})
+    inertia = rigid["rotor.reflected_inertia"] + rigid["spring_end.inertia"]
+    reaction = 1e-3 * np.hypot(inertia * 5.0**2, rigid["rotor.reflected_damping"] * 5.0)
+    assert np.max(np.abs(torque[200:])) == pytest.approx(reaction, rel=0.01)
+
+
+def test_cogging_of_a_bare_drive_is_named():
+    """No effect explained it: only a sensor behind a spring gave the ripple a place to begin at."""
+    rig = load_rig("bare_drive")
+    ripple = {"amplitude": 3.0, "cycles_per_revolution": 7.0, "phase": 0.4}
+    command = np.convolve(60.0 * np.random.default_rng(3).standard_normal(3000), np.ones(40) / 40.0, "same")
+    record = simulate(rig.with_effect("torque_ripple", **ripple), command, rate=200.0)
+    diagnosis = diagnose([record], rig)
+    (cause,) = diagnosis.causes
+    assert cause.name == "torque_ripple"
+    assert cause.parameters["amplitude"].value == pytest.approx(3.0, abs=0.3)
+    assert cause.parameters["cycles_per_revolution"].value == pytest.approx(7.0, rel=1e-3)
+    of_a_spring = {e.name for e in catalogue().values() if e.port is Port.SPRING}
+    assert not of_a_spring & {r.name for r in diagnosis.rejected}, "an effect without a place was tried"

@@ -1,0 +1,159 @@
+"""Senseless import maps and files that do not fit are refused by file, line, field and value."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from map_files import CSV, MAP
+
+from msg_adapters.tables import import_record, load_map
+from rsea_ros.errors import ImportMapError
+
+BAD_MAPS = {
+    "{": "not YAML",
+    "channels: 3\ntime: {rate: 1}": "channels is 3, expected a mapping",
+    "channels: {}": "map: no 'time', expected channels, time",
+    "[]": r"map is \[\], expected a mapping with",
+    MAP.replace("deg", "degrees"): "unit 'degrees' unknown, expected one of s, ms",
+    MAP.replace("sign: -1", "sign: 2"): r"channels.position.sign is 2.0, expected 1 or -1",
+    MAP.replace(
+        ", scale: 6.8", ""
+    ): r"channels.command\[0\]: unit 'mA' is a current, expected a torque, or a scale",
+    MAP.replace("scale: 6.8", "scale: lots"): "scale is 'lots', expected a number",
+    MAP.replace("position", "angle"): "channels: unknown key 'angle', expected command",
+    MAP.replace("sign: -1", "signe: -1"): "channels.position: unknown key 'signe', expected column",
+    MAP.replace(
+        "unit: deg", "unit: mm"
+    ): "channels mix 'mm' and 'N m', expected a linear or a rotary machine",
+    MAP.replace("unit: s", "unit: rad"): "time: unit 'rad' is a angle, expected a time",
+    MAP.replace(
+        "time: {column: t, unit: s}", "time: {rate: 0}"
+    ): r"time.rate is 0.0, expected more than 0 Hz",
+    MAP.replace(
+        "time: {column: t, unit: s}", "time: {}"
+    ): "expected either a column with its unit, or a rate",
+    f"where: {{column: t}}\n{MAP}": "where: expected one of from, below, equals",
+    "time: {rate: 1}\nchannels: {}": "channels is empty, expected some of command",
+}
+
+
+@pytest.mark.parametrize("text", BAD_MAPS)
+def test_senseless_maps_are_refused(files, tmp_path, text):
+    with pytest.raises(ImportMapError, match=BAD_MAPS[text]) as caught:
+        files(text)
+    assert str(caught.value).startswith(str(tmp_path / "map.yaml"))
+    assert "\n" not in str(caught.value)
+
+
+BAD_FILES = {
+    "": "empty file, expected a row of column names and rows of numbers",
+    "t,phi,i,load\n": "no rows, expected numbers below the column names",
+    CSV.replace("phi", "psi"): "no column 'phi', expected one of t, psi, i, load",
+    CSV.replace("-45", "lots"): "line 3, column 'phi' is 'lots', expected a finite number",
+    CSV.replace("-45", "inf"): "line 3, column 'phi' is 'inf', expected a finite number",
+    CSV.replace("-45", "1e999"): "line 3, column 'phi' is '1e999', expected a finite number",
+    CSV.replace("-45", "0x10"): "line 3, column 'phi' is '0x10', expected a finite number",
+    CSV.replace("-45", "1_0"): "line 3, column 'phi' is '1_0', expected a finite number",
+    CSV.replace(",", ";").replace("-45", "-4,5"): "line 3, column 'phi' is '-4,5', .*, with a decimal point",
+    CSV.replace(",6\n", "\n"): "line 4 has 3 fields, expected 4, as in 1 of 3 rows",
+    CSV.replace("1500", "1500,7"): "line 2 has 5 fields, expected 4, as in 1 of 3 rows",
+    CSV.replace("t,phi,i", "t,phi,phi"): r"column 'phi' stands 2 times \(2, 3\), expected once",
+    CSV.split("0.5")[0]: "fewer than two rows, expected a record",
+    CSV.replace("1.0,", "1e300,"): "stamps from 0 s to 1e[+]300 s, expected less than .*another unit of time",
+    CSV.replace("1.0,", "3e9,"): "stamps from 0 s to 3e[+]09 s, expected less than",
+    "x" * 2_000_000: "a line of more than 1048576 characters",
+    "\0" + CSV: "not a text",
+    CSV.replace("1.0,", "0.2,"): r"t of row 3 goes back \(0.200000 s after 0.500000 s\)",
+    CSV.replace("0.5,", "0.0,").replace("1.0,", "0.0,"): "t is 0 s in every row, expected a clock that runs",
+}
+
+
+@pytest.mark.parametrize("text", BAD_FILES)
+def test_files_that_do_not_fit_the_map_are_refused(files, tmp_path, text):
+    with pytest.raises(ImportMapError, match=BAD_FILES[text]) as caught:
+        files(MAP, text)
+    assert str(caught.value).startswith(str(tmp_path / "run.csv"))
+
+
+def test_a_map_that_leaves_no_row_is_refused(files):
+    with pytest.raises(ImportMapError, match=r"fewer than two rows left by where \(load goes from 2 to 6\)"):
+        files(f"where: {{column: load, below: 1}}\n{MAP}")
+
+
+def test_a_value_too_large_for_its_unit_is_refused(files):
+    with pytest.raises(ImportMapError, match=r"command: i [+] load is too large for its unit"):
+        files(MAP.replace("6.8", "1e250"), CSV.replace("1500", "1e200"))
+
+
+def test_an_empty_channel_is_refused(files):
+    with pytest.raises(ImportMapError, match="position: phi has 0 values"):
+        files(MAP, CSV.replace("90", "").replace("-45", "").replace("0,0,6", ",0,6"))
+
+
+BAD_VALUES = {
+    "delimiter: ''": r"line 2: delimiter is '', expected one of ','",
+    "delimiter: ab": r"line 2: delimiter is 'ab', expected one of ','",
+    "delimiter: []": r"line 2: delimiter is \[\], expected one of ','",
+    'delimiter: "\\n"': r"line 2: delimiter is '.*', expected one of ','",
+    "where: {column: yes, from: 1}": r"line 2: where.column is True, expected a name",
+    "where: {column: load, from: .nan}": None,
+    "where: {column: load, from: 1:30}": r"line 2: where.from: '1:30' is sexagesimal",
+    "about: x\nabout: y": r"line 3: key 'about' stands twice, first in line 2",
+}
+
+
+@pytest.mark.parametrize("line", BAD_VALUES)
+def test_values_of_a_map_are_refused_with_their_line(files, line):
+    message = BAD_VALUES[line] or r"line 2: where.from is nan, expected a number"
+    with pytest.raises(ImportMapError, match=message):
+        files(f"\n{line}{MAP}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("scale: 6.8", "scale: .nan", r"line 5: channels.command\[0\].scale is nan, expected a number"),
+        ("scale: 6.8", "scale: 0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
+        ("scale: 6.8", "scale: -0.0", r"line 5: channels.command\[0\].scale is 0, expected another number"),
+        ("scale: 6.8", "scale: .inf", r"line 5: channels.command\[0\].scale is inf, expected a number"),
+        ("scale: 6.8", "scale: 0x10", r"line 5: channels.command.0.scale: '0x10' is hexadecimal"),
+        ("scale: 6.8", "scale: true", r"line 5: channels.command\[0\].scale is True, expected a number"),
+        ("scale: 6.8", "scale: '6.8'", r"line 5: channels.command\[0\].scale is '6.8', expected a number"),
+        ("column: t, unit: s", "rate: .nan", r"line 2: time.rate is nan, expected a number"),
+        ("column: t, unit: s", "rate: .inf", r"line 2: time.rate is inf, expected a number"),
+        (
+            "column: t, unit: s",
+            "rate: 1e-300",
+            r"line 2: time.rate is 1e-300, expected more than 0 Hz: 0.001 to",
+        ),
+        (
+            "column: t, unit: s",
+            "rate: 1e12",
+            r"line 2: time.rate is 1000000000000.0, expected more than 0 Hz: 0.001 to",
+        ),
+        ("column: phi", "column: [phi]", r"line 4: channels.position.column is \['phi'\], expected a name"),
+        ("position: {", "position: [] #{", r"line 4: channels.position is an empty list, expected a column"),
+        ("unit: deg", "unit: N m", r"line 4: channels.position: unit 'N m' is a torque, expected a angle"),
+    ],
+)
+def test_terms_of_a_map_are_refused_with_their_line(files, old, new, message):
+    assert old in MAP
+    with pytest.raises(ImportMapError, match=message):
+        files(MAP.replace(old, new))
+
+
+def test_a_folder_and_a_pipe_are_refused(files, tmp_path):
+    files()
+    mapping = load_map(tmp_path / "map.yaml")
+    (tmp_path / "folder.csv").mkdir()
+    os.mkfifo(tmp_path / "pipe.csv")
+    for name, message in (("folder.csv", "Is a directory"), ("pipe.csv", "is a pipe")):
+        with pytest.raises(ImportMapError, match=f"{name}: {message}"):
+            import_record(tmp_path / name, mapping)
+
+
+def test_a_table_with_too_many_numbers_is_refused(files, monkeypatch):
+    monkeypatch.setattr("msg_adapters.tables.table.LARGEST", 300)
+    with pytest.raises(ImportMapError, match=r"more than 75 rows of 4 columns, expected a shorter record"):
+        files(MAP, CSV + "1.5,0,0,6\n" * 97)

@@ -1,0 +1,117 @@
+"""A driver node on the bench on a wire, and a driver made of a script."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+
+from msg_adapters.ros import DiagnosticArray, JointState, Trigger, torque_command_message
+from rsea_ros.hardware.dynamixel.tables import TABLES
+from rsea_ros.nodes._qos import COMMAND
+from test.nodes.stalls import every, is_stall
+
+ROOT = Path(__file__).resolve().parents[2]
+PATIENT = {"rate": 100.0, "latency": 0.1, "ft_timeout": 0.5, "command_timeout": 5.0, "autostart": True}
+"""A machine that is busy with other tests must not look like a fault."""
+WAIT = 55.0
+"""s for what normally takes one: the driver starts and compiles beside other tests."""
+
+
+class Driven:
+    """A driver on a bench, in a namespace of its own."""
+
+    def __init__(self, bench, listener, name, begin):
+        self.bench, self.name, self._listener = bench, name, listener
+        self._commands = listener.node.create_publisher(JointState, f"/{name}/torque_command", COMMAND)
+        self._clear = listener.node.create_client(Trigger, f"/{name}/driver/clear_fault")
+        self._health = listener.hear(DiagnosticArray, "/diagnostics", COMMAND)
+        self.cleared = []
+        self.process = begin("driver", remaps={"__ns": f"/{name}"}, **bench.parameters(), **PATIENT)
+
+    def push(self, condition, torque=10.0):
+        """Command a torque until the condition holds; clear what a busy machine has latched."""
+        begun, clear_now_and_then = time.monotonic(), every(1.5, self._clear_stall)
+
+        def pushed():
+            assert time.monotonic() < begun + WAIT, self.process.output[-5:]
+            self._commands.publish(torque_command_message(0, torque))
+            if not (result := condition()):
+                clear_now_and_then()
+            return result
+
+        self._listener.until(pushed)
+
+    def _clear_stall(self):
+        fault = newest_value(self._health, self.name, "fault")
+        if is_stall(fault):
+            self.cleared.append(fault)
+            self._clear.call_async(Trigger.Request())
+
+    def drive(self):
+        """Wait until the motor has its torque."""
+        self.push(self._driving)
+
+    def _driving(self):
+        goal, on = self.goal()
+        return goal != 0 and on
+
+    def goal(self):
+        """The goal in counts that the motor got last, and whether its torque is on."""
+        return self.bench.torque()
+
+    def counts(self, torque):
+        """A torque (N m) in counts of the goal, on 54024."""
+        return round(torque / 6.826 / TABLES[54024].ampere)
+
+    def call(self, kind, service, request):
+        """Call a service of the driver; return its answer."""
+        client = self._listener.node.create_client(kind, f"/{self.name}/driver/{service}")
+        self._listener.until(client.service_is_ready)
+        future = client.call_async(request)
+        self._listener.until(future.done)
+        return future.result()
+
+    def trigger(self, service):
+        """Call a Trigger service."""
+        return self.call(Trigger, service, Trigger.Request())
+
+    def change(self, transition):
+        """Ask for a transition of the lifecycle."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return self.call(ChangeState, "change_state", request)
+
+
+class Script:
+    """A driver made of a script, as `start` gives one."""
+
+    def __init__(self, program, remaps, parameters):
+        words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={text_of(value)}")]
+        words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
+        self._process = subprocess.Popen(
+            [sys.executable, str(program), "--ros-args", *words],
+            env={**os.environ, "PYTHONPATH": str(ROOT)}, stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    output = ()
+
+    def kill(self):
+        """End it without asking."""
+        self._process.kill()
+        self._process.wait()
+
+
+def text_of(value):
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def newest_value(health, namespace, key):
+    """The newest value that a driver's diagnostics have."""
+    for message in reversed(health):
+        if message.status[0].name == f"/{namespace}/driver":
+            return {pair.key: pair.value for pair in message.status[0].values}.get(key)
+    return None
