@@ -37,7 +37,7 @@ from rsea_ros.experiment.campaign import Budget, Campaign  # noqa: E402
 from rsea_ros.experiment.causes import USUAL  # noqa: E402
 from rsea_ros.experiment.design import propose  # noqa: E402
 from rsea_ros.experiment.hypothesis import motion  # noqa: E402
-from rsea_ros.experiment.limits import Limits, of_command, of_response, used  # noqa: E402
+from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used  # noqa: E402
 from rsea_ros.experiment.proposal import Asked  # noqa: E402
 from rsea_ros.experiment.shape import at_rest_around  # noqa: E402
 from rsea_ros.experiment.weighing import weigh  # noqa: E402
@@ -51,7 +51,7 @@ from rsea_ros.signals import Channel  # noqa: E402
 RATE, CHIRP = 280.0, 20.0
 ALIKE = {"torque_constant_error", "ft_gain_error"}
 """No run tells these apart without a value measured apart: proved by experiment/bound.py on each bench."""
-LIMITS = Limits(torque=25.0, velocity=2.0, deflection=0.04)
+LIMITS = RunLimits(torque=25.0, velocity=2.0, deflection=0.04)
 DESIGNS = 5
 """Benches whose designed runs are played again and again for the limits."""
 SECONDS, SHORTEST = 20.0, 0.1
@@ -223,7 +223,7 @@ def good(x, policy):
 def limits(runs):
     """Count violations in designed runs on benches drawn from what is known of them."""
     rig, rng, broken, worst, made = load_rig("paper_high_impedance"), np.random.default_rng(3), 0, 0.0, 0
-    tight = Limits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
+    tight = RunLimits(torque=25.0, velocity=1.0, deflection=0.015, ft=22.0)
     with worker_pools() as pools:
         designs = []
         for k in range(DESIGNS):

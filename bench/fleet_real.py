@@ -16,7 +16,7 @@ from rsea_ros.fleet.engine import Engine
 from rsea_ros.fleet.executor import Executor, Serial
 from rsea_ros.fleet.joints import Joint
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import Outcome, Store
+from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.fleet.summary import Summary
 from rsea_ros.fleet.task import Task, work
 from rsea_ros.identification.excitation import Settings, excitation
@@ -53,7 +53,7 @@ def knee() -> Joint:
 def run_real(store: Store, folder: Path, executor: Executor | None = None, cut: str = "") -> Summary:
     """Run the engine over real recordings. cut: truncate the one with this in its name while it is read."""
 
-    def cutting(task: Task) -> Outcome:
+    def cutting(task: Task) -> TaskOutcome:
         if cut and cut in task.bag.url:
             os.truncate(task.bag.url, task.bag.size // 2)
         return work(task)

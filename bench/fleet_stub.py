@@ -11,12 +11,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from rsea_ros.fleet.engine import Engine, Limits
+from rsea_ros.fleet.engine import Engine, EngineLimits
 from rsea_ros.fleet.executor import Executor
 from rsea_ros.fleet.joints import Joint
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import Outcome, Store
+from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.fleet.summary import Summary
 from rsea_ros.fleet.task import Task
 
@@ -34,7 +34,7 @@ def make_bags(folder: Path, count: int) -> Path:
     return folder
 
 
-def stub_row(task: Task) -> Outcome:
+def stub_row(task: Task) -> TaskOutcome:
     """Return a row as wide as a real one."""
     place = int(task.recording, 16)
     time_of = datetime(2026, 1, 1, tzinfo=timezone.utc) + timedelta(minutes=place % 525_600)
@@ -43,16 +43,16 @@ def stub_row(task: Task) -> Outcome:
         for k, name in enumerate(PARAMETERS)
     ]
     row = task.row(outcome="done", time=time_of, parameters=parameters, seconds=0.0, peak_memory=0)
-    return Outcome(row)
+    return TaskOutcome(row)
 
 
-def slow(task: Task) -> Outcome:
+def slow(task: Task) -> TaskOutcome:
     """Return a row after a while."""
     time.sleep(float(os.environ.get(TAKES, "0.5")))
     return stub_row(task)
 
 
-def greedy(task: Task) -> Outcome:
+def greedy(task: Task) -> TaskOutcome:
     """Allocate 4 GB and touch them, for one recording; return a row for any other."""
     if "00003" in task.bag.url:
         held = []
@@ -63,7 +63,7 @@ def greedy(task: Task) -> Outcome:
 
 
 def played(
-    store: Store, folder: Path, executor: Executor, work=slow, limits: Limits | None = None
+    store: Store, folder: Path, executor: Executor, work=slow, limits: EngineLimits | None = None
 ) -> Summary:
     """Run the engine over a folder."""
     held = bags_of([str(folder)], [KNEE])

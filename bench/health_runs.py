@@ -13,10 +13,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 
 from independent.bench import Bench, record_command
 
-from rsea_ros.health.finding import Finding
+from rsea_ros.health.finding import HealthFinding
 from rsea_ros.health.look import events_of
 from rsea_ros.health.monitor import Monitor
-from rsea_ros.health.settings import Settings
+from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting, Quantity, Rig
 from rsea_ros.model.rig_file import load_rig
@@ -121,7 +121,7 @@ def pieces(bench: Bench, seconds: float, rng: np.random.Generator, start: float 
         done += length
 
 
-def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, Finding]]:
+def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, HealthFinding]]:
     """Give a monitor what comes, as a node does; yield the time of each finding that is new, s."""
     for record in records:
         t, kind, values = events_of(record)
@@ -134,4 +134,4 @@ def watch(monitor: Monitor, records: Iterator[Record]) -> Iterator[tuple[float, 
 
 def monitor_of(rig: Rig, **settings: float) -> Monitor:
     """Return a monitor of a rig."""
-    return Monitor(rig, noise_of(rig), Settings(**settings))  # type: ignore[arg-type]
+    return Monitor(rig, noise_of(rig), WatchSettings(**settings))  # type: ignore[arg-type]

@@ -63,11 +63,14 @@ class _Kept(_caching.FunctionCache):  # type: ignore[misc]
         try:
             _run_time.initialize(target_context)
             with self._guard_against_spurious_io_errors():
-                return self._load_overload(sig, target_context)
+                code = self._load_overload(sig, target_context)
         except Exception:  # a file that broke off may raise anything
             with suppress(OSError):
                 self.flush()
-            return None
+            code = None
+        if code is None:
+            tell_once()
+        return code
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -90,6 +93,12 @@ def _cache_of(function: Callable[..., Any]) -> Any:
 def warn_once(reason: str) -> None:
     """Warn that compiled code is not stored, once for each reason."""
     _log.warning("compiled code is not kept, and is compiled again in every process: %s", reason)
+
+
+@cache
+def tell_once() -> None:
+    """Log, once in a process, that code is compiled and stored, which takes time."""
+    _log.info("compiling the simulation for this machine: up to a minute, once")
 
 
 @contextmanager

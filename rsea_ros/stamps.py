@@ -31,6 +31,11 @@ _FOLLOW = 0.2
 """How far the steady clock behind the stamps goes towards each of them."""
 _MANY_BACK = 0.02
 """Share of the steps: where more go back it is disorder, and steps in order of arrival say little."""
+_OFTEN = 0.02
+"""Share of the steps: where fewer are long, they are accidents and no habit of the host."""
+_NO_MULTIPLE, _TIMES = 0.15, 3.0
+"""In periods: so far off a whole number, and so many times farther than steps of one period are off, the
+typical long step is no multiple."""
 _MOST_JUMPS = 200
 """Steps back that are looked at, the longest first: no clock is set more often in a run."""
 _LONGEST_PAUSE = 600.0
@@ -273,7 +278,7 @@ def _dropped(channel: Channel, name: str, taken_out: int) -> list[Fault]:
     """Return the fault of missing samples. taken_out: how many had a stamp that was not theirs."""
     step = np.diff(channel.t)
     period = float(np.median(step)) if len(step) else 0.0
-    if not np.any(step > _GAP * period):
+    if not np.any(step > _GAP * period) or polls_unevenly(step, period):
         return []
     ticks = _ticks(step, period)
     lost = float(np.median(ticks[-3:] - np.arange(len(ticks))[-3:])) - taken_out
@@ -282,6 +287,18 @@ def _dropped(channel: Channel, name: str, taken_out: int) -> list[Fault]:
     longest = int(np.argmax(step))
     detail = f"longest gap {step[longest]:.4g} s at {channel.t[longest]:.3f} s"
     return [Fault("dropped_samples", name, lost / (len(channel) + lost), detail, lost, "samples")]
+
+
+def polls_unevenly(step: FloatArray, period: float) -> bool:
+    """Return whether the long steps, s, are no multiples of a period: a host that polls as it can.
+
+    A steady clock that lost samples leaves steps as near to a multiple as its others are to one period.
+    """
+    long = step > _GAP * period
+    if np.count_nonzero(long) < max(_AROUND, _OFTEN * len(step)):
+        return False
+    off = np.abs(step / period - np.rint(step / period))
+    return float(np.median(off[long])) > max(_NO_MULTIPLE, _TIMES * float(np.median(off[~long])))
 
 
 def _ticks(step: FloatArray, period: float) -> FloatArray:

@@ -270,3 +270,23 @@ def test_an_effect_is_compiled_on_a_full_disk(kept_in):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert tripled.ctypes(1.0) == 3.0
+
+
+START = """
+import sys
+import numpy as np
+from rsea_ros.model.rig_file import load_rig
+from rsea_ros.model.simulation import synthesize
+from rsea_ros.signals import Channel
+t = np.arange(20) / 280.0
+synthesize(load_rig("paper_high_impedance"), Channel(t, t))
+print(sorted({"numba.np.linalg", "numba.np.npyimpl", "scipy.fft", "scipy.special"} & set(sys.modules)))
+"""
+
+
+def test_kept_code_runs_without_the_compiler() -> None:
+    for _ in range(2):  # the first may have to compile
+        done = subprocess.run(
+            [sys.executable, "-c", START], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+    assert done.stdout.strip() == "[]"

@@ -114,3 +114,16 @@ def test_two_clocks_of_three_that_jump_alike_are_found():
     repaired, faults = repair_stamps(_record(t + years, position=t + 1e-3 + years))
     assert {(f.kind, f.channel) for f in faults} == {("clock_jump", "ft"), ("clock_jump", "position")}
     assert repaired.stop < 2 * COUNT * PERIOD
+
+
+def test_a_log_polled_at_two_intervals_lost_nothing():
+    """A host that polled after 4 or after 10 ms was told that 30 % of its samples were dropped."""
+    rng = np.random.default_rng(5)
+    steps = np.where(rng.uniform(size=2000) < 0.3, 10.05e-3, 4.2e-3) * (1.0 + 0.01 * rng.normal(size=2000))
+    stamps = np.cumsum(steps)
+    record = Record({"ft": Channel(stamps, np.sin(stamps))})
+    assert repair_stamps(record)[1] == []
+    lost = np.sort(rng.choice(2000, 1900, replace=False))
+    kept = 4.2e-3 * (np.arange(2000) + 0.05 * rng.normal(size=2000))[lost]
+    (fault,) = repair_stamps(Record({"ft": Channel(kept, np.sin(kept))}))[1]
+    assert (fault.kind, fault.size) == ("dropped_samples", pytest.approx(100, abs=2))

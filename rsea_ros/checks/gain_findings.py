@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rsea_ros.checks.factors import Factor
 from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.checks.gains import SHAPED, Reading, Readings
-from rsea_ros.checks.shape import Shape
+from rsea_ros.checks.shape import FittedShape
 from rsea_ros.checks.spectra import Quotient
 from rsea_ros.model.rig import Rig
 
@@ -106,7 +106,7 @@ def _unit(channel: str, factor: Factor) -> str:
     return f"`unit: {factor.unit}` for {channel} in the import map, or publish SI"
 
 
-def _of_rig(shape: Shape, rig: Rig) -> list[Finding]:
+def _of_rig(shape: FittedShape, rig: Rig) -> list[Finding]:
     """Return how far the rig is from the machine: its values, and the shape of its response."""
     found = []
     for name, value in shape.values.items():

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.checks.factors import Factor, factors
-from rsea_ros.checks.shape import Prior, Shape, ShapeFit
+from rsea_ros.checks.shape import FittedShape, Prior, ShapeFit
 from rsea_ros.checks.spectra import Quotient
 from rsea_ros.model.rig import Rig
 
@@ -57,8 +57,8 @@ class Readings:
     """Readings by channel, the command's too; the fit as the data stand, and with the readings applied."""
 
     channels: Mapping[str, Reading]
-    plain: Shape
-    applied: Shape
+    plain: FittedShape
+    applied: FittedShape
 
 
 def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
@@ -72,7 +72,7 @@ def readings_of(quotients: Mapping[str, Quotient], rig: Rig) -> Readings | None:
     return _tried(fit, plain, quotients, rig)
 
 
-def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: Rig) -> Readings:
+def _tried(fit: ShapeFit, plain: FittedShape, quotients: Mapping[str, Quotient], rig: Rig) -> Readings:
     """Return the readings where something is off: signs first, then factors, then both against none."""
     signs = _signs(fit)
     free = fit.fit({n: Prior(signs[n], 0.0, _FREE) for n in fit.channels})
@@ -89,7 +89,7 @@ def _tried(fit: ShapeFit, plain: Shape, quotients: Mapping[str, Quotient], rig: 
     return Readings({n: _believed(r, quotients, applied) for n, r in found.items()}, plain, applied)
 
 
-def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: Shape) -> Reading:
+def _believed(reading: Reading, quotients: Mapping[str, Quotient], applied: FittedShape) -> Reading:
     """Return the reading, unchanged where the channel does not have the rig's shape or may be limited."""
     q = quotients.get(reading.channel)
     if q is None:

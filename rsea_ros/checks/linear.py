@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.checks.linear_rows import Rows, Setting, State, left_of, on_time, rows_of
+from rsea_ros.checks.linear_rows import LinearSetting, LinearState, Rows, left_of, on_time, rows_of
 from rsea_ros.checks.linear_step import gauss_newton_step
-from rsea_ros.checks.shape import Shape
+from rsea_ros.checks.shape import FittedShape
 from rsea_ros.identification.problem import Problem, case_from, channels_that_tell
 from rsea_ros.identification.unknowns import unknowns_of_rig
 from rsea_ros.model.rig import Rig
@@ -62,7 +62,7 @@ class Linear:
     theta: FloatArray
 
 
-def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape) -> Linear:
+def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape) -> Linear:
     """Return the linearised fit from where the quick fit of the shape ended.
 
     Only the LONGEST of the record in which the command changes most is looked at. Raises IdentificationError
@@ -74,8 +74,8 @@ def linear_of(record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: 
 
 
 def _setting(
-    record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: Shape
-) -> tuple[Setting, State]:
+    record: Record, masked: Mapping[str, BoolArray], rig: Rig, shape: FittedShape
+) -> tuple[LinearSetting, LinearState]:
     """Return the constants of all rounds, and the state where the quick fit ended."""
     start = float(record["command"].t[0])
     begin, end = _liveliest(record["command"])
@@ -85,12 +85,12 @@ def _setting(
     timed = tuple(n for n in SENSED if n in told)  # a held motor torque shows no clock
     values = unknowns_of_rig(rig)
     theta = np.array([u.inner(shape.values.get(u.name, u.start)) for u in values])
-    state = State(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
+    state = LinearState(theta, np.array([shape.delay.get(n, 0.0) for n in timed]), np.zeros(len(timed)))
     case = case_from(on_time(record, start, timed, state), rig, masked)
-    return Setting(record, start, case, rig, timed, values), state
+    return LinearSetting(record, start, case, rig, timed, values), state
 
 
-def _descended(setting: Setting, state: State) -> tuple[State, Rows, FloatArray, bool]:
+def _descended(setting: LinearSetting, state: LinearState) -> tuple[LinearState, Rows, FloatArray, bool]:
     """Return where the rounds end: the state, rows, one sigma of each unknown, whether the clocks stand."""
     rows = rows_of(setting, left_of(setting, state))
     step, sd = gauss_newton_step(rows, setting, state)
@@ -109,7 +109,7 @@ def _descended(setting: Setting, state: State) -> tuple[State, Rows, FloatArray,
     return state.moved(0.5 * step), rows, sd, settled
 
 
-def _clocks_stand(setting: Setting, step: FloatArray, sd: FloatArray) -> bool:
+def _clocks_stand(setting: LinearSetting, step: FloatArray, sd: FloatArray) -> bool:
     """Return whether a step leaves every clock unchanged within its doubt."""
     n, m = len(setting.values), len(setting.timed)
     finest = np.repeat([_RESOLUTION, _RESOLUTION / setting.case.duration], m)
@@ -134,7 +134,7 @@ def _cut(
     return record.between(begin, end), {n: masked[n][keep] for n, keep in inside.items() if n in masked}
 
 
-def _linear(setting: Setting, state: State, rows: Rows, sd: FloatArray, settled: bool) -> Linear:
+def _linear(setting: LinearSetting, state: LinearState, rows: Rows, sd: FloatArray, settled: bool) -> Linear:
     n, m = len(setting.values), len(setting.timed)
     late, grows = np.hypot(sd[n : n + m], _RESOLUTION), sd[n + m : n + 2 * m]
     return Linear(

@@ -27,22 +27,22 @@ _NEAR = 0.02
 """Of the scale of every value: a move so small leaves the derivatives as they are."""
 
 
-class State(NamedTuple):
+class LinearState(NamedTuple):
     """Values of the rig in the fit's coordinates; offset (s) and drift (s/s) of each timed channel."""
 
     theta: FloatArray
     offset: FloatArray
     drift: FloatArray
 
-    def moved(self, step: FloatArray) -> State:
+    def moved(self, step: FloatArray) -> LinearState:
         """Return the state after a step; a clock that reads later than stamped is stamped early."""
         n, m = len(self.theta), len(self.offset)
-        return State(
+        return LinearState(
             self.theta + step[:n], self.offset - step[n : n + m], self.drift - step[n + m : n + 2 * m]
         )
 
 
-class Setting(NamedTuple):
+class LinearSetting(NamedTuple):
     """The constants of all rounds. start: of the whole record, s."""
 
     record: Record
@@ -53,7 +53,7 @@ class Setting(NamedTuple):
     values: tuple[Unknown, ...]
 
 
-def on_time(record: Record, start: float, timed: Sequence[str], state: State) -> Record:
+def on_time(record: Record, start: float, timed: Sequence[str], state: LinearState) -> Record:
     """Return the record with the stamps that its sensors would have had without offset and drift."""
     moved = {}
     for n, late, grows in zip(timed, state.offset, state.drift, strict=True):
@@ -108,7 +108,7 @@ class Rows:
     block: IntArray
 
 
-def left_of(setting: Setting, state: State) -> Left:
+def left_of(setting: LinearSetting, state: LinearState) -> Left:
     """Return the residual of a state, by one simulation."""
     record = on_time(setting.record, setting.start, setting.timed, state)
     case = replace(setting.case, drive=drive_of(record, setting.rig))
@@ -141,7 +141,7 @@ def _misfits(residual: FloatArray, plain: FloatArray, of: IntArray, m: int) -> F
     return np.array(found)
 
 
-def rows_of(setting: Setting, left: Left, known: Slope | None = None) -> Rows:
+def rows_of(setting: LinearSetting, left: Left, known: Slope | None = None) -> Rows:
     """Lay out the rows about a state: one simulation for each unknown, none where a slope is known near."""
     (case,), n, at = left.problem.cases, len(setting.values), left.theta
     if known is None or not known.holds_at(at, left.problem.unknowns):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.checks.linear_rows import Rows, Setting, State
+from rsea_ros.checks.linear_rows import LinearSetting, LinearState, Rows
 from rsea_ros.identification.unknowns import Unknown, start_vector
 from rsea_ros.signals import FloatArray
 
@@ -16,7 +16,9 @@ _OFFSET_DOUBT, _DRIFT_DOUBT, _GAIN_DOUBT = 0.05, 1e-3, 0.25
 _WIDER = 3.0
 
 
-def gauss_newton_step(rows: Rows, setting: Setting, state: State) -> tuple[FloatArray, FloatArray]:
+def gauss_newton_step(
+    rows: Rows, setting: LinearSetting, state: LinearState
+) -> tuple[FloatArray, FloatArray]:
     """Return the step of every unknown and its one sigma."""
     m, matrix = len(setting.timed), rows.matrix
     doubt = [_WIDER * _doubt(u) for u in setting.values]

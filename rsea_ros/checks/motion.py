@@ -23,14 +23,14 @@ _CLEARLY = 4.0
 """Times what the witness changes by where it is quietest: more is motion."""
 
 
-class Motion(NamedTuple):
+class MotionBeside(NamedTuple):
     """Of another channel at a channel's samples: whether it moved, and by how much a sample, shape (n,)."""
 
     moved: BoolArray
     speed: FloatArray
 
 
-def motion_beside(record: Record, name: str) -> Motion | None:
+def motion_beside(record: Record, name: str) -> MotionBeside | None:
     """Return how another channel moved at the samples of a channel, None without another channel."""
     witness = next((n for n in WITNESSES.get(name, ()) if n in record and _is_witness(record[n])), None)
     if witness is None:
@@ -38,7 +38,7 @@ def motion_beside(record: Record, name: str) -> Motion | None:
     t, channel = record[name].t, record[witness]
     moves = np.interp(t, channel.t, _moves(channel).astype(float)) >= 0.5
     speed = np.abs(np.diff(np.interp(t, channel.t, np.nan_to_num(channel.y)), prepend=np.nan))
-    return Motion(moves, np.nan_to_num(speed))
+    return MotionBeside(moves, np.nan_to_num(speed))
 
 
 def is_commanded(record: Record) -> bool:

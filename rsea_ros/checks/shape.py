@@ -43,7 +43,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Shape:
+class FittedShape:
     """A fit of the shape. gain: logarithm, delay: s, both by channel.
 
     error: weighted median of the residual of ln R by channel, weights the power. values: of the rig, by name.
@@ -78,7 +78,7 @@ class ShapeFit:
         self._start = start_vector(self.unknowns)
         self._nominal = self._response(rig)
 
-    def fit(self, priors: Mapping[str, Prior]) -> Shape:
+    def fit(self, priors: Mapping[str, Prior]) -> FittedShape:
         """Return the fit under a prior for the gain of each of `channels`."""
         sign = np.array([priors[n].sign for n in self.channels])[self._of]
         gain = np.array([priors[n].mean for n in self.channels])
@@ -191,11 +191,11 @@ class ShapeFit:
         told: FloatArray = 1.0 - np.diag(np.linalg.inv(normal))
         return told
 
-    def _shape(self, theta: FloatArray, here: FloatArray, cost: float, told: FloatArray) -> Shape:
+    def _shape(self, theta: FloatArray, here: FloatArray, cost: float, told: FloatArray) -> FittedShape:
         n, m, lines = len(self._start), len(self.channels), len(self._of)
         left = np.hypot(here[:lines], here[lines:]) * self._sd
         known = zip(self.unknowns, theta[:n], strict=True)
-        return Shape(
+        return FittedShape(
             values={u.name: u.outer(float(v)) for u, v in known},
             reach={
                 u.name: abs(float(v) - u.inner(u.start)) / u.doubt

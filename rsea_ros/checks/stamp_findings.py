@@ -10,6 +10,7 @@ from rsea_ros.checks.finding import Finding, Light
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, Record
+from rsea_ros.stamps import polls_unevenly
 
 _RED_SHARE = 0.2
 """Of a channel's samples: more bad ones make the channel, not some samples, doubtful."""
@@ -61,6 +62,9 @@ def _rate(name: str, channel: Channel, natural: float | None, command: float) ->
     steps = np.diff(channel.t)
     rate = channel.rate
     longest = f"longest interval {1e3 * float(steps.max()):.3g} ms"
+    if rate and polls_unevenly(steps[steps > 0.0], 1.0 / rate):
+        low, high = 1e3 * np.quantile(steps, (0.05, 0.95))
+        longest = f"uneven, mostly {low:.3g} to {high:.3g} ms; {longest}"
     if natural is not None and rate < _PER_CYCLE * natural:
         expected = f"> {_PER_CYCLE * natural:.3g} Hz, four samples to a cycle of the rig's {natural:.3g} Hz"
         return Finding(

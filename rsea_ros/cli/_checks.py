@@ -8,6 +8,7 @@ from rsea_ros.checks.carried import with_faults
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.finding import Findings
 from rsea_ros.checks.usable import require_motion
+from rsea_ros.cli._lines import say
 from rsea_ros.model.rig import Rig
 from rsea_ros.report.check.terminal import warnings
 from rsea_ros.signals import Record
@@ -33,4 +34,4 @@ def print_warnings(found: Sequence[Findings], rig: Rig) -> None:
     if lines:
         print(f"compared with rig {rig.name}:")
     for line in lines:
-        print(line)
+        say(line, indent=2)

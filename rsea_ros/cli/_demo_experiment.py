@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rsea_ros.cli import demo
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._processes import Processes
 from rsea_ros.cli._runs import RIG
 from rsea_ros.effects.catalogue import effect_named
@@ -42,7 +43,7 @@ def show(out: Path, domain: int, args: argparse.Namespace) -> int:
         nodes.stop(first)
     for line in lines:
         if "[INFO]" in line:
-            print(line.partition("]: ")[2])
+            say(line.partition("]: ")[2], indent=2)
     print(f"hidden cause: {hidden(bench)}")
     return 0
 

@@ -75,7 +75,7 @@ def bags_in(args: argparse.Namespace) -> list[Held]:
 
 def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
     """Write the rows of all new recordings, and return the outcomes."""
-    from rsea_ros.fleet.engine import Engine, Limits
+    from rsea_ros.fleet.engine import Engine, EngineLimits
     from rsea_ros.fleet.plan import is_anything_new
     from rsea_ros.fleet.store import locked, open_store
     from rsea_ros.fleet.task import work
@@ -88,7 +88,7 @@ def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> Summary:
         memory = None if args.serial or args.scheduler else _memory(args)
         place = executor(args, memory) if is_anything_new(store, held) else serial()
         with place as places, progress("fleet") as tell:
-            return Engine(store, places, work, tell, Limits(memory)).run(held)
+            return Engine(store, places, work, tell, EngineLimits(memory)).run(held)
 
 
 @contextmanager
@@ -108,7 +108,6 @@ def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]
     with on_this_machine(_workers(args), memory, args.dashboard) as (workers, link):
         print(f"dashboard: {link}", file=sys.stderr, flush=True)
         yield workers
-
 
 
 def check_options(args: argparse.Namespace) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shutil
 import sys
-
-from rich.console import Console
-from rich.table import Table
+from typing import TYPE_CHECKING
 
 from rsea_ros.report.lines import WIDTH, wrapped
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 _NARROWEST = 40
 
@@ -27,4 +28,6 @@ def say(text: str, indent: int = 0) -> None:
 
 def show(table: Table) -> None:
     """Print a table as wide as lines may be; cells that may wrap do."""
+    from rich.console import Console
+
     Console(width=columns()).print(table)

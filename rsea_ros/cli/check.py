@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.topics import AXES
-from rsea_ros.cli._lines import columns, say
+from rsea_ros.cli import _lines
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import FOUND
 from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, cut, topic_map
@@ -88,6 +89,6 @@ def _print(checks: list[Findings]) -> None:
     console = Console()
     for findings in checks:
         print(findings.source)
-        for line in check_lines(findings, columns()):
+        for line in check_lines(findings, _lines.columns()):
             console.print(line, highlight=False, soft_wrap=True)
     say(summary(checks))

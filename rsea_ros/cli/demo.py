@@ -16,6 +16,7 @@ import numpy as np
 from msg_adapters import read_record
 from msg_adapters.bags import read_contents
 from rsea_ros.cli._columns import columns
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import seed
 from rsea_ros.cli._output import path
 from rsea_ros.cli._processes import Processes
@@ -109,7 +110,7 @@ def recorded(nodes: Processes, out: Path, duration: float, args: argparse.Namesp
         disturbances = [f for f in read_record(bag, strict=False).faults if f.kind in DISTURBANCES]
         if not disturbances:
             break
-        print(f"this machine was too busy ({'; '.join(fault_lines(disturbances))}): {consequence}")
+        say(f"this machine was too busy ({'; '.join(fault_lines(disturbances))}): {consequence}", indent=2)
     return bag
 
 

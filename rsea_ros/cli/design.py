@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_json, add_results, path, print_file, results_place
 from rsea_ros.design.requirement import Requirement, check_magnitude
 from rsea_ros.model.train import TRAINS
@@ -109,24 +110,26 @@ def _print(asked: Any, least: Any, robust: Any, report: Path) -> None:
     from rsea_ros.report import words
     from rsea_ros.report.design.page import verdict
 
-    print(verdict(asked))
+    say(verdict(asked))
     for check in asked.checks:
         value = "not possible" if math.isnan(check.value) else f"{check.value:.4g} {check.unit}"
         sign = ">=" if check.least else "<="
-        print(
+        say(
             f"  {'yes' if check.met else 'NO '}  {check.name}: {value}, asked {sign} {check.limit:.4g} "
-            f"{check.unit}"
+            f"{check.unit}",
+            indent=7,
         )
-    print(
+    say(
         f"smallest stiffness that meets all demands on the spring: {least.stiffness:.0f} N m/rad, springs of "
         f"{least.rate:.0f} N/m"
     )
     for row in by_train(asked.requirement, asked.unit, asked.stiffness):
         low, high = row.band_range
-        print(
+        say(
             f"  {words.train(row.train)}, n = {row.turns:+.0f}: {row.band:.4g} Hz "
             f"({low:.4g} to {high:.4g} Hz over 90 % of the rotor's inertia), {row.for_band:.0f} N m/rad for "
-            f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N m/rad for all demands"
+            f"{asked.requirement.bandwidth:g} Hz, {row.least:.0f} N m/rad for all demands",
+            indent=4,
         )
     if robust:
         print(f"with 95 % of all parts within tolerance: {robust.stiffness:.0f} N m/rad")

@@ -10,7 +10,7 @@ from typing import get_args
 
 from msg_adapters import TopicMap, read_record
 from msg_adapters.overlay import write_overlay
-from rsea_ros.cli._lines import columns
+from rsea_ros.cli import _lines
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
 from rsea_ros.cli._runs import OFF_RIG, add_rig, add_runs, off_rig, rig_choice
@@ -118,7 +118,7 @@ def _print(result: Diagnosis, report: Path) -> None:
     from rsea_ros.report.diagnosis.terminal import terminal_lines
     from rsea_ros.report.lines import command_row
 
-    console, width = Console(), columns()
+    console, width = Console(), _lines.columns()
     for line in terminal_lines(result, width):
         console.print(line, highlight=False, soft_wrap=True)
     print(f"report      {report}")

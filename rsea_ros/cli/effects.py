@@ -18,16 +18,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue, or one effect with the description in its file."""
     from rsea_ros import effects
+    from rsea_ros.cli._lines import say
     from rsea_ros.effects._page import EffectPage
     from rsea_ros.effects.catalogue import effect_named
     from rsea_ros.effects.scale import MACHINE
 
     if args.name is None:
-        print(repr(effects))
-        print("\nrsea effects NAME shows equation, parameters and source.")
+        for line in repr(effects).splitlines():
+            say(line, indent=4)
+        print()
+        say("rsea effects NAME shows equation, parameters and source.")
         return 0
     page = EffectPage(effect_named(args.name))
-    print(page)
-    print(f"\n{page.description}")
-    print(f"\nBounds and sizes are for {MACHINE}; on others they grow as named, in powers of four.")
+    for line in str(page).splitlines():
+        say(line, indent=len(line) - len(line.lstrip()) + 2)
+    print()
+    for line in page.description.splitlines():
+        say(line)
+    print()
+    say(f"Bounds and sizes are for {MACHINE}; on others they grow as named, in powers of four.")
     return 0

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
@@ -19,7 +20,7 @@ from rsea_ros.report.file_names import COMMANDS, EXPERIMENT, EXPERIMENT_JSON, MO
 
 if TYPE_CHECKING:
     from rsea_ros.experiment.advice import Advice
-    from rsea_ros.experiment.files import Model
+    from rsea_ros.experiment.files import ModelFile
     from rsea_ros.experiment.hypothesis import Hypothesis
     from rsea_ros.identification.solver import Map
 
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     return FOUND if NO_RUN in args.fail_on and advice.proposal is None else 0
 
 
-def models_in(path: str) -> list[Model]:
+def models_in(path: str) -> list[ModelFile]:
     """Return the causes of a model.yaml, a rig, or a diagnosis.json beside its model.yaml."""
     from rsea_ros import strict_yaml
     from rsea_ros.experiment.documents import models_of
@@ -94,7 +95,7 @@ def models_in(path: str) -> list[Model]:
 
 
 def _possible(
-    models: Sequence[Model], args: argparse.Namespace, run: Map
+    models: Sequence[ModelFile], args: argparse.Namespace, run: Map
 ) -> tuple[list[Hypothesis], dict[str, float], dict[str, float]]:
     """Return the hypotheses; from bags, the noise by channel and the excluded causes.
 
@@ -137,22 +138,24 @@ def written(advice: Advice, place: Place, args: argparse.Namespace) -> Path:
 
 def _print(advice: Advice, report: Path) -> None:
     from rsea_ros.report.experiment.words import limit_rows, plain_name, proof_words, verdict
+    from rsea_ros.report.lines import LABEL
 
-    print(verdict(advice))
+    say(verdict(advice))
     for h in advice.hypotheses:
-        print(f"possible    {plain_name(h.name)}: probability {h.probability:.3f}")
+        say(f"possible    {plain_name(h.name)}: probability {h.probability:.3f}", indent=LABEL)
     for name, probability in advice.excluded.items():
-        print(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}")
+        say(f"excluded    {plain_name(name)} by the records: probability {probability:.1g}", indent=LABEL)
     p = advice.proposal
     if p is not None:
         for i, a in enumerate(p.names):
             for j, b in enumerate(p.names):
                 if i != j:
-                    print(f"separates   {plain_name(a)} over {plain_name(b)}: S = {p.table[i, j]:.3g}")
+                    rivals = f"{plain_name(a)} over {plain_name(b)}"
+                    say(f"separates   {rivals}: S = {p.table[i, j]:.3g}", indent=LABEL)
         for name, expected, level, limit, unit in limit_rows(p, advice.asked.limits.stated()):
             allowed = f"of {limit} {unit}" if limit != "none" else f"{unit} (no limit stated)"
-            print(f"asks        {name} {expected}, at most {level} {allowed}")
+            say(f"asks        {name} {expected}, at most {level} {allowed}", indent=LABEL)
         print(f"run         {report.parent / COMMANDS}")
     for proof in advice.proofs:
-        print(f"no run      {proof_words(proof)}")
+        say(f"no run      {proof_words(proof)}", indent=LABEL)
     print(f"report      {report}")

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._numbers import positive
 from rsea_ros.cli._output import FOUND, add_force, path
 from rsea_ros.new_files import check_free, write_file
@@ -72,7 +73,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(_document(made, rig, out, found, not_played), indent=2))
     else:
-        print("\n".join(_lines(made, rig, out, found, not_played)))
+        for line in _lines(made, rig, out, found, not_played):
+            say(line, indent=4)
     too_far = args.limit is not None and any(not one.times_noise <= args.limit for one in found)
     return FOUND if too_far else 0
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from msg_adapters import write_record
 from msg_adapters.tables import Imported, ImportMap, import_records, load_map, summary
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._maps import map_path
 from rsea_ros.cli._numbers import whole_numbers
 from rsea_ros.cli._output import add_force
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         lines = list(_said(imported, args.out))
     else:
         lines = _write_several(args, mapping)
-    print("\n".join(lines))
+    for line in lines:
+        say(line, indent=2)
     return 0
 
 

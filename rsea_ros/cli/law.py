@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import FOUND, add_fail_on, add_json, add_results, print_file, results_place
 from rsea_ros.cli._progress import progress
-from rsea_ros.cli._runs import add_rig, add_runs
+from rsea_ros.cli._runs import add_rig, add_runs, rig_choice
 from rsea_ros.cli._topics import add_topic_options, add_window_options, each_once, topic_map
 from rsea_ros.report.file_names import LAW, LAW_JSON
 
@@ -42,23 +43,25 @@ def run(args: argparse.Namespace) -> int:
         records = checked(records, rig, topics.axis, quiet=args.json, masks=True)
         from rsea_ros.cli._provenance import provenance
         from rsea_ros.laws.learn import learn
-        from rsea_ros.laws.writing import Provenance
+        from rsea_ros.laws.writing import LawProvenance
         from rsea_ros.report.law.files import write_law
 
         where = provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
-        result = learn(records, rig, Provenance(where.date, where.version, bags, ""), tell)
+        result = learn(records, rig, LawProvenance(where.date, where.version, bags, ""), tell)
         report = write_law(result, place, where)
     if args.json:
         print_file(report.parent / LAW_JSON)
     else:
         from rsea_ros.report.law.words import gain_sentence, headline, law_lines
+        from rsea_ros.report.rig.words import rig_named
 
-        print(headline(result))
+        say(headline(result))
+        print(f"rig         {rig_named(result.rig_name, rig_choice(args))}")
         for line in law_lines(result):
-            print(f"  {line}")
+            say(f"  {line}", indent=6)
         if result.laws:
-            print(gain_sentence(result))
+            say(gain_sentence(result), indent=2)
             print(f"effect      {', '.join(str(report.parent / (w.law.name + '.py')) for w in result.laws)}")
         print(f"report      {report}")
     finding = "law" if result.laws else "at_noise_floor" if result.at_floor else "no_law"

@@ -13,9 +13,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn, Protocol, cast
 
+from rsea_ros.cli import _lines
+from rsea_ros.cli._columns import columns
+from rsea_ros.cli._compiling import compiling_told
 from rsea_ros.cli._shown import shown
 from rsea_ros.errors import ParameterError, RseaError
 from rsea_ros.interrupts import Stopped, Stops
+from rsea_ros.report.lines import wrapped
 from rsea_ros.wording import did_you_mean, printable
 
 SUCCESS, BAD_INPUT, INTERRUPTED, READER_GONE = 0, 2, 130, 141
@@ -40,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     name = arguments[0] if arguments else "--help"
     prefix = f"rsea {name}" if name in verbs() else "rsea"
-    with shown(), Stops() as stops:
+    with shown(), compiling_told(), Stops() as stops:
         try:
             status = _call(name, arguments[1:])
             sys.stdout.flush()
@@ -68,9 +72,9 @@ def verbs() -> dict[str, Path]:
 
 def overview() -> str:
     """Return the help text with one line for each verb, without importing the verbs."""
-    rows = [f"  {name:<10} {summary(path)}" for name, path in verbs().items()]
+    rows = [(f"  {name}", summary(path)) for name, path in verbs().items()]
     closing = "rsea VERB --help shows the arguments of a verb with units, and an example; rsea --version."
-    return "\n".join(["usage: rsea VERB …", "", *rows, "", closing])
+    return "\n".join(["usage: rsea VERB …", "", columns(rows), "", wrapped(closing, _lines.columns())])
 
 
 def summary(path: Path) -> str:

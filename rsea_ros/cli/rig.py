@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rsea_ros.cli._lines import say
 from rsea_ros.cli._output import add_force, path
 from rsea_ros.errors import ParameterError
 
@@ -52,11 +53,11 @@ def _check(args: argparse.Namespace) -> int:
     from rsea_ros.model.rig_file import load_rig
 
     rig = load_rig(args.rig)
-    print(f"{rig.name}: {rig.about}" if rig.about else rig.name)
+    say(f"{rig.name}: {rig.about}" if rig.about else rig.name, indent=2)
     rows = [_row(rig, name) for name in sorted(rig.quantities)]
     print(columns([("", "value", "unit", "known to", "source"), *rows]))
     for line in remarks(rig):
-        print(line)
+        say(line, indent=2)
     return 0
 
 

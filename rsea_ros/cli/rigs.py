@@ -15,8 +15,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print a line for each rig."""
     from rsea_ros.cli._columns import columns
+    from rsea_ros.cli._lines import say
     from rsea_ros.model.rig_file import load_rig, rig_names
 
     print(columns([(name, load_rig(name).about) for name in rig_names()]))
-    print("\nrsea rig check NAME shows the values of a rig; rsea rig new NAME starts a new one.")
+    print()
+    say("rsea rig check NAME shows the values of a rig; rsea rig new NAME starts a new one.")
     return 0

@@ -147,7 +147,7 @@ class TorqueController:
         more, learned = model.more(forward)
         more = min(max(more, -largest - forward), largest - forward)
         error, slowness, reading = self._compare(reading, offset)
-        self._hear(reading, missed, error, slowness, sure=self._learn and trust == 1.0 and not late)
+        self._hear(reading, missed, error, slowness, in_time=trust == 1.0 and not late)
         back, state = feedback(self._law, self._state, error, slowness, reading.ft, reading.velocity)
         back += self._link.torque(reading.link, model.yielding, missed, offset)
         back = 0.0 if late else trust * back
@@ -194,7 +194,7 @@ class TorqueController:
         placed = replace(reading, ft=reading.ft - torque + ft, velocity=reading.velocity - speed + velocity)
         return torque - reading.ft, speed - reading.velocity, placed
 
-    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, sure: bool) -> None:
+    def _hear(self, reading: Reading, missed: int, error: float, slowness: float, *, in_time: bool) -> None:
         """Learn from a sample, and take the measured motor torque for the one that acted.
 
         After lost samples, those between are read on a straight line.
@@ -203,10 +203,10 @@ class TorqueController:
         for part in np.linspace(0.0, 1.0, missed + 2)[1:].tolist() if missed else (1.0,):
             ft, velocity = s.ft + part * (reading.ft - s.ft), s.velocity + part * turned
             torque = s.applied + self._learned[0]
-            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=sure)
+            self.learned.hear(ft, velocity, torque, gap=self._crossed, sure=self._learn and in_time)
         share = missed / (missed + 1)
         acted = self._acted.over_sample(
-            reading.motor_torque, self._sent_before, self._sent, sure=sure and not missed
+            reading.motor_torque, self._sent_before, self._sent, sure=in_time and not missed
         )
         acted -= self._known[0]
         self._state = s._replace(

@@ -97,7 +97,8 @@ def search(
     selection = eliminate_backwards(selection, effects, pools, settings)
     tell("evaluating on the test blocks", 0.95)
     held_out = held_out_of(selection, holdout)
-    return selection, [evaluate(selection, m, held_out, pools, settings) for m in selection.models]
+    stages = pools.fits.map(lambda m: evaluate(selection, m, held_out, pools, settings), selection.models)
+    return selection, list(stages)
 
 
 def searched_effects(nominal: Problem, without: Collection[str]) -> list[Effect]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion, run_case
-from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
 from rsea_ros.identification.excitation import ramped
 from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, serial, solve
@@ -59,7 +59,7 @@ class Bound:
 def bound(
     true: Hypothesis,
     rival: Hypothesis,
-    limits: Limits,
+    limits: RunLimits,
     duration: float,
     noise: Mapping[str, float],
     rate: float = 280.0,
@@ -79,7 +79,7 @@ def bound(
 
 
 def _sine(
-    frequency: float, level: tuple[float, float], true: Hypothesis, limits: Limits, rate: float
+    frequency: float, level: tuple[float, float], true: Hypothesis, limits: RunLimits, rate: float
 ) -> FloatArray:
     """Return a sine of a level within the limits at the likeliest values, N m."""
     length = max(_LENGTH, 1.0 / frequency)

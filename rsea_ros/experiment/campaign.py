@@ -16,7 +16,7 @@ from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.hypothesis import NOTHING, Hypothesis
 from rsea_ros.experiment.limits import used
 from rsea_ros.experiment.proposal import Asked, Proposal
-from rsea_ros.experiment.weighing import Weighing, weigh
+from rsea_ros.experiment.weighing import RunWeighing, weigh
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -72,12 +72,12 @@ class Rules:
 class Round:
     """The knowledge before a run, and the run. proposal: None in the last round."""
 
-    weighing: Weighing
+    weighing: RunWeighing
     proposal: Proposal | None
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CampaignOutcome:
     """How the loop ended. proofs: of pairs that no run separates. records: those that count, the first ones
     included. why: the failure, in words.
     """
@@ -89,7 +89,7 @@ class Outcome:
     why: str = ""
 
     @property
-    def weighing(self) -> Weighing:
+    def weighing(self) -> RunWeighing:
         """The weighing by all runs together."""
         return self.rounds[-1].weighing
 
@@ -109,12 +109,12 @@ class _Session:
     """The state of a campaign."""
 
     records: list[Record]
-    weighing: Weighing
+    weighing: RunWeighing
     rounds: list[Round] = field(default_factory=list)
 
-    def ended(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> Outcome:
+    def ended(self, end: End, proofs: tuple[Proof, ...] = (), why: str = "") -> CampaignOutcome:
         rounds = (*self.rounds, Round(self.weighing, None))
-        return Outcome(end, rounds, tuple(self.records), proofs, why)
+        return CampaignOutcome(end, rounds, tuple(self.records), proofs, why)
 
 
 @dataclass
@@ -133,7 +133,7 @@ class Campaign:
     choose: Callable[..., Proposal] = propose
     """How the next run is chosen; a bench puts other policies here."""
 
-    def go(self, records: Sequence[Record], first: Weighing | None = None) -> Outcome:
+    def go(self, records: Sequence[Record], first: RunWeighing | None = None) -> CampaignOutcome:
         """Run the loop from some records to its end. first: their weighing, if known.
 
         Raises IdentificationError where nothing can be fitted to them.
@@ -148,13 +148,13 @@ class Campaign:
             session.weighing = now
         return outcome
 
-    def possible(self, weighing: Weighing) -> list[Hypothesis]:
+    def possible(self, weighing: RunWeighing) -> list[Hypothesis]:
         """Return the causes for which a run is designed: those that may be, and those that fit as well."""
         near = weighing.near_by_data(self.rules.by_data)
         every = weighing.hypotheses()
         return [h for h in every if h.probability >= self.rules.possible or h.name in near][: self.rules.most]
 
-    def _round(self, session: _Session) -> Outcome | None:
+    def _round(self, session: _Session) -> CampaignOutcome | None:
         """Design a run and have it played; return the outcome, None where the loop continues."""
         weighing = session.weighing
         if end := self._known(weighing) or self._spent(session.rounds):
@@ -178,7 +178,7 @@ class Campaign:
         session.records.append(record)
         return None
 
-    def _known(self, weighing: Weighing) -> End | None:
+    def _known(self, weighing: RunWeighing) -> End | None:
         """Return the outcome by present knowledge, None where the loop continues."""
         if weighing.probability[weighing.best] < self.rules.confirmed:
             return None

@@ -15,12 +15,12 @@ import numpy as np
 
 from rsea_ros.errors import ParameterError
 from rsea_ros.experiment.hypothesis import Hypothesis
-from rsea_ros.experiment.judge import INSIDE, Judge, noise_by_channel
 from rsea_ros.experiment.margins import Group, Peaks, ends_of, peaks, share_used
 from rsea_ros.experiment.proposal import Asked, Proposal
 from rsea_ros.experiment.refine import refined
 from rsea_ros.experiment.separation import decided, refitted, separations, sharpened
 from rsea_ros.experiment.shape import Shape
+from rsea_ros.experiment.shape_rater import INSIDE, ShapeRater, noise_by_channel
 from rsea_ros.identification.solver import Map, serial
 from rsea_ros.model.rig import Rig
 from rsea_ros.progress import Progress
@@ -74,7 +74,7 @@ def propose(
     """
     say = tell or (lambda step, share: None)
     check_commanded_by_torque(hypotheses[0].problem.rig)
-    judge = Judge(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
+    judge = ShapeRater(hypotheses, asked, noise_by_channel(hypotheses, measured or {}), run)
     if len(hypotheses) == 1:
         return _sharpest(judge, say)
     shapes = [s for s in TRIED if s.kind in asked.kinds]
@@ -99,7 +99,7 @@ def propose(
     return _final(judge, shape, length, apart, 2 * len(shapes) + count)
 
 
-def _hopeless(judge: Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
+def _hopeless(judge: ShapeRater, shapes: Sequence[Shape], tables: Sequence[FloatArray]) -> BoolArray:
     """Return which pairs no shape tried separates either way, in the longest run, shape (k, k)."""
     stack, asked = np.array(tables), judge.asked
     apart = np.eye(len(judge.hypotheses), dtype=bool)
@@ -113,14 +113,16 @@ def _hopeless(judge: Judge, shapes: Sequence[Shape], tables: Sequence[FloatArray
     return apart
 
 
-def _per_second(judge: Judge, table: FloatArray, apart: BoolArray, asked: Asked) -> list[tuple[float, float]]:
+def _per_second(
+    judge: ShapeRater, table: FloatArray, apart: BoolArray, asked: Asked
+) -> list[tuple[float, float]]:
     """Return the share that a shape decides per second, and the length, for several lengths of the run."""
     lengths = np.geomspace(asked.shortest, asked.longest, 7)
     scaled = [(decided(table * s / asked.probe, judge.probability, apart), float(s)) for s in lengths]
     return [(share / (_PER_RUN + s), s) for share, s in scaled]
 
 
-def _final(judge: Judge, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
+def _final(judge: ShapeRater, shape: Shape, length: float, apart: BoolArray, tried: int) -> Proposal:
     """Return the proposal of a shape, as large as the limits allow under doubt, judged with full steps."""
     asked, hypotheses = judge.asked, judge.hypotheses
     command, found = held(judge.within(shape, length) / INSIDE, asked, ends_of(hypotheses))
@@ -164,7 +166,7 @@ def held(command: FloatArray, asked: Asked, groups: Sequence[Group]) -> tuple[Fl
     return best
 
 
-def _with_refits(judge: Judge, command: FloatArray, table: FloatArray) -> FloatArray:
+def _with_refits(judge: ShapeRater, command: FloatArray, table: FloatArray) -> FloatArray:
     """Return S with a full fit of each nearest rival, where one linear step does not settle it."""
     case, table = judge.case(command, is_quick=False), table.copy()
     for i, row in enumerate(table):
@@ -174,7 +176,7 @@ def _with_refits(judge: Judge, command: FloatArray, table: FloatArray) -> FloatA
     return table
 
 
-def _sharpest(judge: Judge, say: Progress) -> Proposal:
+def _sharpest(judge: ShapeRater, say: Progress) -> Proposal:
     """Return the run that narrows the parameters of a single cause most (D-optimality)."""
     asked = judge.asked
     shapes = [s for s in TRIED if s.kind in asked.kinds]

@@ -8,12 +8,12 @@ from typing import Any
 from rsea_ros.checked import mapping, number, text
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.errors import FieldError
-from rsea_ros.experiment.files import Model
+from rsea_ros.experiment.files import ModelFile
 from rsea_ros.experiment.hypothesis import NOTHING
 from rsea_ros.model.rig import EffectSetting, Rig
 
 
-def models_of(document: Mapping[str, Any], extended: Rig) -> list[Model]:
+def models_of(document: Mapping[str, Any], extended: Rig) -> list[ModelFile]:
     """Return the cause of a diagnosis that is most in doubt and its alternatives, each beside all other
     causes.
 
@@ -28,7 +28,7 @@ def models_of(document: Mapping[str, Any], extended: Rig) -> list[Model]:
         for i, a in enumerate(_list(document, "alternatives"))
     ]
     if not causes:
-        return [Model(NOTHING, extended, {})]
+        return [ModelFile(NOTHING, extended, {})]
     doubt = {c.name: sum(m.probability or 0.0 for n, m in others if n == c.name) for c in causes}
     name = max(doubt, key=lambda n: (doubt[n], n == causes[-1].name))
     asked = next(c for c in causes if c.name == name)
@@ -37,13 +37,13 @@ def models_of(document: Mapping[str, Any], extended: Rig) -> list[Model]:
     return [_placed(m, extended, rest) for m in group]
 
 
-def _placed(model: Model, extended: Rig, rest: tuple[EffectSetting, ...]) -> Model:
-    return Model(
+def _placed(model: ModelFile, extended: Rig, rest: tuple[EffectSetting, ...]) -> ModelFile:
+    return ModelFile(
         model.name, extended.with_effects(*rest, model.rig.effects[-1]), model.intervals, model.probability
     )
 
 
-def _cause(body: Mapping[str, Any], where: str, extended: Rig) -> Model:
+def _cause(body: Mapping[str, Any], where: str, extended: Rig) -> ModelFile:
     name = text(body.get("name", ""), f"{where}.name")
     effect = effect_named(name)
     sizes = mapping(body.get("parameters", {}), f"{where}.parameters")
@@ -57,7 +57,7 @@ def _cause(body: Mapping[str, Any], where: str, extended: Rig) -> Model:
                 intervals[f"{name}.{p.name}"] = (low, high)
     setting = EffectSetting(name, {**effect.typical, **values})
     probability = number(body.get("probability", 1.0), f"{where}.probability", "1")
-    return Model(name, extended.with_effects(setting), intervals, probability)
+    return ModelFile(name, extended.with_effects(setting), intervals, probability)
 
 
 def _list(document: Mapping[str, Any], key: str) -> list[Mapping[str, Any]]:

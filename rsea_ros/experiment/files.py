@@ -20,7 +20,7 @@ SPREAD = 0.2
 
 
 @dataclass(frozen=True)
-class Model:
+class ModelFile:
     """A cause in a rig. intervals: 95 %, of its parameters by name, SI. probability: None if unsaid."""
 
     name: str
@@ -29,13 +29,13 @@ class Model:
     probability: float | None = None
 
 
-def model_of(rig: Rig) -> Model:
+def model_of(rig: Rig) -> ModelFile:
     """Return a model.yaml as a model: its last effect is the cause, the others belong to the rig."""
     name = rig.effects[-1].name if rig.effects else NOTHING
-    return Model(name, rig, {})
+    return ModelFile(name, rig, {})
 
 
-def hypotheses_from(models: Sequence[Model]) -> list[Hypothesis]:
+def hypotheses_from(models: Sequence[ModelFile]) -> list[Hypothesis]:
     """Return models as hypotheses; those without a probability share the rest equally.
 
     Raises ParameterError for two models of one name and for less than one.
@@ -51,7 +51,7 @@ def hypotheses_from(models: Sequence[Model]) -> list[Hypothesis]:
     return [_hypothesis(m, float(p)) for m, p in zip(models, shares / shares.sum(), strict=True)]
 
 
-def _hypothesis(model: Model, probability: float) -> Hypothesis:
+def _hypothesis(model: ModelFile, probability: float) -> Hypothesis:
     """Return a model as a hypothesis around its values."""
     rig = model.rig
     setting = next((e for e in rig.effects if e.name == model.name), None)
@@ -75,7 +75,7 @@ def _clocks(problem: Problem, rig: Rig) -> tuple[Unknown, ...]:
     return tuple(u for u in clocks(sorted(listed), rig) if u.name not in known)
 
 
-def _sd(unknown: Unknown, coordinate: float, rig: Rig, model: Model) -> float:
+def _sd(unknown: Unknown, coordinate: float, rig: Rig, model: ModelFile) -> float:
     """Return one sigma of an unknown in the fit's coordinates: of its interval, else as stated or SPREAD."""
     quantity = rig.quantities.get(unknown.name, Quantity(0.0))
     pair = quantity.ci95 or model.intervals.get(unknown.name)

@@ -26,7 +26,7 @@ UNITS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Limits:
+class RunLimits:
     """The largest size of each quantity either way; infinite where nothing limits it.
 
     torque: of the command. slew: its change from one command to the next, over their period. heat: its RMS
@@ -60,7 +60,7 @@ class Limits:
         return {f.name: v for f in fields(self) if math.isfinite(v := getattr(self, f.name))}
 
 
-def limits_from(text: str) -> Limits:
+def limits_from(text: str) -> RunLimits:
     """Return the limits of `torque=20,velocity=0.5`. Raises ParameterError for text of another form."""
     values: dict[str, float] = {}
     for item in filter(None, text.split(",")):
@@ -75,7 +75,7 @@ def limits_from(text: str) -> Limits:
         values[name] = float(value)
     if "torque" not in values:
         raise ParameterError("--limits: no torque, expected at least torque=… in N m")
-    return Limits(**values)
+    return RunLimits(**values)
 
 
 def of_command(command: FloatArray, rate: float) -> dict[str, float]:
@@ -98,7 +98,7 @@ def of_response(command: FloatArray, outputs: Mapping[str, FloatArray]) -> dict[
     return peaks
 
 
-def used(peaks: Mapping[str, float], limits: Limits) -> float:
+def used(peaks: Mapping[str, float], limits: RunLimits) -> float:
     """Return the largest share of a limit that is used; above 1 one is broken."""
     shares = [peaks[n] / limit for n, limit in limits.stated().items() if n in peaks]
     return max((s if math.isfinite(s) else math.inf for s in shares), default=0.0)

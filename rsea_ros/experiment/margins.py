@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import norm
 
 from rsea_ros.experiment.hypothesis import Hypothesis, motion
-from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
@@ -115,6 +115,6 @@ def at_ends(values: FloatArray) -> float:
     return float(values[0] + np.sqrt(np.sum(increases**2)))
 
 
-def share_used(found: Peaks, limits: Limits) -> float:
+def share_used(found: Peaks, limits: RunLimits) -> float:
     """Return the largest share of a limit that is used at LEVEL."""
     return used(found.at_level, limits)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.errors import ParameterError
-from rsea_ros.experiment.limits import Limits
+from rsea_ros.experiment.limits import RunLimits
 from rsea_ros.experiment.margins import Peaks
 from rsea_ros.experiment.shape import Kind, Shape
 from rsea_ros.signals import FloatArray
@@ -17,7 +17,7 @@ from rsea_ros.signals import FloatArray
 class Asked:
     """The freedom of a design. rate: Hz. shortest, longest: s. refine: evaluations of the refinement."""
 
-    limits: Limits
+    limits: RunLimits
     rate: float = 280.0
     shortest: float = 0.5
     longest: float = 10.0

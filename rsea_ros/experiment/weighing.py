@@ -32,7 +32,7 @@ HOPELESS = 1e-6
 
 
 @dataclass(frozen=True)
-class Weighed:
+class WeighedCause:
     """A cause fitted to all records. log_evidence: see the module; left: RMS over the noise."""
 
     name: str
@@ -42,11 +42,11 @@ class Weighed:
 
 
 @dataclass(frozen=True)
-class Weighing:
+class RunWeighing:
     """The result from all records. probability: by cause, for those not dropped before; they sum to 1."""
 
     cases: tuple[Case, ...]
-    fits: Mapping[str, Weighed]
+    fits: Mapping[str, WeighedCause]
     probability: Mapping[str, float]
     scale: float
 
@@ -111,9 +111,9 @@ def weigh(
     records: Sequence[Record],
     rig: Rig,
     causes: Sequence[str],
-    before: Weighing | None = None,
+    before: RunWeighing | None = None,
     run: Map = serial,
-) -> Weighing:
+) -> RunWeighing:
     """Weigh causes, and that there is none, by all records of a bench.
 
     before: the weighing of the earlier records; fits continue from it, and HOPELESS causes are left
@@ -131,7 +131,7 @@ def weigh(
     return _weighed(fitted_again(solutions, run), cases)
 
 
-def _where(before: Weighing | None, name: str) -> FloatArray | None:
+def _where(before: RunWeighing | None, name: str) -> FloatArray | None:
     """Return where the fit of a cause ended before, None for one that was not fitted."""
     return before.fits[name].solution.theta if before is not None and name in before.fits else None
 
@@ -143,13 +143,13 @@ def information_of(solution: Solution, scale: float) -> FloatArray:
     return result
 
 
-def _weighed(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> Weighing:
+def _weighed(solutions: Mapping[str, Solution], cases: tuple[Case, ...]) -> RunWeighing:
     samples = max(len(next(iter(solutions.values())).residual), 1)
     scale = max(1.0, min(s.cost for s in solutions.values()) / samples)
-    fits = {n: Weighed(n, s, _evidence(s, scale), _left(s)) for n, s in solutions.items()}
+    fits = {n: WeighedCause(n, s, _evidence(s, scale), _left(s)) for n, s in solutions.items()}
     logs = np.array([f.log_evidence for f in fits.values()])
     shares = np.exp(logs - logs.max())
-    return Weighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
+    return RunWeighing(cases, fits, dict(zip(fits, (shares / shares.sum()).tolist(), strict=True)), scale)
 
 
 def _evidence(solution: Solution, scale: float) -> float:

@@ -18,7 +18,7 @@ from rsea_ros.fleet.executor import Done, Executor, Job, WorkerLost
 from rsea_ros.fleet.plan import Held
 from rsea_ros.fleet.rate import Rate
 from rsea_ros.fleet.sources import Bag
-from rsea_ros.fleet.store import Outcome, Store
+from rsea_ros.fleet.store import Store, TaskOutcome
 from rsea_ros.fleet.summary import Summary
 from rsea_ros.fleet.task import Changed, Task, read_fingerprint, reason
 from rsea_ros.progress import Progress
@@ -33,7 +33,7 @@ _TURN = 1.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class EngineLimits:
     """memory: bytes that a worker may have, None for no limit.
 
     back_off: s before the second attempt of a task whose worker was lost; twice as long before each further.
@@ -50,13 +50,13 @@ class Engine:
         self,
         store: Store,
         executor: Executor,
-        work: Callable[[Task], Outcome],
+        work: Callable[[Task], TaskOutcome],
         tell: Progress,
-        limits: Limits | None = None,
+        limits: EngineLimits | None = None,
     ) -> None:
         self._store, self._executor, self._work = store, executor, work
         self._keys, self._recordings = store.known()
-        self._limits, self._tell = limits or Limits(), tell
+        self._limits, self._tell = limits or EngineLimits(), tell
         self._ready: deque[Job] = deque()
         self._later: list[tuple[float, int, Job]] = []
         self._order, self._in_flight = count(), 0
@@ -168,9 +168,9 @@ class Engine:
             self._summary.unreadable.append(reason(f"{what}{error}"))
 
     def _quarantine(self, task: Task, why: str) -> None:
-        self._put(Outcome(task.row(outcome="quarantined", reason=reason(why))))
+        self._put(TaskOutcome(task.row(outcome="quarantined", reason=reason(why))))
 
-    def _put(self, outcome: Outcome) -> None:
+    def _put(self, outcome: TaskOutcome) -> None:
         row = outcome.row
         self._store.put(outcome)
         self._summary.outcomes[row["outcome"]] += 1

@@ -34,7 +34,7 @@ LOOSE = 64
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TaskOutcome:
     """The outcome of a task: its row, and the texts of its artefacts by file name."""
 
     row: Row
@@ -57,7 +57,7 @@ class Store:
         """Return the keys of all rows, and the recording of every bag by path, bytes and stamp."""
         return known_rows(self.rows)
 
-    def put(self, outcome: Outcome) -> None:
+    def put(self, outcome: TaskOutcome) -> None:
         """Write artefacts, then the row: a killed writer leaves artefacts without a row, never the reverse.
 
         Raises OSError, and OutputError for a row that the store has.

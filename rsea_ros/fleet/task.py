@@ -17,7 +17,7 @@ from rsea_ros.errors import RseaError
 from rsea_ros.fleet.joints import Joint
 from rsea_ros.fleet.row import Row, analysis_of, empty
 from rsea_ros.fleet.sources import Bag, fingerprint, local_copy, relisted
-from rsea_ros.fleet.store import Outcome
+from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.identification.workers import on_cores
 from rsea_ros.wording import brief
 
@@ -70,7 +70,7 @@ def read_fingerprint(bag: Bag) -> tuple[Bag, str]:
     return before, digest
 
 
-def work(task: Task) -> Outcome:
+def work(task: Task) -> TaskOutcome:
     """Read, check, identify and, on request, diagnose; return row and artefacts.
 
     An error in the recording becomes the row's outcome and reason. Raises Changed as read_fingerprint.
@@ -91,7 +91,7 @@ def work(task: Task) -> Outcome:
             row |= {"outcome": "quarantined", "reason": reason(_fault(error))}
     if _now(task.bag) != task.bag:
         raise Changed(task.bag.url)
-    return Outcome(row | {"seconds": time.perf_counter() - begin, "peak_memory": _peak()}, files)
+    return TaskOutcome(row | {"seconds": time.perf_counter() - begin, "peak_memory": _peak()}, files)
 
 
 def reason(text: str) -> str:

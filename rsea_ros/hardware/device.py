@@ -39,6 +39,7 @@ class State:
     motor_trouble: settings that the motor has lost, such as torque off, in words.
     deflection: rad, of the spring, from a second encoder, the drive's side less the distal one; nan without.
     inferred: whether the wrench is stiffness times deflection, not measured.
+    acknowledged_late: whether the reply to a write that raised NoReply arrived during this reading.
     """
 
     stamp: int
@@ -56,6 +57,7 @@ class State:
     motor_trouble: str = ""
     deflection: float = math.nan
     inferred: bool = False
+    acknowledged_late: bool = False
 
 
 class Device(Protocol):

@@ -91,6 +91,7 @@ class DynamixelNetft:
             hardware_error=sample.hardware_error,
             ft_trouble=trouble,
             motor_trouble=sample.trouble,
+            acknowledged_late=self._motor.acknowledged_late,
         )
         return self._last
 

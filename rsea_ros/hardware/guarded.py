@@ -86,6 +86,8 @@ class Guarded:
             self._failed("read", error)
             return None
         self._losses["read"].take(lost=False)
+        if state.acknowledged_late:
+            self._losses["write"].take_back()
         self.guard.look(state)
         self.state = state
         return state

@@ -28,7 +28,7 @@ class Limits:
     """
 
     torque: float
-    slew: float = 40_000.0
+    slew: float = 10_000.0
     deflection: float = math.radians(5.0)
     temperature: float = 70.0
     current: float = math.inf

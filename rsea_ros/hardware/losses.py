@@ -24,6 +24,13 @@ class Losses:
         self._recent.clear()
         self._in_a_row = self._count = 0
 
+    def take_back(self) -> None:
+        """Count the last answer, which was lost, as one that came after all."""
+        if self._recent and self._recent[-1]:
+            self._recent[-1] = False
+            self._count -= 1
+        self._in_a_row = 0
+
     def take(self, *, lost: bool) -> Fault | None:
         """Take in whether the answer of a cycle was lost; return the fault that it is."""
         if len(self._recent) == self._recent.maxlen:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.log import FT, STATE
@@ -27,7 +27,7 @@ HEAVY = 8.0
 """Standard deviations beyond which an innovation counts for less: an outlier counts no more than the rest."""
 
 
-class Evidence(NamedTuple):
+class LookEvidence(NamedTuple):
     """Of one look by channel: c (3, p), A (3, p, p), sum of squares and number of innovations, shape (3,)."""
 
     score: FloatArray
@@ -44,16 +44,16 @@ class Evidence(NamedTuple):
 class Bank:
     """The observers of a rig. hold: how long a command stays in force, s."""
 
-    def __init__(self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], hold: float) -> None:
+    def __init__(self, rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], hold: float) -> None:
         self._steps = np.array([[h.step] for h in hypotheses])
         rigs = (rig, *(h.changed(rig, h.step) for h in hypotheses))
         self._observers = [BatchObserver(each, noise, hold=hold) for each in rigs]
 
-    def judge(self, look: Look) -> Evidence:
+    def judge(self, look: Look) -> LookEvidence:
         """Return the evidence of a look."""
         by_channel = [whitened(observer, look) for observer in self._observers]
         p, n = len(self._steps), len(CHANNELS)
-        found = Evidence(np.zeros((n, p)), np.zeros((n, p, p)), np.zeros(n), np.zeros(n))
+        found = LookEvidence(np.zeros((n, p)), np.zeros((n, p, p)), np.zeros(n), np.zeros(n))
         for channel in range(n):
             w = np.array([each[channel] for each in by_channel])
             w = w[:, np.isfinite(w).all(axis=0)]

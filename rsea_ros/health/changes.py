@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rsea_ros.health.bank import CHANNELS, Bank, Evidence
+from rsea_ros.health.bank import CHANNELS, Bank, LookEvidence
 from rsea_ros.health.cusum import Cusum, threshold
 from rsea_ros.health.estimates import Estimates
-from rsea_ros.health.finding import UNEXPLAINED, Finding, unexplained
-from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.finding import UNEXPLAINED, HealthFinding, unexplained
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import SETTLE, Look
 from rsea_ros.health.scatter import Scatter
-from rsea_ros.health.settings import Settings
-from rsea_ros.health.single_cause import Cause, Fitter
+from rsea_ros.health.settings import WatchSettings
+from rsea_ros.health.single_cause import ChangeCause, Fitter
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
 
@@ -44,7 +44,7 @@ class _Base:
     """The model that a joint is compared with, and its date (s)."""
 
     rig: Rig
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[ChangeHypothesis, ...]
     since: float = -math.inf
     last: str = ""
 
@@ -56,8 +56,8 @@ class Answer:
     The second are also fitted to the looks right after its adoption; first is the model's cost on these.
     """
 
-    beside: Sequence[Cause]
-    instead: Sequence[Cause]
+    beside: Sequence[ChangeCause]
+    instead: Sequence[ChangeCause]
     first: float
 
 
@@ -68,15 +68,15 @@ class Changes:
     """Pass looks to `take`; when there is a `job`, run it and pass its result to `conclude`."""
 
     def __init__(
-        self, rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], models: Mapping[str, float],
-        scatter: Scatter, settings: Settings,
+        self, rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], models: Mapping[str, float],
+        scatter: Scatter, settings: WatchSettings,
     ) -> None:  # fmt: skip
         """models: values of the last model by name, against which sizes are said."""
         self._noise, self._scatter, self._settings = noise, scatter, settings
         self._models = dict(models)
         self._looks: deque[Look] = deque(maxlen=REMEMBERED)
         self._before: _Base | None = None
-        self.found: dict[str, Finding] = {}
+        self.found: dict[str, HealthFinding] = {}
         self.job: Job | None = None
         self._begin(_Base(rig, tuple(hypotheses)))
 
@@ -96,7 +96,7 @@ class Changes:
         """Whether more should be looked at."""
         return self._cusum.suspects
 
-    def take(self, look: Look, evidence: Evidence) -> None:
+    def take(self, look: Look, evidence: LookEvidence) -> None:
         """Process a look with motion."""
         self._looks.append(look)
         score, information = evidence.scaled(self._scatter.scale)
@@ -131,7 +131,7 @@ class Changes:
     def _fitter(self, base: _Base, looks: Sequence[Look]) -> Fitter:
         return Fitter(base.rig, self._noise, self._settings.hold, looks, self._scatter.scale)
 
-    def conclude(self, answer: Answer) -> Finding | None:
+    def conclude(self, answer: Answer) -> HealthFinding | None:
         """Take the result of the job; return the finding that is new, if one is."""
         self.job = None
         both = answer.beside[0].cost + answer.first
@@ -141,7 +141,7 @@ class Changes:
             return self._weigh(answer.instead)
         return self._weigh(answer.beside)
 
-    def _weigh(self, causes: Sequence[Cause]) -> Finding | None:
+    def _weigh(self, causes: Sequence[ChangeCause]) -> HealthFinding | None:
         """Name the best cause, take it over where it is sure, wait for more where it is not."""
         best, code = causes[0], causes[0].hypothesis.code
         confidence = sum(c.probability for c in causes if c.hypothesis.code == code)
@@ -154,13 +154,13 @@ class Changes:
             return self._later(finding if _is_change(best.hypothesis, finding.size) else None)
         return self._adopt(best, finding)
 
-    def _finding(self, cause: Cause, confidence: float) -> Finding:
+    def _finding(self, cause: ChangeCause, confidence: float) -> HealthFinding:
         h, half = cause.hypothesis, 0.5 * (cause.ci95[1] - cause.ci95[0])
         size = h.value + cause.change - self._models[h.name]
         since = self.found[h.name].since if h.name in self.found else self._began
-        return Finding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
+        return HealthFinding(h.code, h.name, h.unit, size, (size - half, size + half), since, confidence)
 
-    def _later(self, finding: Finding | None) -> Finding | None:
+    def _later(self, finding: HealthFinding | None) -> HealthFinding | None:
         """Report an unsure cause, and fit again after twice as many looks as before."""
         self._patience = min(2 * self._patience + 2, REMEMBERED)
         self._wait = self._patience
@@ -172,7 +172,7 @@ class Changes:
         self.found[finding.name] = finding
         return None if known else finding
 
-    def _adopt(self, cause: Cause, finding: Finding) -> Finding | None:
+    def _adopt(self, cause: ChangeCause, finding: HealthFinding) -> HealthFinding | None:
         """Adopt a cause into the model; a change within the model's doubt does not count."""
         h = cause.hypothesis
         adopted = replace(h, value=h.value + cause.change)
@@ -189,7 +189,7 @@ class Changes:
         return finding
 
 
-def _is_change(hypothesis: Hypothesis, size: float) -> bool:
+def _is_change(hypothesis: ChangeHypothesis, size: float) -> bool:
     """Return whether a parameter that is so far off the last model is beyond that model's doubt."""
     return abs(size) > hypothesis.inner + 0.5 * hypothesis.least
 

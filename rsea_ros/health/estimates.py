@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.normal import Z95
 from rsea_ros.signals import FloatArray
 
@@ -26,7 +26,7 @@ WEAK = 3.0
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ChangeEstimate:
     """Value of a parameter with its 95 % interval, in its unit, and whether the last look held it."""
 
     name: str
@@ -39,7 +39,7 @@ class Estimate:
 class Estimates:
     """The estimates of all hypotheses of a bank."""
 
-    def __init__(self, hypotheses: Sequence[Hypothesis]) -> None:
+    def __init__(self, hypotheses: Sequence[ChangeHypothesis]) -> None:
         self._hypotheses = tuple(hypotheses)
         p = len(self._hypotheses)
         self._information, self._score = np.zeros(p), np.zeros(p)
@@ -59,13 +59,13 @@ class Estimates:
         """Process a look without motion."""
         self._held[:] = True
 
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[ChangeEstimate]:
         """Return value and interval of each parameter."""
         variance = 1.0 / (self._information + self._prior)
         common = np.array([h.common for h in self._hypotheses])
         change, half = variance * self._score, Z95 * np.sqrt(variance + common**2)
         return [
-            Estimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
+            ChangeEstimate(h.name, h.unit, h.value + c, (h.value + c - d, h.value + c + d), held)
             for h, c, d, held in zip(
                 self._hypotheses, change.tolist(), half.tolist(), self._held.tolist(), strict=True
             )

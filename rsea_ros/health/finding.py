@@ -9,7 +9,7 @@ from rsea_ros.health.sensors import Sensors
 
 
 @dataclass(frozen=True)
-class Finding:
+class HealthFinding:
     """code: of codes.TABLE. name: parameter or channel. size, ci95: change against the model, in `unit`; nan
     where the code has no size. since: s, by the joint's stamps. confidence: probability, 0 to 1.
     """
@@ -26,12 +26,12 @@ class Finding:
 UNEXPLAINED = "RSEA_UNEXPLAINED"
 
 
-def unexplained(since: float, share: float) -> Finding:
+def unexplained(since: float, share: float) -> HealthFinding:
     """Return the finding of a change without a name. share: of it that the best cause does not explain."""
-    return Finding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
+    return HealthFinding(UNEXPLAINED, UNEXPLAINED, "", math.nan, (math.nan, math.nan), since, share)
 
 
-def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[Finding]:
+def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[HealthFinding]:
     """Return the findings on the sensors themselves. jumps: of the stamps. late: samples left out."""
     found = [_plain("RSEA_SENSOR_FROZEN", name, since) for name, since in sensors.frozen.items()]
     found += [_plain("RSEA_SENSOR_MISSING", name, since) for name, since in sensors.missing.items()]
@@ -40,5 +40,5 @@ def sensor_findings(sensors: Sensors, jumps: int, late: int) -> list[Finding]:
     return [*found, _plain("RSEA_BAD_DATA", told, math.nan)] if told else found
 
 
-def _plain(code: str, name: str, since: float) -> Finding:
-    return Finding(code, name, "", math.nan, (math.nan, math.nan), since, 1.0)
+def _plain(code: str, name: str, since: float) -> HealthFinding:
+    return HealthFinding(code, name, "", math.nan, (math.nan, math.nan), since, 1.0)

@@ -20,7 +20,7 @@ EFFECT_DOUBT = 0.1
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class ChangeHypothesis:
     """One parameter of the joint. All numbers in its unit.
 
     value: the model's. doubt: one sigma of it. least: smallest change beyond that doubt that is worth an
@@ -59,7 +59,7 @@ class Hypothesis:
         return self.apply(rig, value / self.value if self.relative else value)
 
 
-def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
+def hypotheses_of(rig: Rig, period: float) -> tuple[ChangeHypothesis, ...]:
     """Return the possible changes of a joint. period: s, between measurements."""
     found = [_field(rig, "rotor.reflected_damping", "RSEA_FRICTION", 0.25)]
     found.append(_effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.25, 0.5, 0.5))
@@ -80,14 +80,14 @@ def hypotheses_of(rig: Rig, period: float) -> tuple[Hypothesis, ...]:
     return tuple(h for h in found if h is not None)
 
 
-def nuisances_of(rig: Rig) -> tuple[Hypothesis, ...]:
+def nuisances_of(rig: Rig) -> tuple[ChangeHypothesis, ...]:
     """Return parameters without a code that may be slightly wrong in the model: inertia, spring damping."""
     names = ["rotor.reflected_inertia", *([] if rig.rigid_spring else ["spring.damping"])]
     found = (_field(rig, name, "", 0.1) for name in names)
     return tuple(h for h in found if h is not None)
 
 
-def _friction(rig: Rig) -> Hypothesis:
+def _friction(rig: Rig) -> ChangeHypothesis:
     """Return the hypothesis that viscous and Coulomb friction grow together, as in a cold or a worn gear."""
     name = "rotor.reflected_damping"
     dry = _effect(rig, "coulomb_friction", "torque", "RSEA_FRICTION", 0.0, 0.0, 0.0)
@@ -96,18 +96,18 @@ def _friction(rig: Rig) -> Hypothesis:
         torque = next((e.parameters["torque"] for e in rig.effects if e.name == "coulomb_friction"), 0.0)
         return dry.apply(rig.with_values({name: factor * rig[name]}), factor * torque)
 
-    return Hypothesis(
+    return ChangeHypothesis(
         "RSEA_FRICTION", FACTOR, "1", 1.0, EFFECT_DOUBT, 0.2, 0.2, 0.05, 20.0, scaled,
         relative=True,
     )  # fmt: skip
 
 
-def _field(rig: Rig, name: str, code: str, part: float) -> Hypothesis | None:
+def _field(rig: Rig, name: str, code: str, part: float) -> ChangeHypothesis | None:
     """Return the hypothesis of a rig's value; part of it that is worth an alarm."""
     value = rig[name]
     if not value > 0.0 or math.isinf(value):
         return None
-    return Hypothesis(
+    return ChangeHypothesis(
         code, name, rig.unit(name), value, _doubt(rig, name), part * value, part * value, 0.02 * value,
         50.0 * value, lambda rig, v: rig.with_values({name: v}),
     )  # fmt: skip
@@ -122,13 +122,13 @@ def _doubt(rig: Rig, name: str) -> float:
 
 def _effect(
     rig: Rig, name: str, parameter: str, code: str, part: float, least: float, step: float
-) -> Hypothesis:
+) -> ChangeHypothesis:
     """Return the hypothesis of an effect's parameter. part: of the model's value that is worth an alarm."""
     effect = effect_named(name)
     (which,) = (p for p in effect.parameters if p.name == parameter)
     value = next((e.parameters[parameter] for e in rig.effects if e.name == name), which.null)
     known = abs(value - which.null)
-    return Hypothesis(
+    return ChangeHypothesis(
         code, f"{name}.{parameter}", which.unit, value, EFFECT_DOUBT * known, max(least, part * known),
         max(step, part * known), which.low, which.high, lambda rig, v: _set(rig, name, parameter, v),
     )  # fmt: skip

@@ -11,13 +11,13 @@ import numpy as np
 from rsea_ros.errors import RigError
 from rsea_ros.health.bank import Bank
 from rsea_ros.health.changes import Answer, Changes
-from rsea_ros.health.estimates import Estimate
-from rsea_ros.health.finding import Finding, sensor_findings
-from rsea_ros.health.hypotheses import FACTOR, GAINS, Hypothesis, hypotheses_of, nuisances_of
+from rsea_ros.health.estimates import ChangeEstimate
+from rsea_ros.health.finding import HealthFinding, sensor_findings
+from rsea_ros.health.hypotheses import FACTOR, GAINS, ChangeHypothesis, hypotheses_of, nuisances_of
 from rsea_ros.health.look import FEWEST, Cutter, Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.health.sensors import Sensors
-from rsea_ros.health.settings import Settings
+from rsea_ros.health.settings import WatchSettings
 from rsea_ros.health.tuning import tuned
 from rsea_ros.model.observer.log import STATE
 from rsea_ros.model.observer.noise import Noise
@@ -39,11 +39,11 @@ class Monitor:
     out.
     """
 
-    def __init__(self, rig: Rig, noise: Noise, settings: Settings | None = None) -> None:
+    def __init__(self, rig: Rig, noise: Noise, settings: WatchSettings | None = None) -> None:
         """Raises RigError for a rig that the observer cannot follow."""
         if rig.loop is not None:
             raise RigError(f"rig {rig.name}: a position loop commands it, expected torques as commands")
-        self._rig, self._noise, self._settings = rig, noise, settings or Settings()
+        self._rig, self._noise, self._settings = rig, noise, settings or WatchSettings()
         Bank(rig, noise, hypotheses_of(rig, USUAL), self._settings.hold)
         self._least = STILL * noise.position if math.isfinite(noise.position) else 0.0
         self.sensors = Sensors(rig)
@@ -85,17 +85,17 @@ class Monitor:
         """The computation that the next finding needs."""
         return None if self.changes is None else self.changes.job
 
-    def conclude(self, answer: Answer) -> Finding | None:
+    def conclude(self, answer: Answer) -> HealthFinding | None:
         """Take the result of the job; return the finding that is new, if one is."""
         assert self.changes is not None
         return self.changes.conclude(answer)
 
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[HealthFinding]:
         """Return the present findings."""
         changed = [] if self.changes is None else list(self.changes.found.values())
         return [*changed, *sensor_findings(self.sensors, self.jumps, self.late)]
 
-    def estimates(self) -> list[Estimate]:
+    def estimates(self) -> list[ChangeEstimate]:
         """Return all parameters; none while it learns."""
         return [] if self.changes is None else self.changes.estimates.estimates()
 
@@ -127,7 +127,7 @@ class Monitor:
         )
         self._start(rig, hypotheses, {h.name: h.value for h in models})
 
-    def _start(self, rig: Rig, hypotheses: tuple[Hypothesis, ...], models: dict[str, float]) -> None:
+    def _start(self, rig: Rig, hypotheses: tuple[ChangeHypothesis, ...], models: dict[str, float]) -> None:
         """Watch for changes from a rig, and from the first looks on."""
         bank = Bank(rig, self._noise, hypotheses, self._settings.hold)
         first, self._first = [(look, bank.judge(look)) for look in self._first], []

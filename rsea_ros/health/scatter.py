@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.health.bank import CHANNELS, Evidence
+from rsea_ros.health.bank import CHANNELS, LookEvidence
 from rsea_ros.signals import FloatArray
 
 SCALES = 0.3, 3.0
@@ -28,12 +28,12 @@ class Scatter:
     level: FloatArray
     spread: FloatArray
 
-    def excess(self, evidence: Evidence) -> FloatArray:
+    def excess(self, evidence: LookEvidence) -> FloatArray:
         """Return by how many of its standard deviations each channel of a look is louder than usual, (3,)."""
         return (_loudness(evidence) - self.level) / self.spread
 
 
-def scatter_of(looks: Sequence[Evidence]) -> Scatter:
+def scatter_of(looks: Sequence[LookEvidence]) -> Scatter:
     """Return the scatter of some looks; a change that lasts through them is not taken for scatter."""
     squares, counts = (np.sum([getattr(e, n) for e in looks], axis=0) for n in ("squares", "counts"))
     scale = np.clip(np.sqrt(squares / np.maximum(counts, 1.0)), *SCALES)
@@ -50,7 +50,7 @@ def scatter_of(looks: Sequence[Evidence]) -> Scatter:
     )
 
 
-def _loudness(evidence: Evidence) -> FloatArray:
+def _loudness(evidence: LookEvidence) -> FloatArray:
     """Return the logarithm of the mean square by channel; zero for a missing one."""
     there = evidence.counts > 0.0
     mean = np.where(there, evidence.squares, 1.0) / np.where(there, evidence.counts, 1.0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Settings:
+class WatchSettings:
     """rate: false alarms an hour. every: s between looks. learn: looks that show how the innovations scatter.
 
     fitted: looks that a cause is fitted to. hold: s, how long a command stays in force.

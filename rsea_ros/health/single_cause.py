@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.health.bank import whitened
-from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.model.observer.batch import BatchObserver
 from rsea_ros.model.observer.noise import Noise
@@ -36,13 +36,13 @@ STARTS = (-3.0, 3.0, 12.0)
 
 
 @dataclass(frozen=True)
-class Cause:
+class ChangeCause:
     """A fitted cause. change, ci95: in the parameter's unit. probability: among the causes that were fitted.
 
     explained: part of the excess of the innovations that it explains. cost: of the fit (see Fitter).
     """
 
-    hypothesis: Hypothesis
+    hypothesis: ChangeHypothesis
     change: float
     ci95: tuple[float, float]
     probability: float
@@ -56,7 +56,7 @@ _Point = tuple[float, FloatArray, float]
 
 @dataclass(frozen=True)
 class _Fit:
-    hypothesis: Hypothesis
+    hypothesis: ChangeHypothesis
     change: float
     cost: float
     sigma: float
@@ -69,7 +69,7 @@ class Fitter:
         self._rig, self._noise, self._hold = rig, noise, hold
         self._looks, self._scale = looks, scale
 
-    def causes(self, hypotheses: Sequence[Hypothesis], starts: FloatArray) -> list[Cause]:
+    def causes(self, hypotheses: Sequence[ChangeHypothesis], starts: FloatArray) -> list[ChangeCause]:
         """Return the causes, the most probable first. starts: changes to begin with, (p,)."""
         before = self._innovations(self._rig)
         usual = WHITE * float(np.isfinite(before).sum())
@@ -85,7 +85,7 @@ class Fitter:
         shares = (weights / weights.sum()).tolist()
         explained = [(excess + usual - f.cost) / max(excess, 1.0) for f in fits]
         found = [
-            Cause(f.hypothesis, f.change, _interval(f, phi), share, part, f.cost)
+            ChangeCause(f.hypothesis, f.change, _interval(f, phi), share, part, f.cost)
             for f, share, part in zip(fits, shares, explained, strict=True)
         ]
         return sorted(found, key=lambda cause: -cause.probability)
@@ -94,14 +94,14 @@ class Fitter:
         """Return the cost of the unchanged rig on the looks; zero without any."""
         return cost(self._innovations(self._rig)) if self._looks else 0.0
 
-    def _start(self, hypothesis: Hypothesis, start: float) -> _Point:
+    def _start(self, hypothesis: ChangeHypothesis, start: float) -> _Point:
         """Return the best of some changes to begin with."""
         low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         starts = (start, *(k * hypothesis.least for k in STARTS))
         tried = [self._at(hypothesis, change) for change in {min(max(s, low), high) for s in starts}]
         return min(tried, key=lambda one: one[2])
 
-    def _fit(self, hypothesis: Hypothesis, first: _Point, limit: float) -> _Fit:
+    def _fit(self, hypothesis: ChangeHypothesis, first: _Point, limit: float) -> _Fit:
         """Return the best fit of one hypothesis: Gauss-Newton with the weights of the cost."""
         low, high = hypothesis.low - hypothesis.value, hypothesis.high - hypothesis.value
         change, w, size = first
@@ -126,7 +126,7 @@ class Fitter:
                 break
         return _Fit(hypothesis, change, size, max(sigma, 0.5 * hypothesis.grain / Z95))
 
-    def _at(self, hypothesis: Hypothesis, change: float) -> _Point:
+    def _at(self, hypothesis: ChangeHypothesis, change: float) -> _Point:
         """Return a change, its innovations and their cost."""
         w = self._innovations(hypothesis.changed(self._rig, change))
         return change, w, cost(w)

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.health.bank import Bank, Evidence
-from rsea_ros.health.hypotheses import Hypothesis
+from rsea_ros.health.bank import Bank, LookEvidence
+from rsea_ros.health.hypotheses import ChangeHypothesis
 from rsea_ros.health.look import Look
 from rsea_ros.health.scatter import scatter_of
 from rsea_ros.model.observer.noise import Noise
@@ -30,8 +30,8 @@ ROUNDS = 2
 
 
 def tuned(
-    rig: Rig, noise: Noise, hypotheses: Sequence[Hypothesis], looks: Sequence[Look], hold: float
-) -> tuple[Rig, tuple[Hypothesis, ...]]:
+    rig: Rig, noise: Noise, hypotheses: Sequence[ChangeHypothesis], looks: Sequence[Look], hold: float
+) -> tuple[Rig, tuple[ChangeHypothesis, ...]]:
     """Return rig and hypotheses with the values that the looks have, within the doubts."""
     total, now, first = np.zeros(len(hypotheses)), tuple(hypotheses), rig
     for _ in range(ROUNDS):
@@ -49,7 +49,7 @@ def tuned(
 
 
 def _change(
-    found: Sequence[Evidence], hypotheses: Sequence[Hypothesis], before: FloatArray
+    found: Sequence[LookEvidence], hypotheses: Sequence[ChangeHypothesis], before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the change of each parameter in all and its sigma, (p,). before: as the looks were judged."""
     from scipy.optimize import lsq_linear  # takes 0.2 s that only this needs

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rsea_ros.identification.problem import Case
-from rsea_ros.identification.spectra import HANN, OVERLAP, Shape, segment_spectra, shape_of
+from rsea_ros.identification.spectra import HANN, OVERLAP, SpectralShape, segment_spectra, shape_of
 from rsea_ros.identification.witnesses import witnesses
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -83,7 +83,7 @@ def _slow(values: FloatArray, rate: float) -> float:
     return float(power[low].mean() / max(power[above].mean(), 1e-300))
 
 
-def _unsteady(spectra: ComplexArray, shape: Shape, rate: float) -> float:
+def _unsteady(spectra: ComplexArray, shape: SpectralShape, rate: float) -> float:
     """Return the variance of the whitened power over time, over stationary noise's, in the worst band."""
     power = np.abs(spectra) ** 2 / shape.at(np.linspace(0.0, 1.0, spectra.shape[1]))
     ratios = [0.0]
@@ -94,7 +94,7 @@ def _unsteady(spectra: ComplexArray, shape: Shape, rate: float) -> float:
     return max(ratios)
 
 
-def _kurtosis(shape: Shape, values: FloatArray) -> float:
+def _kurtosis(shape: SpectralShape, values: FloatArray) -> float:
     """Return the excess kurtosis of whitened values."""
     white = shape.whitened(values)
     white = white - white.mean()

@@ -34,7 +34,7 @@ def segment_spectra(values: FloatArray, longest: int, fewest: int) -> ComplexArr
 
 
 @dataclass(frozen=True)
-class Shape:
+class SpectralShape:
     """A spectrum that never rises with frequency. share: of the Nyquist frequency. level: power, falling.
 
     off: standard deviations by which the worst band of the measured spectrum lies off it.
@@ -58,7 +58,7 @@ class Shape:
         return white
 
 
-def shape_of(spectra: ComplexArray) -> Shape:
+def shape_of(spectra: ComplexArray) -> SpectralShape:
     """Return the falling spectrum nearest to the mean of some segments', in bands of equal ratio."""
     lines = spectra.shape[1]
     edges = np.unique(np.append(1, np.round(np.geomspace(2, _TOP * lines, _BANDS)).astype(np.int64)))
@@ -67,7 +67,7 @@ def shape_of(spectra: ComplexArray) -> Shape:
     freedom = 1.8 * count * len(spectra) / OVERLAP / np.where(count > 2, HANN, 1.0)
     level = falling(measured, freedom)
     off = float(np.max(np.abs(np.log(measured / level)) * np.sqrt(freedom / 2.0)))
-    return Shape(np.sqrt(edges[:-1] * (edges[1:] - 1.0)) / (lines - 1.0), level, off)
+    return SpectralShape(np.sqrt(edges[:-1] * (edges[1:] - 1.0)) / (lines - 1.0), level, off)
 
 
 def falling(levels: FloatArray, weights: FloatArray) -> FloatArray:

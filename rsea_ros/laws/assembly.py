@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_ros.laws.candidates import SPLINES, Candidate, basis_of, spline_knots
-from rsea_ros.laws.columns import Bench
+from rsea_ros.laws.candidates import SPLINES, TermCandidate, basis_of, spline_knots
+from rsea_ros.laws.columns import LawBench
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.law import Curve, Law, Part, joined
@@ -21,7 +21,7 @@ _RIDGE = 1e-4
 
 
 def law_of(
-    gram: Gram, candidates: Sequence[Candidate], benches: Sequence[Bench], models: Sequence[Model]
+    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], models: Sequence[Model]
 ) -> list[Law]:
     """Return the laws of some models fitted together, those of one place as one."""
     first = len(gram.prior)
@@ -47,7 +47,7 @@ def law_of(
 
 
 def curve_of(
-    gram: Gram, candidates: Sequence[Candidate], benches: Sequence[Bench], dependence: Dependence
+    gram: Gram, candidates: Sequence[TermCandidate], benches: Sequence[LawBench], dependence: Dependence
 ) -> Law:
     """Return the learnt law of a dependence: its spline, as points of a curve."""
     first, place = len(gram.prior), dependence.place
@@ -70,7 +70,7 @@ def curve_of(
     return replace(law, ranges=ranges_of(law, _all_letters(benches)))
 
 
-def _all_letters(benches: Sequence[Bench]) -> dict[str, np.ndarray]:
+def _all_letters(benches: Sequence[LawBench]) -> dict[str, np.ndarray]:
     return {
         n: np.concatenate([b.variables.letters[n] for b in benches]) for n in benches[0].variables.letters
     }

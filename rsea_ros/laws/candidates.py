@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from rsea_ros.laws.columns import Bench, Rows
+from rsea_ros.laws.columns import LawBench, Rows
 from rsea_ros.laws.repeats import lines, modes, periods
 from rsea_ros.laws.terms import (
     COMMAND_TERMS,
@@ -33,7 +33,7 @@ _DEGREE = 2
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TermCandidate:
     """One column: a term with a shape, or one part of a spline over a variable (times another).
 
     part: (variable, factor, number) of a spline's part.
@@ -96,7 +96,7 @@ def factor_of(variables: Variables, place: Place, over: str, factor: str) -> Flo
     return np.abs(values) if place == "gear" else values
 
 
-def spline_knots(benches: Sequence[Bench], spline: Spline) -> FloatArray:
+def spline_knots(benches: Sequence[LawBench], spline: Spline) -> FloatArray:
     """Return the knots of a spline over the range of its variable in all records."""
     return knots_of(np.concatenate([b.variables.letters[spline.over] for b in benches]), spline.parts)
 
@@ -117,7 +117,7 @@ def basis_of(x: FloatArray, knots: FloatArray) -> FloatArray:
     return np.ascontiguousarray(BSpline.design_matrix(inside, knots, _DEGREE, extrapolate=True).toarray().T)
 
 
-def terms_for(benches: Sequence[Bench]) -> tuple[Term, ...]:
+def terms_for(benches: Sequence[LawBench]) -> tuple[Term, ...]:
     """Return the terms that may act on a machine, the waves at the periods that the first record shows."""
     bench = benches[0]
     made: list[Term] = [
@@ -139,7 +139,7 @@ def terms_for(benches: Sequence[Bench]) -> tuple[Term, ...]:
     )
 
 
-def wave_numbers(bench: Bench) -> list[float]:
+def wave_numbers(bench: LawBench) -> list[float]:
     """Return cycles per revolution of the rotor at which the missing torque repeats."""
     variables, missing = bench.variables, bench.missing
     at = (np.arange(len(variables.letters["t"])) + (0.5 if bench.injector else 0.0)) * variables.step
@@ -147,13 +147,13 @@ def wave_numbers(bench: Bench) -> list[float]:
     return periods(theta, missing.torque)
 
 
-def sensor_modes(bench: Bench) -> list[float]:
+def sensor_modes(bench: LawBench) -> list[float]:
     """Return the frequencies of the highest broad peaks of the F/T sensor's residual, Hz."""
     keep = bench.case.mask["ft"]
     return modes(bench.case.t["ft"][keep], bench.residual["ft"][keep])
 
 
-def sensor_lines(bench: Bench) -> list[float]:
+def sensor_lines(bench: LawBench) -> list[float]:
     """Return the frequency of the sharpest line in the F/T signal that the mechanics do not explain, Hz."""
     case = bench.case
     keep = case.mask["ft"]
@@ -162,20 +162,20 @@ def sensor_lines(bench: Bench) -> list[float]:
     return lines(t, bench.residual["ft"][keep] - explained)
 
 
-def candidates_of(benches: Sequence[Bench]) -> list[tuple[Candidate, list[FloatArray]]]:
+def candidates_of(benches: Sequence[LawBench]) -> list[tuple[TermCandidate, list[FloatArray]]]:
     """Return all candidates with their course along the steps of every case."""
     return [*_of_terms(benches), *_of_splines(benches)]
 
 
-def _of_terms(benches: Sequence[Bench]) -> Iterator[tuple[Candidate, list[FloatArray]]]:
+def _of_terms(benches: Sequence[LawBench]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
     for term in terms_for(benches):
         for shape in benches[0].variables.shapes(term):
             values = [b.variables.values(term, shape) for b in benches]
             if any(np.ptp(v) > 0.0 or v[0] != 0.0 for v in values):
-                yield Candidate(term.place, term.regressor, term, shape), values
+                yield TermCandidate(term.place, term.regressor, term, shape), values
 
 
-def _of_splines(benches: Sequence[Bench]) -> Iterator[tuple[Candidate, list[FloatArray]]]:
+def _of_splines(benches: Sequence[LawBench]) -> Iterator[tuple[TermCandidate, list[FloatArray]]]:
     for spline in SPLINES:
         if spline.place not in benches[0].places or np.ptp(benches[0].variables.letters[spline.over]) == 0.0:
             continue
@@ -183,15 +183,15 @@ def _of_splines(benches: Sequence[Bench]) -> Iterator[tuple[Candidate, list[Floa
         parts = [spline_parts(b.variables, spline, knots) for b in benches]
         for k in range(spline.parts):
             part = (spline.over, spline.factor, k)
-            yield Candidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]
+            yield TermCandidate(spline.place, spline.regressor, part=part), [p[k] for p in parts]
 
 
 def columns_of(
-    rows: Rows, benches: Sequence[Bench], made: Sequence[tuple[Candidate, list[FloatArray]]]
+    rows: Rows, benches: Sequence[LawBench], made: Sequence[tuple[TermCandidate, list[FloatArray]]]
 ) -> list[FloatArray]:
     """Return the column of every candidate; the simulations run on two threads."""
 
-    def column(item: tuple[Candidate, list[FloatArray]]) -> FloatArray:
+    def column(item: tuple[TermCandidate, list[FloatArray]]) -> FloatArray:
         candidate, values = item
         return rows.column([b.answers(v, candidate.place) for b, v in zip(benches, values, strict=True)])
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rsea_ros.laws.base import Base
-from rsea_ros.laws.candidates import Candidate, candidates_of, columns_of
-from rsea_ros.laws.columns import Bench, bench_of, rows_of
+from rsea_ros.laws.candidates import TermCandidate, candidates_of, columns_of
+from rsea_ros.laws.columns import LawBench, bench_of, rows_of
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.gram import HELD_BACK, SELECTION, Gram, gram_of
 from rsea_ros.laws.result import Tried
@@ -31,8 +31,8 @@ class Search:
     """A base model with all columns of laws and their sums of products."""
 
     base: Base
-    benches: tuple[Bench, ...]
-    candidates: tuple[Candidate, ...]
+    benches: tuple[LawBench, ...]
+    candidates: tuple[TermCandidate, ...]
     gram: Gram
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.laws.candidates import Candidate
+from rsea_ros.laws.candidates import TermCandidate
 from rsea_ros.laws.gram import SELECTION, Gram
 from rsea_ros.laws.selection import standard_error
 from rsea_ros.laws.terms import Place
@@ -38,7 +38,7 @@ class Dependence:
     beside_se: float = 0.0
 
 
-def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, str], list[int]]:
+def families(candidates: Sequence[TermCandidate], first: int) -> dict[tuple[Place, str], list[int]]:
     """Return the columns of splines over every variable, and of memories where a spline is impossible."""
     made: dict[tuple[Place, str], list[int]] = {}
     for k, c in enumerate(candidates):
@@ -53,7 +53,7 @@ def families(candidates: Sequence[Candidate], first: int) -> dict[tuple[Place, s
 
 
 def dependences(
-    gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = ()
+    gram: Gram, candidates: Sequence[TermCandidate], given: Sequence[int] = ()
 ) -> tuple[Dependence, ...]:
     """Return the dependences of the residual, the largest first. given: columns of a law that acts."""
     made = families(candidates, len(gram.prior))

@@ -17,7 +17,7 @@ from rsea_ros.laws.law import Law
 from rsea_ros.laws.reading import letters_of
 from rsea_ros.laws.refinement import Refined, effect_from
 from rsea_ros.laws.result import Shown, WrittenLaw
-from rsea_ros.laws.writing import Provenance, source_of
+from rsea_ros.laws.writing import LawProvenance, source_of
 from rsea_ros.model.rig import EffectSetting
 
 _POINTS = 4000
@@ -25,7 +25,7 @@ _POINTS = 4000
 LAW = "law"
 """What a law of a past is drawn over: its own value, for no variable of the moment tells it."""
 _FIRST = ("theta", "h", "d", "w", "u", "T", "q", "t", "share")
-_NO_PROVENANCE = Provenance("an unknown date", "0", {"unknown": "0"}, "")
+_NO_PROVENANCE = LawProvenance("an unknown date", "0", {"unknown": "0"}, "")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Draft:
 
 
 def finished(
-    drafts: Sequence[Draft], refined: Refined, cases: Sequence[Case], provenance: Provenance | None,
+    drafts: Sequence[Draft], refined: Refined, cases: Sequence[Case], provenance: LawProvenance | None,
     gain: float, ci95: tuple[float, float],
 ) -> list[WrittenLaw]:  # fmt: skip
     """Return the laws as they were fitted, with their files."""

@@ -18,7 +18,7 @@ from rsea_ros.laws.fitting import gain_on_tests, refined_laws, share_of
 from rsea_ros.laws.law import Law
 from rsea_ros.laws.refinement import acting, effect_from
 from rsea_ros.laws.result import LawResult, WrittenLaw
-from rsea_ros.laws.writing import Provenance
+from rsea_ros.laws.writing import LawProvenance
 from rsea_ros.model.rig import EffectSetting, Rig
 from rsea_ros.progress import Progress
 from rsea_ros.signals import Record
@@ -27,7 +27,7 @@ from rsea_ros.signals import Record
 def learn(
     records: Sequence[Record],
     rig: Rig,
-    provenance: Provenance | None = None,
+    provenance: LawProvenance | None = None,
     progress: Progress | None = None,
 ) -> LawResult:
     """Return the laws that a rig's simulation of records lacks, with their effect files.
@@ -62,7 +62,7 @@ def nothing_left(base: Base, records: Sequence[Record]) -> LawResult:
 
 def _result(
     search: Search, depends: Sequence[Dependence], choice: Choice, records: Sequence[Record],
-    provenance: Provenance | None,
+    provenance: LawProvenance | None,
 ) -> LawResult:  # fmt: skip
     base = search.base
     laws = _laws(search, choice)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rsea_ros.laws.candidates import Candidate
+from rsea_ros.laws.candidates import TermCandidate
 from rsea_ros.laws.gram import FOLDS, SELECTION, Gram
 from rsea_ros.laws.terms import Place
 from rsea_ros.signals import FloatArray, IntArray
@@ -72,7 +72,7 @@ def folded(gram: Gram, weight: FloatArray) -> Folded:
 
 
 def paths(
-    gram: Gram, candidates: Sequence[Candidate], given: Sequence[int] = (), most: int = MOST_TERMS
+    gram: Gram, candidates: Sequence[TermCandidate], given: Sequence[int] = (), most: int = MOST_TERMS
 ) -> list[Model]:
     """Return the models of one, two, … terms of every place. given: columns that are part of all."""
     models = []
@@ -82,7 +82,7 @@ def paths(
 
 
 def _path(
-    gram: Gram, candidates: Sequence[Candidate], place: Place, given: Sequence[int], most: int
+    gram: Gram, candidates: Sequence[TermCandidate], place: Place, given: Sequence[int], most: int
 ) -> list[Model]:
     first = len(gram.prior)
     free = [first + k for k, c in enumerate(candidates) if c.term is not None and c.place == place]
@@ -103,14 +103,14 @@ def _path(
     return models
 
 
-def _same_form(a: Candidate, b: Candidate) -> bool:
+def _same_form(a: TermCandidate, b: TermCandidate) -> bool:
     """Return whether two candidates are one term with other shapes; waves and pasts of others are others."""
     assert a.term is not None and b.term is not None
     is_many = a.term.shape == "cycles_per_revolution" or a.term.memory in ("lag", "delay", "ring")
     return a.term.name == b.term.name and (a.shape == b.shape or not is_many)
 
 
-def _acts_right(gram: Gram, candidates: Sequence[Candidate], columns: Sequence[int]) -> bool:
+def _acts_right(gram: Gram, candidates: Sequence[TermCandidate], columns: Sequence[int]) -> bool:
     """Return whether all terms that only can take energy do."""
     first = len(gram.prior)
     beta = gram.fit(np.array(columns, np.int64), SELECTION)[first:]

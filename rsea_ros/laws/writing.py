@@ -24,7 +24,7 @@ _LETTERS = {"w": "the speed ω, rad/s", "q": "the angle q, rad", "theta": "the r
 
 
 @dataclass(frozen=True)
-class Provenance:
+class LawProvenance:
     """The origin of a law: date, version of the program, and the hash of every bag by name."""
 
     date: str
@@ -33,7 +33,7 @@ class Provenance:
     gain: str
 
 
-def source_of(law: Law, claims: Claims, provenance: Provenance) -> str:
+def source_of(law: Law, claims: Claims, provenance: LawProvenance) -> str:
     """Return the text of the effect file."""
     header = _docstring(law, provenance)
     body = curve_body(law) if law.curve is not None else body_of(law)
@@ -42,7 +42,7 @@ def source_of(law: Law, claims: Claims, provenance: Provenance) -> str:
     return f"{header}\n{_imports(law, body)}\n{_tables(law)}\n{function}\n\n{_effect(law, claims)}"
 
 
-def _docstring(law: Law, provenance: Provenance) -> str:
+def _docstring(law: Law, provenance: LawProvenance) -> str:
     kind = "A learnt law, no cause: a curve through data" if law.is_learnt else "A law that was found in data"
     seen = "; ".join(f"{_LETTERS[n]}: up to {v:.3g}" for n, v in law.ranges.items() if n in letters_of(law))
     bags = "\n".join(f"    {name}  sha256 {digest}" for name, digest in provenance.bags.items())

@@ -29,7 +29,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from rsea_ros.model.equations import PORTS, rotor_inertia, train_ratio
-from rsea_ros.model.netlist import GROUND, Element, Kind, Solution, nodal_analysis
+from rsea_ros.model.netlist import GROUND, Element, Kind, NodalSolution, nodal_analysis
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
 
@@ -55,7 +55,7 @@ def circuit_response(rig: Rig, hz: FloatArray, port: str = "gear") -> Mapping[st
     return {name: np.array([row[name] for row in rows]) for name in reads}
 
 
-def _read(solution: Solution, s: complex) -> dict[str, complex]:
+def _read(solution: NodalSolution, s: complex) -> dict[str, complex]:
     w = solution.current
     return {
         "position": (w["J_sc"] - w["Mu_2"]) / s,

@@ -36,7 +36,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Solution:
+class NodalSolution:
     """voltage: torques by node, N m. current: velocities by element (of a transformer: primary), rad/s."""
 
     voltage: dict[str, complex]
@@ -50,7 +50,7 @@ def impedance(element: Element, s: complex) -> complex:
     return element.value * s if element.kind == "inertia" else complex(element.value)
 
 
-def nodal_analysis(elements: Sequence[Element], s: complex, driven: str) -> Solution:
+def nodal_analysis(elements: Sequence[Element], s: complex, driven: str) -> NodalSolution:
     """Return all voltages and currents while one source has 1 N m and the others none.
 
     Modified nodal analysis (Ho, Ruehli, Brennan, IEEE TCAS 22, 1975): the unknowns are the voltages of the
@@ -67,7 +67,7 @@ def nodal_analysis(elements: Sequence[Element], s: complex, driven: str) -> Solu
         right[k] = 1.0 if element.name == driven else 0.0
     x = _solve(matrix, right)
     voltage = {GROUND: 0j, **{n: complex(x[i]) for n, i in nodes.items()}}
-    return Solution(voltage, {e.name: complex(x[len(nodes) + k]) for k, e in enumerate(elements)})
+    return NodalSolution(voltage, {e.name: complex(x[len(nodes) + k]) for k, e in enumerate(elements)})
 
 
 def _stamp(matrix: ComplexArray, nodes: dict[str, int], k: int, e: Element, s: complex) -> None:

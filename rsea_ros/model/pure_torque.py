@@ -59,7 +59,7 @@ AGAIN = 1.0
 
 
 @dataclass(frozen=True)
-class Settings:
+class FlagSettings:
     """tolerance_db, tolerance_deg: of T_d / T_p. limit: share of power of a sine at the edge, 0.05 to 0.5.
 
     hysteresis: part of the edge's frequency, either way. window: over which power is measured; hold_on,
@@ -95,10 +95,10 @@ class Reading(NamedTuple):
 class PureTorque:
     """The flag of one rig, fed with the observer's estimates at increasing stamps (s)."""
 
-    def __init__(self, rig: Rig, settings: Settings | None = None) -> None:
+    def __init__(self, rig: Rig, settings: FlagSettings | None = None) -> None:
         """Raises RigError for a rig without a spring: there is one torque, not two."""
         check_two_torques(rig)
-        s = settings or Settings()
+        s = settings or FlagSettings()
         self._function = end_over_end(structured(rig))
         self.edge = flat_band(self._function, s.tolerance_db, s.tolerance_deg)
         odds = (1.0 - s.limit) / s.limit

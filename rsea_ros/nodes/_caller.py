@@ -18,7 +18,7 @@ _PATIENCE = 60.0
 """s that an answer may take: a driver that configures talks to its devices."""
 
 
-class Refused(RseaError):
+class CallRefused(RseaError):
     """A node that answered, and did not do what was asked."""
 
 
@@ -46,7 +46,7 @@ class Caller:
     def call(self, name: str, action: str) -> str:
         """Do one action of a node and return its answer.
 
-        Raises ParameterError for an unknown node or action, Refused when the node does not do it.
+        Raises ParameterError for an unknown node or action, CallRefused when the node does not do it.
         """
         name = self.found(name)
         if action in self._transitions(name):
@@ -62,13 +62,13 @@ class Caller:
         request = ChangeState.Request()
         request.transition.id = self._transitions(name)[transition]
         if not self._ask(ChangeState, f"{name}/change_state", request).success:
-            raise Refused(f"{name}: {transition} failed, it is {self.state(name)}: its log says why")
+            raise CallRefused(f"{name}: {transition} failed, it is {self.state(name)}: its log says why")
         return f"{name}: {self.state(name)}"
 
     def _trigger(self, name: str, service: str) -> str:
         answer = self._ask(Trigger, f"{name}/{service}", Trigger.Request())
         if not answer.success:
-            raise Refused(f"{name}: {service} was refused: {answer.message}")
+            raise CallRefused(f"{name}: {service} was refused: {answer.message}")
         return f"{name}: {answer.message or service}"
 
     def found(self, name: str) -> str:
@@ -105,15 +105,15 @@ class Caller:
         return {each.transition.label: each.transition.id for each in answer.available_transitions}
 
     def _ask(self, kind: type, name: str, request: Any) -> Any:
-        """Return the answer of a service. Raises Refused when none comes."""
+        """Return the answer of a service. Raises CallRefused when none comes."""
         client: Any = self._node.create_client(kind, name)
         try:
             if not client.wait_for_service(DISCOVERY):
-                raise Refused(f"{name}: nobody serves it")
+                raise CallRefused(f"{name}: nobody serves it")
             future = client.call_async(request)
             spin(self._node, _PATIENCE, future.done)
             if not future.done():
-                raise Refused(f"{name}: no answer within {_PATIENCE:g} s")
+                raise CallRefused(f"{name}: no answer within {_PATIENCE:g} s")
             return future.result()
         finally:
             self._node.destroy_client(client)

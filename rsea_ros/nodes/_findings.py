@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from msg_adapters.ros import ERROR, OK, WARN, DiagnosticArray, statuses_message
 from rsea_ros.health.codes import TABLE
-from rsea_ros.health.finding import Finding
+from rsea_ros.health.finding import HealthFinding
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import STEADY
 from rsea_ros.nodes._qos import COMMAND
@@ -25,7 +25,11 @@ class FindingsPublisher:
     """Publishes a status for every code once a second. stamp: converts the seconds of a finding to ns."""
 
     def __init__(
-        self, node: Node, joint: str, findings: Callable[[], Sequence[Finding]], stamp: Callable[[float], int]
+        self,
+        node: Node,
+        joint: str,
+        findings: Callable[[], Sequence[HealthFinding]],
+        stamp: Callable[[float], int],
     ) -> None:
         self._name, self._joint = node.get_fully_qualified_name(), joint
         self._findings, self._stamp = findings, stamp
@@ -38,7 +42,7 @@ class FindingsPublisher:
         rows = [self._row(code.name, [f for f in found if f.code == code.name]) for code in TABLE]
         self._publisher.publish(statuses_message(time.time_ns(), rows, self._joint))
 
-    def _row(self, code: str, found: Sequence[Finding]) -> Row:
+    def _row(self, code: str, found: Sequence[HealthFinding]) -> Row:
         name = f"{self._name}: {code}"
         if not found:
             return name, OK, "no", {"code": code}
@@ -49,7 +53,7 @@ class FindingsPublisher:
             values |= {f"{prefix}{key}": value for key, value in self._values(finding).items()}
         return name, level, "; ".join(sentence(f) for f in found), values
 
-    def _values(self, finding: Finding) -> dict[str, object]:
+    def _values(self, finding: HealthFinding) -> dict[str, object]:
         values: dict[str, object] = {"name": finding.name, "confidence": f"{finding.confidence:.3f}"}
         if math.isfinite(finding.size):
             low, high = finding.ci95
@@ -60,7 +64,7 @@ class FindingsPublisher:
         return values
 
 
-def sentence(finding: Finding) -> str:
+def sentence(finding: HealthFinding) -> str:
     """Return a finding in a line."""
     if not math.isfinite(finding.size):
         return finding.name or finding.code

@@ -18,7 +18,7 @@ from msg_adapters import read_record, write_record
 from msg_adapters.overlay import write_overlay
 from msg_adapters.ros import JointState, Trigger
 from rsea_ros.errors import DeviceError, ParameterError, RseaError
-from rsea_ros.experiment.campaign import Budget, Campaign, Outcome, Round
+from rsea_ros.experiment.campaign import Budget, Campaign, CampaignOutcome, Round
 from rsea_ros.experiment.causes import USUAL, causes_from
 from rsea_ros.experiment.limits import limits_from
 from rsea_ros.experiment.opinion import diagnosed
@@ -81,7 +81,7 @@ class Experiment:
         self._health = Health(node, self._report)
         node.create_timer(0.02, self._look, clock=STEADY)
         self._pool = ThreadPoolExecutor(1, "experiment")
-        self._work: Future[Outcome] = self._pool.submit(self._go)
+        self._work: Future[CampaignOutcome] = self._pool.submit(self._go)
 
     def _made(self, values: dict[str, Any]) -> Campaign:
         asked = Asked(limits_from(values["limits"]), values["rate"], longest=values["longest"])
@@ -89,7 +89,7 @@ class Experiment:
         causes = causes_from(values["causes"])
         return Campaign(load_rig(values["rig"]), causes, asked, self._play, budget, hear=self._hear)
 
-    def _go(self) -> Outcome:
+    def _go(self) -> CampaignOutcome:
         """Begin with the bags. Raises ParameterError without one, BagError for one that cannot be read."""
         bags = [bag for bag in self._values["bag"].split(",") if bag]
         if not bags:
@@ -186,7 +186,7 @@ class Experiment:
             log.info(f"diagnosis of all runs: {self._diagnosed(outcome)}")
         log.info(f"report: {report}")
 
-    def _diagnosed(self, outcome: Outcome) -> str:
+    def _diagnosed(self, outcome: CampaignOutcome) -> str:
         """Write the diagnosis of all runs together and return its sentence; a person may interrupt it."""
         try:
             verdict = diagnosed(outcome.records, self._campaign.rig, self._campaign.causes)

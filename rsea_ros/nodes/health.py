@@ -12,9 +12,9 @@ from typing import Any
 
 from rclpy.node import Node
 
-from rsea_ros.health.finding import Finding
+from rsea_ros.health.finding import HealthFinding
 from rsea_ros.health.monitor import Monitor
-from rsea_ros.health.settings import Settings
+from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
 from rsea_ros.nodes._cycle import SECOND
@@ -58,7 +58,7 @@ class HealthNode:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._rig_name, self._axis = node, values["rig"], values["axis"]
         rig = load_rig(values["rig"])
-        settings = Settings(
+        settings = WatchSettings(
             rate=values["false_alarms"], every=values["every"], learn=values["learn"], hold=WATCHDOG / SECOND
         )
         self._monitor = Monitor(rig, noise_from(rig, values["identification"]), settings)
@@ -99,7 +99,7 @@ class HealthNode:
             if self._monitor.job is not None:
                 self._told(self._monitor.conclude(answer))
 
-    def _told(self, finding: Finding | None) -> None:
+    def _told(self, finding: HealthFinding | None) -> None:
         """Report new findings, and keep a bag of them."""
         if finding is None:
             return

@@ -13,7 +13,7 @@ from msg_adapters.raw import RawWriter
 from msg_adapters.ros import JointState, efforts_message
 from msg_adapters.topics import TYPES
 from rsea_ros.model.observer import Observer
-from rsea_ros.model.pure_torque import PureTorque, Settings
+from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_error import PURE, ErrorFlag, ErrorSettings
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.nodes._commands import WATCHDOG
@@ -69,7 +69,7 @@ class Model:
         noise = noise_from(rig, values["identification"])
         observer = Observer(rig, noise, hold=WATCHDOG / SECOND, duration=values["duration"])
         names = ("tolerance_db", "tolerance_deg", "hysteresis", "window", "hold_on", "hold_off", "quiet")
-        self._flag = PureTorque(rig, Settings(limit=values["share"], **{n: values[n] for n in names}))
+        self._flag = PureTorque(rig, FlagSettings(limit=values["share"], **{n: values[n] for n in names}))
         asked = (values[n] for n in ("tolerance", "error_window", "error_hysteresis", "quiet"))
         self._error = ErrorFlag(rig, ErrorSettings(*asked))
         self._estimates = node.create_publisher(JointState, "torque_estimate", COMMAND)

@@ -51,7 +51,7 @@ Status = Literal["found", "silent", "unclear"]
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """where: section or equation. printed: the paper's digits. ours: same unit. how: the derivation of ours.
 
     status: found, where the paper's numbers alone make ours; silent, where one is missing; unclear otherwise.
@@ -88,38 +88,40 @@ def table_2(name: str) -> float:
     return float(TABLE_2[name][0])
 
 
-def claims() -> tuple[Claim, ...]:
+def claims() -> tuple[PaperClaim, ...]:
     """Return every printed number that others determine, those from the paper's numbers alone first."""
     return (*_recomputed(), *_from_the_springs(), *_from_the_parts())
 
 
-def _recomputed() -> Iterator[Claim]:
+def _recomputed() -> Iterator[PaperClaim]:
     c_2 = formulas.EQ_10[2]
-    yield Claim("Eq. (10)", "K_s/J_eff, numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator")
+    yield PaperClaim(
+        "Eq. (10)", "K_s/J_eff, numerator", "1560.436", c_2, "1/s^2", "K_s/J_eff of the denominator"
+    )
     j_eff, b_eff = formulas.eq_10_inertia_and_damping(table_2("K_s"))
     j_m, b_m = j_eff - table_2("J_sc"), b_eff - table_2("b_s")
     averaged = "Eq. (10), both K_s/J_eff averaged as the paper says"
-    yield Claim("Table 2", "J_m", TABLE_2["J_m"][0], j_m, "kg m^2", f"{averaged}, less J_sc")
-    yield Claim("Table 2", "b_m", TABLE_2["b_m"][0], b_m, "N m s/rad", f"{averaged}, less b_s")
+    yield PaperClaim("Table 2", "J_m", TABLE_2["J_m"][0], j_m, "kg m^2", f"{averaged}, less J_sc")
+    yield PaperClaim("Table 2", "b_m", TABLE_2["b_m"][0], b_m, "N m s/rad", f"{averaged}, less b_s")
     factor = 1.0 - 10.0 ** (-3.0 / 20.0)
-    yield Claim(
+    yield PaperClaim(
         "Eq. (7)", "factor", "0.292", factor, "1", "+3 dB of an undamped Eq. (6); √2 would make 0.293"
     )
     band = pure_torque_bandwidth(PROTOTYPE_STIFFNESS, PROTOTYPE_INERTIA)
-    yield Claim("4.1, Fig. 20", "bandwidth of the prototype", "55.5", band, "Hz", "Eq. (7)")
+    yield PaperClaim("4.1, Fig. 20", "bandwidth of the prototype", "55.5", band, "Hz", "Eq. (7)")
 
 
-def _from_the_springs() -> Iterator[Claim]:
+def _from_the_springs() -> Iterator[PaperClaim]:
     missing = "Eq. (9) with r_s = 0: r_s is not printed"
     for where, what, printed, rate, arm in (
         ("3.2.1", "K_s, nominal", "1690.5", SPRING_RATE, ARM),
         ("4.1", "K_s, prototype", "260", PROTOTYPE_RATE, PROTOTYPE_ARM),
     ):
         ours = formulas.eq_9_spring_stiffness(rate, arm, 0.0)
-        yield Claim(where, what, printed, ours, "N m/rad", missing, "silent")
+        yield PaperClaim(where, what, printed, ours, "N m/rad", missing, "silent")
 
 
-def _from_the_parts() -> Iterator[Claim]:
+def _from_the_parts() -> Iterator[PaperClaim]:
     inertia = PENDULUM_MASS * PENDULUM_LENGTH**2
     stiffness = PENDULUM_MASS * GRAVITY * PENDULUM_LENGTH
     drag = TORQUE_CONSTANT * NO_LOAD_CURRENT / NO_LOAD_SPEED
@@ -128,4 +130,4 @@ def _from_the_parts() -> Iterator[Claim]:
         ("K_ld, pendulum", "K_ld", stiffness, "N m/rad", "m g l; the paper says that K_ld was tuned"),
         ("b_m, viscous", "b_m", drag, "N m s/rad", "at most: the maker's no-load 1.65 A at 33.1 rpm"),
     ):
-        yield Claim("Table 2", what, TABLE_2[name][0], ours, unit, how, "unclear")
+        yield PaperClaim("Table 2", what, TABLE_2[name][0], ours, unit, how, "unclear")

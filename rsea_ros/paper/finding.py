@@ -8,7 +8,7 @@ from rsea_ros.paper.claims import Status
 
 
 @dataclass(frozen=True)
-class Finding:
+class PaperFinding:
     """found: two statements that cannot both hold. silent: what is left out. unclear: two readings."""
 
     status: Status

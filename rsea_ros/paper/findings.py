@@ -6,11 +6,11 @@ another machine, or what rests on an estimate of ours is none.
 
 from __future__ import annotations
 
-from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.finding import PaperFinding
 from rsea_ros.paper.findings_bench import identification, moving_output, prototype
 from rsea_ros.paper.findings_theory import circuit, equations
 
 
-def findings() -> tuple[Finding, ...]:
+def findings() -> tuple[PaperFinding, ...]:
     """Return all of them, in the order of the paper."""
     return (*circuit(), *equations(), *identification(), *moving_output(), *prototype())

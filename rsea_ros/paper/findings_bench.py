@@ -17,25 +17,25 @@ from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
 from rsea_ros.paper.figure_18 import largest_gap, readings, resonance_hz
-from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.finding import PaperFinding
 
 
-def identification() -> Iterator[Finding]:
+def identification() -> Iterator[PaperFinding]:
     c_0, _, c_2 = formulas.EQ_10
     k_s = claims.table_2("K_s")
-    yield Finding(
+    yield PaperFinding(
         "found",
         "Eq. (10)",
         f"The same K_s/J_eff is {c_0} in the numerator and {c_2} in the denominator, "
         f"{100 * (1 - c_0 / c_2):.1f} % apart: a gain of {c_0 / c_2:.3f} at rest where Eq. (4) has 1.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Eq. (10)",
         "The paper says that it averages the two. That hides a torque constant that is off, or friction; an "
         "amplitude series or the drive current would decide.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "3.2.1",
         "Only K_s/J_eff and b_eff/J_eff can be had from T_d/T_m. The absolute values rest on the measured "
@@ -44,7 +44,7 @@ def identification() -> Iterator[Finding]:
         f"nominal K_s {1690.5 / (0.5 * (c_0 + c_2)):.3f} kg·m².",
     )
     bound = claims.TORQUE_CONSTANT * claims.NO_LOAD_CURRENT / claims.NO_LOAD_SPEED
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Table 2, b_m",
         f"23.088 N·m·s/rad cannot be viscous drag: at the no-load speed of 33.1 rpm it would take "
@@ -53,7 +53,7 @@ def identification() -> Iterator[Finding]:
         "friction, linearised at the test's amplitude; the paper names static friction only as the reason "
         "for the added noise.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "3.2.1",
         f"280 Hz with excitation to 140 Hz is exactly Nyquist. The hold's half sample, {0.5e3 / 280:.3f} "
@@ -62,13 +62,13 @@ def identification() -> Iterator[Finding]:
         "command and "
         "measurement were aligned.",
     )
-    yield Finding(
+    yield PaperFinding(
         "found",
         "3.2.1, 3.2.2",
         "The standard deviation of a noise in torque is printed as 10 N and 30 N. We take N·m.",
     )
     over = math.erfc(44.2 / 30.0 / math.sqrt(2.0))
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "3.2.2",
         f"Noise of 30 N·m is above the continuous torque of 44.2 N·m {100 * over:.0f} % of the time. That "
@@ -77,14 +77,14 @@ def identification() -> Iterator[Finding]:
     )
 
 
-def moving_output() -> Iterator[Finding]:
+def moving_output() -> Iterator[PaperFinding]:
     rig = load_rig("paper_moving_output")
     at = np.array([10.0, 19.0, 33.0])
     gains = 20.0 * np.log10(np.abs(frequency_response(rig, outputs.end_torque(rig, "spring_end"), at)))
     _, moving, grounded = readings(rig).values()
     gap_hz, gap = largest_gap(rig, grounded)
     stiffness = claims.PENDULUM_MASS * claims.GRAVITY * claims.PENDULUM_LENGTH
-    yield Finding(
+    yield PaperFinding(
         "unclear",
         "3.2.2, Figs. 16 and 18",
         "The lumped model of Fig. 18 can be read in two ways: only the parts within the inner line "
@@ -95,7 +95,7 @@ def moving_output() -> Iterator[Finding]:
         f"{gap:.1f} dB more, at {gap_hz:.2f} Hz. What decides is the resonance: {resonance_hz(rig):.1f} Hz "
         f"unlumped, {resonance_hz(moving):.1f} Hz lumped with moving loads.",
     )
-    yield Finding(
+    yield PaperFinding(
         "found",
         "3.2.2, 19 Hz",
         "“Around 19 Hz the experimental phase becomes out of sync” is put down to a very small output. The "
@@ -106,14 +106,14 @@ def moving_output() -> Iterator[Finding]:
         f"{360 * 19 / 280:.0f}° for one "
         "sample.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "3.2.2, 33 Hz",
         "The “resonance around 33 Hz” is in neither model, as the paper says: the unlumped one is smooth "
         "there, "
         f"{_db(gains[2])}. A structural resonance (the effect `structural_resonance`) can be fitted to it.",
     )
-    yield Finding(
+    yield PaperFinding(
         "unclear",
         "3.2.2, Table 2, K_ld",
         f"5.8 kg at 0.114 m make m g l = {stiffness:.2f} N·m/rad; Table 2 has 7, which the paper says it "
@@ -121,14 +121,14 @@ def moving_output() -> Iterator[Finding]:
         "pendulum was “approximated by changing K_ld and b_s”; b_s is the spring's damping, b_ld may be "
         "meant.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Table 2, 10⁸",
         "A fixed end is modelled by 10⁸ in inertia, damping and stiffness. Against a clamped end that "
         "changes "
         f"T_d/T_m by {clamp_error():.0e} at most: it does no harm.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "3.2.2",
         "“Much better” is not quantified: no fit, no coherence, no data set held out. The numbers for a "
@@ -137,15 +137,15 @@ def moving_output() -> Iterator[Finding]:
     )
 
 
-def prototype() -> Iterator[Finding]:
+def prototype() -> Iterator[PaperFinding]:
     k_s, j_sc, torque = claims.PROTOTYPE_STIFFNESS, claims.PROTOTYPE_INERTIA, claims.KNEE_TORQUE
-    yield Finding(
+    yield PaperFinding(
         "found",
         "4.1 and Eq. (8)",
         f"By Eq. (8) a mechanism of {k_s:.0f} N·m/rad carries at most K_s/2 = {k_s / 2:.0f} N·m, at 45°: "
         f"less than the {torque:.0f} N·m asked for.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "4.1 and 3.1.2",
         f"{torque:.0f} N·m on {k_s:.0f} N·m/rad, taken as linear, deflect {torque / k_s:.2f} rad, "
@@ -157,7 +157,7 @@ def prototype() -> Iterator[Finding]:
     backward, forward = (
         float(undamped_band(k_s, inner_inertia(replace(rig, train=t)))) for t in claims.PROTOTYPE_TRAINS
     )
-    yield Finding(
+    yield PaperFinding(
         "unclear",
         "4.1 and Eqs. (5) to (7)",
         "Neither the rotor's inertia nor which spline of the harmonic drive is held is printed. With our "
@@ -169,7 +169,7 @@ def prototype() -> Iterator[Finding]:
         f"{pure_torque_bandwidth(k_s, j_sc):.1f} Hz.",
     )
     radius = spring_radius(k_s, claims.PROTOTYPE_RATE, claims.PROTOTYPE_ARM)
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "4.1",
         f"Neither r_s ({1e3 * radius:.1f} mm by Eq. (9)), nor damping, nor the body in the ADAMS run are "

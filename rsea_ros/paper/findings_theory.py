@@ -15,22 +15,22 @@ from rsea_ros.model.bandwidth import (
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.spring import spring_radius
 from rsea_ros.paper import claims, formulas
-from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.finding import PaperFinding
 
 
-def circuit() -> Iterator[Finding]:
+def circuit() -> Iterator[PaperFinding]:
     platform = load_rig("paper_high_impedance")
     k_s, j_sc = claims.table_2("K_s"), claims.table_2("J_sc")
     spin = platform["rotor.reflected_inertia"] / platform["gear.ratio"]
     forward, backward = (float(undamped_band(k_s, j)) for j in (inner_inertia(platform), j_sc - spin))
-    yield Finding(
+    yield PaperFinding(
         "found",
         "Nomenclature and 2.2",
         "J_eff is the “sum of reflected inertia and motor chassis inertia” in the nomenclature, J_sc + J_m "
         "with "
         "the spring chassis in section 2.2 and in Table 2.",
     )
-    yield Finding(
+    yield PaperFinding(
         "found",
         "2.2, text on Fig. 7",
         "With torque as voltage and velocity as current an infinite impedance is an open branch. The text "
@@ -38,7 +38,7 @@ def circuit() -> Iterator[Finding]:
         "short circuit there, which would make T_d = 0; nodal analysis of the open one gives Eq. (4). Fig. 7 "
         "itself we have not seen.",
     )
-    yield Finding(
+    yield PaperFinding(
         "unclear",
         "Fig. 8, Eqs. (5) to (7)",
         "Mu_1 = N + 1 = 502 and Mu_2 = −1 leave the sense of the rotor to the polarity dots of Fig. 8, "
@@ -51,18 +51,18 @@ def circuit() -> Iterator[Finding]:
     )
 
 
-def equations() -> Iterator[Finding]:
+def equations() -> Iterator[PaperFinding]:
     k_s, j_sc, b_s = (claims.table_2(n) for n in ("K_s", "J_sc", "b_s"))
     eq_6 = formulas.eq_6_distal_per_proximal(k_s, j_sc, b_s)
     peak_hz, peak_db = resonance_peak(eq_6)
     lumped = pure_torque_bandwidth(k_s, claims.table_2("J_m") + j_sc)
-    yield Finding(
+    yield PaperFinding(
         "found",
         "2.3.1, Eqs. (4) and (5)",
         "b_m is b_rotor N² by the line above Eq. (1), and is multiplied by N² once more in both equations. "
         "Table 2's b_m fits the first.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Eqs. (1), (3), (4), (6)",
         "The numerators have K_s, the torque of the elastic element. A sensor in series with spring and "
@@ -70,14 +70,14 @@ def equations() -> Iterator[Finding]:
         f"sees K_s + b_s s: {_lag(30.0, b_s, k_s):.0f}° apart at 30 Hz, {_lag(80.0, b_s, k_s):.0f}° at 80 "
         "Hz.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Eq. (3) and Eq. (7)",
         f"The rule of Eq. (7) on the lumped Eq. (3) gives {lumped:.2f} Hz where Eq. (6) gives "
         f"{pure_torque_bandwidth(k_s, j_sc):.1f} Hz: the strongest number for the unlumped model, and not "
         "printed.",
     )
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Eq. (7)",
         "Undamped; the paper says that it ignores some subtleties. With Table 2's b_s = 3 N·m·s/rad |Eq. "
@@ -86,7 +86,7 @@ def equations() -> Iterator[Finding]:
         f"{flat_band(eq_6):.1f} Hz; its phase passes −10° at {flat_band(eq_6, 3.0, 10.0):.1f} Hz.",
     )
     nominal = formulas.eq_9_spring_stiffness(claims.SPRING_RATE, claims.ARM, 0.0)
-    yield Finding(
+    yield PaperFinding(
         "unclear",
         "3.1, Eqs. (8) and (9)",
         "Two pairs of opposing springs are four. Preloaded, all four act: 4 K, at least "
@@ -95,7 +95,7 @@ def equations() -> Iterator[Finding]:
         f"counts a pair. The measured {k_s:.0f} N·m/rad speak for 2 K; preload is not mentioned.",
     )
     radius = spring_radius(1690.5, claims.SPRING_RATE, claims.ARM)
-    yield Finding(
+    yield PaperFinding(
         "silent",
         "Eq. (9)",
         f"The spring radius r_s is not printed. K_s = 1690.5 N·m/rad needs {1e3 * radius:.1f} mm; the "

@@ -62,13 +62,13 @@ class Wire:
         return get("velocity") * model.radian_per_second, turned, get("current") * self._unit
 
 
-def errors(rate, shift):
+def errors(rate, shift, **options):
     """Return gain - 1 and phase (rad) of a sine's fundamental, and its error (RMS, relative).
 
     shift: samples by which the grid of the desired torques lies behind the sensor's first record.
     """
     wire, grid, period = Wire(), Grid(1e9 / rate), 1e9 / rate
-    controller = TorqueController(load_rig("paper_high_impedance"), rate, GAINS[rate])
+    controller = TorqueController(load_rig("paper_high_impedance"), rate, GAINS[rate], **options)
     start, command, rows = BEGIN + shift * period, 0.0, []
     for k in range(1, round(1.6 * rate)):
         wire.at(round(BEGIN + k * period + WRITES))
@@ -98,6 +98,11 @@ def test_a_sine_comes_out_in_size_and_in_time(rate, shift):
     assert abs(gain) < 0.01
     assert abs(math.degrees(phase)) < 1.0
     assert error < 0.017
+
+
+def test_an_outer_loop_that_learns_no_load_learns_the_timing_all_the_same():
+    gain, phase, _ = errors(280.0, 0.0, learn=False)
+    assert abs(gain) < 0.015 and abs(math.degrees(phase)) < 1.5
 
 
 def follow(part, late=0, n=600):

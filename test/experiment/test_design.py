@@ -13,7 +13,7 @@ from rsea_ros.experiment.bound import bound
 from rsea_ros.experiment.design import propose
 from rsea_ros.experiment.files import hypotheses_from, model_of
 from rsea_ros.experiment.hypothesis import motion, run_case
-from rsea_ros.experiment.limits import Limits, of_command, of_response, used
+from rsea_ros.experiment.limits import RunLimits, of_command, of_response, used
 from rsea_ros.experiment.margins import at_ends
 from rsea_ros.experiment.proposal import Asked
 from rsea_ros.experiment.separation import Refit, refitted
@@ -24,7 +24,7 @@ from rsea_ros.identification.solver import power, solve
 from rsea_ros.model.rig_file import load_rig
 
 RIG = load_rig("paper_high_impedance")
-LIMITS = Limits(torque=15.0, velocity=1.5, deflection=0.03)
+LIMITS = RunLimits(torque=15.0, velocity=1.5, deflection=0.03)
 ASKED = Asked(LIMITS, refine=3, probe=1.0, kinds=("multisine", "chirp"))
 NOISE = {"ft": 0.03, "position": 6e-6}
 
@@ -74,7 +74,7 @@ def test_more_doubt_makes_a_smaller_run():
         [replace(h, information=h.information * weight) for h in possible(nonlinear_spring={"cubic": 100.0})]
         for weight in (100.0, 1.0)
     )
-    tight = Asked(Limits(torque=30.0, deflection=0.012), refine=0, kinds=("chirp",), longest=1.0)
+    tight = Asked(RunLimits(torque=30.0, deflection=0.012), refine=0, kinds=("chirp",), longest=1.0)
     assert propose(unsure, tight).peaks.expected["torque"] < propose(sure, tight).peaks.expected["torque"]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timezone
 
 from rsea_ros.fleet.joints import Joint
-from rsea_ros.fleet.store import Outcome
+from rsea_ros.fleet.store import TaskOutcome
 from rsea_ros.fleet.task import Task
 
 MARCH = datetime(2026, 3, 5, tzinfo=timezone.utc)
@@ -13,9 +13,9 @@ KNEE = Joint("knee", "name: stub")
 HIP = Joint("hip", "name: stub")
 
 
-def stub_work(task: Task) -> Outcome:
+def stub_work(task: Task) -> TaskOutcome:
     """Return a row of one parameter at once."""
     values = {"value": 1500.0, "low": 1490.0, "high": 1510.0, "unit": "N m/rad", "identifiable": True}
     stiffness = {"name": "spring.stiffness", **values}
     row = task.row(outcome="done", time=MARCH, parameters=[stiffness], seconds=0.1, peak_memory=1)
-    return Outcome(row, {"identification.json": "{}\n"})
+    return TaskOutcome(row, {"identification.json": "{}\n"})

@@ -14,13 +14,13 @@ import pytest
 from fleet_stubs import HIP, KNEE, stub_work
 
 from rsea_ros.fleet import engine as engines
-from rsea_ros.fleet.engine import ATTEMPTS, Engine, Limits
+from rsea_ros.fleet.engine import ATTEMPTS, Engine, EngineLimits
 from rsea_ros.fleet.errors import FleetError
 from rsea_ros.fleet.executor import Done, Job, Serial, WorkerLost
 from rsea_ros.fleet.plan import is_anything_new
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.store import Outcome, locked, open_store
+from rsea_ros.fleet.store import TaskOutcome, locked, open_store
 from rsea_ros.fleet.task import Changed, Task
 
 
@@ -84,7 +84,7 @@ def test_other_settings_and_another_joint_are_new(store, folder):
 
 def test_a_lost_worker_is_replaced_and_a_recording_that_kills_workers_is_quarantined(store, folder):
     losses = {"run1.mcap": 2, "run3.mcap": 1000}
-    summary = played(store, folder, executor=Unlucky(losses), limits=Limits(back_off=0.001))
+    summary = played(store, folder, executor=Unlucky(losses), limits=EngineLimits(back_off=0.001))
     assert summary.outcomes == {"done": 4, "quarantined": 1}
     ((joint, bag, why),) = summary.quarantined
     assert joint == "knee" and bag.endswith("run3.mcap") and f"all {ATTEMPTS} times" in why
@@ -109,7 +109,7 @@ def test_an_error_of_the_cluster_is_a_row_and_not_the_end(store, folder):
 def test_a_bag_too_large_for_a_worker_never_reaches_one(store, folder):
     with (folder / "run4.mcap").open("ab") as file:
         file.truncate(4_000_000_000)  # of which the disk holds nothing
-    limit = Limits(memory=int(engines.BASE + engines.FACTOR * 1e6))
+    limit = EngineLimits(memory=int(engines.BASE + engines.FACTOR * 1e6))
     held = [(bag, joints) for bag, joints in bags_of([str(folder)], [KNEE])]
     engine = Engine(store, Serial(), stub_work, lambda step, share: None, limit)
     engine._recordings = {(bag.url, bag.size, bag.stamp): f"{k:016x}" for k, (bag, _) in enumerate(held)}
@@ -174,7 +174,7 @@ def test_a_row_made_again_outlives_a_compaction_that_named_its_file(store, folde
 
     def work(task: Task):
         poison = {"outcome": "quarantined"} if task.bag.url.endswith("run2.mcap") else {}
-        return Outcome(stub_work(task).row | poison)
+        return TaskOutcome(stub_work(task).row | poison)
 
     played(store, folder, work=work)
     store.take_out({"quarantined"})
@@ -188,7 +188,7 @@ def test_two_runs_take_turns(store):
     """Another process holds the lock: a run that does not wait names it, one that waits begins after it."""
     code = f"""
 import time
-from rsea_ros.fleet.store import Outcome, locked, open_store
+from rsea_ros.fleet.store import TaskOutcome, locked, open_store
 with locked(open_store({str(store.path)!r}), None):
     print("held", flush=True)
     time.sleep(30)
@@ -220,6 +220,6 @@ def test_a_folder_that_is_no_store_is_refused(tmp_path, folder):
 def test_jobs_that_wait_to_be_tried_again_do_not_hold_the_others_up(store, folder):
     """While one job waits to be retried, the others are done."""
     begin = time.monotonic()
-    summary = played(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=Limits(back_off=0.3))
+    summary = played(store, folder, executor=Unlucky({"run0.mcap": 1}), limits=EngineLimits(back_off=0.3))
     assert summary.outcomes == {"done": 5} and time.monotonic() - begin < 5.0
     assert Job(stub_work, None).attempt == 0

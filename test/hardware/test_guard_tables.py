@@ -30,8 +30,8 @@ def test_a_new_guard_commands_zero_and_has_no_fault():
 
 
 def test_a_step_of_torque_is_limited_by_default():
-    """40 000 N m/s: 40 N m a ms, which no actuator of this size can follow; it stops a typing error."""
-    assert Guard(Limits(68.0), 1e-3).allowed(68.0, 0.0) == pytest.approx(40.0)
+    """10 000 N m/s, as the driver: 10 N m a ms."""
+    assert Guard(Limits(68.0), 1e-3).allowed(68.0, 0.0) == pytest.approx(10.0)
 
 
 def test_the_slew_limit_holds_both_ways_and_from_the_previous_torque():

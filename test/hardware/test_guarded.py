@@ -180,6 +180,18 @@ def test_every_second_answer_lost_is_a_fault_though_never_two_in_a_row(joint, de
     assert joint.fault is None and joint.cycles == {what: 17}
 
 
+def test_a_write_that_is_acknowledged_during_the_reading_is_not_lost(joint, device):
+    """At 1 kHz a driver whose readings all came latched no_reply: its writes were acknowledged too late."""
+    device.broken, device.reading = {"write": [LOST] * 40}, {"acknowledged_late": True}
+    for _ in range(40):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault is None and joint.cycles == {"failed_writes": 40}
+    device.broken, device.reading = {"write": [LOST] * 3}, {}
+    for _ in range(3):
+        joint.cycle(1.0, 0.0)
+    assert joint.fault == Fault("no_reply", 3, 3, "cycles", "no reply")
+
+
 def test_a_third_of_the_answers_lost_is_none(joint, device):
     device.broken = {"read": [LOST, None, None] * 40}
     for _ in range(120):

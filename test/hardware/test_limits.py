@@ -1,8 +1,10 @@
 """Limits against plain arithmetic: which torques are cut, which readings trip, and how the torque ends."""
 
 import math
+from pathlib import Path
 
 import pytest
+import yaml
 
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.device import NoReply, Refused, State
@@ -11,6 +13,7 @@ from rsea_ros.hardware.limits import Fault, Guard, Limits
 from rsea_ros.hardware.protection import NONE, Protection
 
 PERIOD = 0.01
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def guard(**limits):
@@ -195,3 +198,10 @@ def test_the_ramp_goes_on_when_commands_come_again():
         guard.allowed(10.0, 0.0)
     torques = [guard.allowed(10.0, 0.06), *(guard.allowed(10.0, 0.0) for _ in range(6))]
     assert torques[-1] == 0.0 and torques == sorted(torques, reverse=True)
+
+
+def test_the_default_slew_limit_is_that_of_the_driver():
+    """A Limits of one's own allowed four times the slew of the driver."""
+    driver = yaml.safe_load((ROOT / "config" / "nodes" / "driver.yaml").read_text(encoding="utf-8"))
+    (parameters,) = (node["ros__parameters"] for node in driver.values())
+    assert Limits(1.0).slew == parameters["slew_limit"]

@@ -12,7 +12,7 @@ import pytest
 from rsea_ros.errors import DeviceError
 from rsea_ros.hardware.netft.calibration import parse
 from rsea_ros.hardware.netft.receiver import Receiver
-from rsea_ros.hardware.netft.records import RESYNCHRONISE, Record, Sequence, decode, request, trouble
+from rsea_ros.hardware.netft.records import RESYNCHRONISE, RdtRecord, Sequence, decode, request, trouble
 
 
 def datagram(sequence, ft_sequence=None, status=0, values=(1, -2, 3, -4, 5, -6)):
@@ -27,7 +27,7 @@ def record(sequence, ft_sequence=None):
 def test_a_record_and_a_request_are_as_the_manual_says():
     assert request(2, 5) == bytes.fromhex("1234 0002 00000005")
     packed = "00000007 00000009 80020000 00000001 fffffffe 00000003 fffffffc 00000005 fffffffa"
-    assert decode(bytes.fromhex(packed)) == Record(7, 9, 0x80020000, (1, -2, 3, -4, 5, -6))
+    assert decode(bytes.fromhex(packed)) == RdtRecord(7, 9, 0x80020000, (1, -2, 3, -4, 5, -6))
 
 
 @pytest.mark.parametrize("first", [5, 2**32 - 3])

@@ -7,7 +7,7 @@ from independent.bench import Bench, record_command
 from rsea_ros.errors import RigError
 from rsea_ros.health.look import events_of
 from rsea_ros.health.monitor import Monitor
-from rsea_ros.health.settings import Settings
+from rsea_ros.health.settings import WatchSettings
 from rsea_ros.model.observer import noise_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
@@ -15,7 +15,7 @@ from rsea_ros.signals import Channel, Record
 
 RATE, CLEAN, AFTER = 280.0, 8.0, 8.0
 BENCH = Bench().having(coulomb=3.0, b_m=8.0)
-SETTINGS = Settings(learn=6, every=1.0, fitted=3)
+SETTINGS = WatchSettings(learn=6, every=1.0, fitted=3)
 
 
 def rig():

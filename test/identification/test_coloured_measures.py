@@ -10,7 +10,7 @@ from coloured_cases import RATE, white
 from scipy.signal import lfilter
 
 from rsea_ros.identification import coloured
-from rsea_ros.identification.spectra import Shape, segment_spectra, shape_of
+from rsea_ros.identification.spectra import SpectralShape, segment_spectra, shape_of
 
 ALTERNATING = np.resize([1.0, -1.0], 10_000)
 
@@ -114,7 +114,7 @@ def test_values_too_rare_for_a_hertz_are_not_slow():
     ],
 )
 def test_the_excess_kurtosis_of_known_distributions_is_right(values, excess):
-    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
+    flat = SpectralShape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._kurtosis(flat, values(np.random.default_rng(1))) == pytest.approx(excess, abs=0.15)
 
 
@@ -122,7 +122,7 @@ def test_kurtosis_is_that_of_the_whitened_residual():
     """Smoothing makes anything Gaussian; what was smoothed is not."""
     y = lfilter([1.0], [1.0, -0.97], np.random.default_rng(2).laplace(size=2**16))
     shape = shape_of(segment_spectra(y, 1024, 8))
-    flat = Shape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
+    flat = SpectralShape(np.array([0.1, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._kurtosis(flat, y) < 0.3
     assert coloured._kurtosis(shape, y) > 0.7
 
@@ -151,12 +151,14 @@ def test_noise_that_comes_late_in_one_band_is_unsteady(band, least):
 
 def test_the_worst_band_decides_whether_noise_is_steady():
     calm = np.ones((10, 513), complex)
-    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
+    flat = SpectralShape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._unsteady(calm, flat, RATE) == 0.0
     burst = calm.copy()
     burst[:5, 40:160] *= math.sqrt(3.0)  # from 10 to 40 Hz: 3 and 1, off by half of its mean
     assert coloured._unsteady(burst, flat, RATE) == pytest.approx(0.25 * 120 / 1.5)
-    assert coloured._unsteady(burst, Shape(flat.share, 9.0 * flat.level, 0.0), RATE) == pytest.approx(20.0)
+    assert coloured._unsteady(burst, SpectralShape(flat.share, 9.0 * flat.level, 0.0), RATE) == pytest.approx(
+        20.0
+    )
 
 
 def share(a, b):
@@ -216,7 +218,7 @@ def test_lines_that_are_unsteady_count_in_their_band(first, last, lines):
     """Lines of a quarter of a hertz, with powers of 3 and 1: off by half of the mean."""
     spectra = np.ones((10, 513), complex)
     spectra[:5, first : last + 1] = math.sqrt(3.0)
-    flat = Shape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
+    flat = SpectralShape(np.array([0.001, 1.0]), np.array([1.0, 1.0]), 0.0)
     assert coloured._unsteady(spectra, flat, RATE) == pytest.approx(0.25 * lines / 1.5)
 
 

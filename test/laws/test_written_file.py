@@ -20,11 +20,11 @@ from rsea_ros.laws.law import Curve, Law, Part
 from rsea_ros.laws.memory import remembered
 from rsea_ros.laws.refinement import effect_from
 from rsea_ros.laws.terms import COMMAND_TERMS, GEAR_TERMS, SENSOR_TERMS, SPRING_TERMS, Term, wave_terms
-from rsea_ros.laws.writing import Provenance, source_of
+from rsea_ros.laws.writing import LawProvenance, source_of
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.simulation import simulate_drive, synthesize
 
-WHERE = Provenance("2026-01-01", "0.0", {"run.mcap": "ab12"}, "Gain: 50 %.")
+WHERE = LawProvenance("2026-01-01", "0.0", {"run.mcap": "ab12"}, "Gain: 50 %.")
 RANGES = {"w": 0.6, "q": 0.02, "theta": 10.0, "d": 0.02, "T": 30.0, "u": 24.0}
 NOTHING = Claims("velocity", "neither", None)
 
@@ -57,20 +57,20 @@ def written(request):
 
 
 def test_it_holds_the_contract_of_the_effects(written):
-    contract.test_null_equals_nominal_to_the_last_bit(written)
+    contract.test_the_null_effect_equals_the_nominal_model_to_the_last_bit(written)
     contract.test_the_effect_shrinks_to_nothing_with_its_parameters(written)
     contract.test_the_step_is_short_enough(written)
-    contract.test_finite_beside_a_soft_gear(written)
-    contract.test_described_for_people_and_fits(written)
+    contract.test_the_simulation_is_finite_beside_a_soft_gear(written)
+    contract.test_every_effect_is_described_for_people_and_for_fits(written)
     contract.test_wrong_parameters_are_refused(written)
-    contract.test_finite_over_the_whole_bounds(written, "bare_drive")
-    contract.test_finite_over_the_whole_bounds(written, "paper_high_impedance")
+    contract.test_the_simulation_is_finite_over_the_whole_bounds(written, "bare_drive")
+    contract.test_the_simulation_is_finite_over_the_whole_bounds(written, "paper_high_impedance")
 
 
 def test_its_measured_claims_hold(written):
-    claimed.test_it_shows_most_in_its_channel(written)
-    claimed.test_parity(written)
-    claimed.test_growth_with_the_amplitude(written)
+    claimed.test_an_effect_shows_most_in_its_stated_channel(written)
+    claimed.test_an_effect_has_its_stated_parity(written)
+    claimed.test_an_effect_grows_with_the_amplitude_as_stated(written)
     if written.claims.passive:
         claimed.test_a_passive_effect_only_takes_energy(written)
 

@@ -11,7 +11,7 @@ import pytest
 
 from rsea_ros.errors import ParameterError, RigError
 from rsea_ros.model.observer import Estimate, Observer
-from rsea_ros.model.pure_torque import PureTorque, Settings
+from rsea_ros.model.pure_torque import FlagSettings, PureTorque
 from rsea_ros.model.pure_torque_filter import empty_pair, powers
 from rsea_ros.model.pure_torque_noise import split
 from rsea_ros.model.response import frequency_response
@@ -34,7 +34,7 @@ def error_model(rate, rig):
 
 def flag_at(rate, rig="paper_high_impedance", **settings):
     """A flag that knows its noise floor."""
-    flag = PureTorque(load_rig(rig), Settings(**settings))
+    flag = PureTorque(load_rig(rig), FlagSettings(**settings))
     flag.calibrate(error_model(rate, rig), 1.0 / rate)
     return flag
 
@@ -176,4 +176,4 @@ def test_a_rig_without_a_spring_is_refused():
 
 def test_a_limit_that_is_not_a_share_is_refused():
     with pytest.raises(ParameterError, match=r"limit = 0\.9, expected a share from 0\.05 to 0\.5"):
-        Settings(limit=0.9)
+        FlagSettings(limit=0.9)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -15,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
 
 from rsea_ros.nodes import driver
+from test.nodes.warm import Nodes
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT = 60.0
@@ -24,19 +23,13 @@ TIMEOUT = 60.0
 class Process:
     """A node of the package, started with parameters."""
 
-    def __init__(self, name, log, parameters, remaps):
+    def __init__(self, nodes, name, log, parameters, remaps):
         words = [w for key, value in parameters.items() for w in ("-p", f"{key}:={written(value)}")]
         words += [w for old, new in remaps.items() for w in ("-r", f"{old}:={new}")]
         self._log = log
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "ROS_LOG_DIR": str(log.parent / "ros")}
-        with log.open("wb") as sink:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", f"rsea_ros.nodes.{name}", "--ros-args", *words],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=sink,
-                stderr=subprocess.STDOUT,
-            )
+        log.touch()
+        self._process = nodes.start(name, words, environment, log)
 
     @property
     def output(self):
@@ -77,14 +70,22 @@ def written(value):
     return f"'{value}'" if isinstance(value, (str, Path)) else str(value)
 
 
+@pytest.fixture(scope="session")
+def nodes(tmp_path_factory):
+    """What starts nodes, in processes of their own."""
+    parent = Nodes(tmp_path_factory.mktemp("nodes"))
+    yield parent
+    parent.close()
+
+
 @pytest.fixture(scope="module")
-def start(tmp_path_factory):
+def start(nodes, tmp_path_factory):
     """A function that starts a node; what still runs after the module is killed."""
     started = []
 
     def begin(name, remaps=(), **parameters):
         log = tmp_path_factory.mktemp(name) / "output.log"
-        started.append(Process(name, log, parameters, dict(remaps)))
+        started.append(Process(nodes, name, log, parameters, dict(remaps)))
         return started[-1]
 
     yield begin

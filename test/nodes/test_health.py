@@ -8,7 +8,7 @@ import pytest
 from msg_adapters import TopicMap, read_record
 from msg_adapters.ros import ERROR, OK, WARN, JointState, WrenchStamped, joint_state_message, wrench_message
 from rsea_ros.health.codes import NAMES
-from rsea_ros.health.finding import Finding
+from rsea_ros.health.finding import HealthFinding
 from rsea_ros.nodes._findings import FindingsPublisher
 from rsea_ros.nodes._health_inputs import Inputs
 from rsea_ros.nodes._kept import Keeper, Ring
@@ -91,8 +91,8 @@ def test_memory_is_bounded_in_time_and_size():
 def test_every_code_has_a_status_of_its_own(listener):
     nan = math.nan
     found = [
-        Finding("RSEA_BACKLASH", "backlash.gap", "rad", 4e-3, (3.9e-3, 4.1e-3), 2.0, 0.99),
-        Finding("RSEA_SENSOR_FROZEN", "ft", "", nan, (nan, nan), 1.0, 1.0),
+        HealthFinding("RSEA_BACKLASH", "backlash.gap", "rad", 4e-3, (3.9e-3, 4.1e-3), 2.0, 0.99),
+        HealthFinding("RSEA_SENSOR_FROZEN", "ft", "", nan, (nan, nan), 1.0, 1.0),
     ]
     publisher = FindingsPublisher(listener.node, "knee", lambda: found, lambda t: EPOCH + round(t * 1e9))
     messages = []

@@ -28,13 +28,14 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
     """Protocol 2.0; `receiver.rejected` counts damaged frames.
 
     expected: parameters of the reply that is waited for; one of another size answers an older request, is
-    left out and counted (`stale`). None: any. A refusal has no parameters and is accepted.
+    left out and counted (`stale`, `acknowledged` where it has neither parameters nor an error). None: any. A
+    refusal has no parameters and is accepted.
     meanwhile: done once while the next reply is on its way.
     """
 
     def __init__(self) -> None:
         self.receiver = Receiver()
-        self.stale = 0
+        self.stale = self.acknowledged = 0
         self.expected: int | None = None
         self.meanwhile: Callable[[], None] | None = None
         self._frames: list[bytes] = []
@@ -80,6 +81,7 @@ class PacketHandler(Protocol2PacketHandler):  # type: ignore[misc]  # the SDK ha
                 if self._answers(packet):
                     return packet, int(COMM_SUCCESS)
                 self.stale += 1
+                self.acknowledged += len(packet) == EMPTY and not packet[8] & 0x7F
             data = port.receive()
             self._frames += self.receiver.feed(data, raw=fast_option)
             if not data and port.isPacketTimeout():

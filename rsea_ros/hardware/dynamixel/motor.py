@@ -30,6 +30,7 @@ class Motor:
 
     protection: the motor's bus watchdog, or a supervisor for a motor without; known once it is open.
     torque_constant: N m/A of the counts, with its spread; own: the motor's settings.
+    acknowledged_late: whether the reply to a write that raised NoReply arrived during the last reading.
     """
 
     def __init__(self, settings: Settings, port: Port | None = None) -> None:
@@ -39,6 +40,7 @@ class Motor:
         self.protection: Protection | Supervised = Supervised(settings.watchdog, settings.supervisor)
         self._watchlist = Watchlist(self.bus)
         self._longer, self._spared = 0, 0.0
+        self.acknowledged_late, self._unanswered = False, -1
         self.table: ControlTable | None = None
         self.own: OwnLimits | None = None
         self.torque_constant = TorqueConstant(math.nan, math.nan, math.nan, "")
@@ -120,6 +122,8 @@ class Motor:
             raise
         finally:
             self.bus.latency, self._spared = usual, 0.0
+            self.acknowledged_late = 0 <= self._unanswered < self.bus.handler.acknowledged
+            self._unanswered = -1
         instant = (begin + time.monotonic_ns()) // 2
         return self.sample(data, instant)
 
@@ -131,7 +135,11 @@ class Motor:
 
     def write(self, torque: float) -> None:
         """Command a torque (N m). Raises NoReply, PortLost, Refused."""
-        self.bus.put(self.known.goal_torque, self.counts(torque))
+        try:
+            self.bus.put(self.known.goal_torque, self.counts(torque))
+        except NoReply:
+            self._unanswered = self.bus.handler.acknowledged
+            raise
         self._spared = self.port.left
 
     def counts(self, torque: float) -> int:

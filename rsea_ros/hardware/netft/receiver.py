@@ -11,7 +11,7 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from rsea_ros.errors import DeviceError
-from rsea_ros.hardware.netft.records import STOP, STREAM, Record, Sequence, decode, request
+from rsea_ros.hardware.netft.records import STOP, STREAM, RdtRecord, Sequence, decode, request
 
 SO_TIMESTAMPNS = 35
 """Linux: the kernel stamps a datagram on arrival, however late the thread comes to fetch it."""
@@ -32,7 +32,7 @@ class Arrival(NamedTuple):
     """A record and when it arrived: stamp by the system clock, ns since the epoch; instant: monotonic, ns."""
 
     stamp: int
-    record: Record
+    record: RdtRecord
     instant: int
 
 

@@ -22,7 +22,7 @@ RESYNCHRONISE = 4
 """Consecutive records that are believed against those before."""
 
 
-class Record(NamedTuple):
+class RdtRecord(NamedTuple):
     """One record: counters, status bits, counts of force x, y, z and torque x, y, z."""
 
     sequence: int
@@ -36,12 +36,12 @@ def request(command: int, count: int = 0) -> bytes:
     return _REQUEST.pack(0x1234, command, count)
 
 
-def decode(datagram: bytes) -> Record | None:
+def decode(datagram: bytes) -> RdtRecord | None:
     """Return the record of a datagram; None for another datagram."""
     if len(datagram) != SIZE:
         return None
     sequence, ft_sequence, status, *counts = _RECORD.unpack(datagram)
-    return Record(sequence, ft_sequence, status, tuple(counts))
+    return RdtRecord(sequence, ft_sequence, status, tuple(counts))
 
 
 def trouble(status: int) -> str:
@@ -77,7 +77,7 @@ class Sequence:
         """Accept the next record whatever its counters."""
         self._rdt = self._ft = None
 
-    def accept(self, record: Record) -> bool:
+    def accept(self, record: RdtRecord) -> bool:
         """Count a record; return whether it is newer than all before and may be used."""
         step = 1 if self._rdt is None else (record.sequence - self._rdt) % _WORD
         ft_step = 1 if self._ft is None else (record.ft_sequence - self._ft) % _WORD
@@ -97,7 +97,7 @@ class Sequence:
         self._stray, self._strays = None, 0
         return True
 
-    def _another_stream(self, record: Record) -> bool:
+    def _another_stream(self, record: RdtRecord) -> bool:
         """Return whether the last few records that did not fit follow each other."""
         follows = False
         if self._stray is not None:

@@ -9,7 +9,7 @@ from rsea_ros.effects import signal_table as st
 from rsea_ros.effects.catalogue import effect_named
 from rsea_ros.model.drive import LONGEST_STEP
 from rsea_ros.model.equations import PORTS
-from rsea_ros.model.observer.filter import CLOCK, SIGMA, Model, State, disturbance
+from rsea_ros.model.observer.filter import CLOCK, SIGMA, FilterModel, FilterState, disturbance
 from rsea_ros.model.observer.linear import linear_model
 from rsea_ros.model.observer.noise import Noise
 from rsea_ros.model.rig import Rig
@@ -32,7 +32,7 @@ def without_delay(rig: Rig) -> tuple[Rig, float]:
     return rig.with_effects(*(e for e in rig.effects if e not in delays)), float(delay)
 
 
-def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[Model, State]:
+def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[FilterModel, FilterState]:
     """Return the model and the state at rest with nothing known. hold, duration: s."""
     machine, linear = build(rig, LONGEST_STEP, duration), linear_model(structured(rig))
     n, size = linear.order, len(linear.start)
@@ -44,7 +44,7 @@ def assemble(rig: Rig, noise: Noise, *, hold: float, duration: float) -> tuple[M
     walk = np.zeros((size, size))
     walk[n, n] = noise.walk / scale[n] ** 2
     estimated = linear.estimated
-    model = Model(
+    model = FilterModel(
         linear=machine.linear._replace(phi=np.eye(n), g=np.zeros((n, len(PORTS)))),
         calls=_with_disturbance(machine.calls),
         block=block, block_scale=block_scale, a=a, walk=walk, scale=scale,
@@ -78,12 +78,12 @@ def _with_disturbance(calls: Calls) -> Calls:
     )
 
 
-def _state(n: int, size: int, machine: Machine) -> State:
+def _state(n: int, size: int, machine: Machine) -> FilterState:
     """Return a state of zeros, all its parts views of one array."""
     own = len(machine.own)
     sizes = (n, size - n, size * size, st.SIZE, own, n, 3, SIGMA + 3, CLOCK, 9)
     whole = np.zeros(sum(sizes))
     parts = np.split(whole, np.cumsum(sizes)[:-1])
-    state = State(whole, *parts)
+    state = FilterState(whole, *parts)
     state.table[:] = machine.table
     return state._replace(p=state.p.reshape(size, size))

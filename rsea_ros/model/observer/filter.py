@@ -42,7 +42,7 @@ once: Any = partial(njit, cache=True, nogil=True, error_model="numpy", inline="a
 """For functions that one place calls."""
 
 
-class Model(NamedTuple):
+class FilterModel(NamedTuple):
     """The constants of the filter; only `held` changes: step for which linear.phi, f and q hold, s.
 
     measured: rows of position and ft on z, shape (2, n). noise: variances of position, ft, motor torque.
@@ -66,7 +66,7 @@ class Model(NamedTuple):
     hold: float
 
 
-class State(NamedTuple):
+class FilterState(NamedTuple):
     """All that changes, as views of `whole`, so that a copy of one array is a checkpoint.
 
     extra: (d[, zero]). reach: g. predicted: position, ft, measured motor torque. estimate: T_d, T_p, d, their

@@ -16,14 +16,14 @@ from numba import carray, types  # type: ignore[attr-defined]
 from numba.extending import intrinsic
 
 from rsea_ros.compiler import njit
-from rsea_ros.model.observer.filter import Model, State, inner
+from rsea_ros.model.observer.filter import FilterModel, FilterState, inner
 from rsea_ros.model.observer.log import NONE, Log, take_in
 from rsea_ros.model.step import Calls, Linear
 
 ADDRESS, ROWS, COLUMNS = range(3)
 
 
-def handle_of(model: Model, state: State, log: Log) -> npt.NDArray[np.int64]:
+def handle_of(model: FilterModel, state: FilterState, log: Log) -> npt.NDArray[np.int64]:
     """Return address and shape of every array, shape (arrays, 3). The arrays must outlive it."""
     return np.array([_row(array) for array in _arrays((model, state, log))], dtype=np.int64)
 
@@ -78,15 +78,15 @@ def _model(h, rest, reads_load, hold):  # type: ignore[no-untyped-def]
     m, v, n = _matrix, _vector, _numbers
     linear = Linear(m(h, 0), m(h, 1), n(h, 2), m(h, 3), m(h, 4), m(h, 5), v(h, 6), reads_load, rest)
     calls = Calls(n(h, 7), n(h, 8), n(h, 9), n(h, 10), v(h, 11), True)
-    return Model(linear, calls, m(h, 12), v(h, 13), m(h, 14), m(h, 15), v(h, 16), m(h, 17), m(h, 18),
+    return FilterModel(linear, calls, m(h, 12), v(h, 13), m(h, 14), m(h, 15), v(h, 16), m(h, 17), m(h, 18),
                  m(h, 19), v(h, 20), m(h, 21), m(h, 22), v(h, 23), hold)  # fmt: skip
 
 
 @inner
 def _state(h):  # type: ignore[no-untyped-def]
     m, v = _matrix, _vector
-    return State(v(h, 24), v(h, 25), v(h, 26), m(h, 27), v(h, 28), v(h, 29), v(h, 30), v(h, 31), v(h, 32),
-                 v(h, 33), v(h, 34))  # fmt: skip
+    return FilterState(v(h, 24), v(h, 25), v(h, 26), m(h, 27), v(h, 28), v(h, 29), v(h, 30), v(h, 31),
+                       v(h, 32), v(h, 33), v(h, 34))  # fmt: skip
 
 
 @inner

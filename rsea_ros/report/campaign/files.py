@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rsea_ros.experiment.campaign import Campaign, Outcome
+from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.experiment.run_file import run_text
 from rsea_ros.model.rig_file import rig_text
 from rsea_ros.new_files import NewFiles
@@ -16,7 +16,7 @@ from rsea_ros.report.provenance import Provenance
 
 
 def write_campaign(
-    outcome: Outcome,
+    outcome: CampaignOutcome,
     campaign: Campaign,
     out: Path,
     notes: tuple[str, ...] = (),

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rsea_ros.experiment.campaign import Campaign, Outcome
+from rsea_ros.experiment.campaign import Campaign, CampaignOutcome
 from rsea_ros.report.campaign.words import end_sentence
 from rsea_ros.report.experiment.json import SCHEMA, proof_json, proposal_json
 from rsea_ros.report.json_values import strict
 
 
-def campaign_json(outcome: Outcome, campaign: Campaign) -> Mapping[str, Any]:
+def campaign_json(outcome: CampaignOutcome, campaign: Campaign) -> Mapping[str, Any]:
     """Return the contents of experiment.json of a session."""
     rounds = [
         {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rsea_ros.experiment.campaign import Outcome
-from rsea_ros.experiment.limits import Limits
+from rsea_ros.experiment.campaign import CampaignOutcome
+from rsea_ros.experiment.limits import RunLimits
 from rsea_ros.report.campaign.words import end_sentence, size
 from rsea_ros.report.experiment.page import command_figure, limits_section, spectrum_figure
 from rsea_ros.report.experiment.words import plain_name, proof_words, shape_words
@@ -22,9 +22,9 @@ _ROWS = 8
 
 
 def campaign_page(
-    outcome: Outcome,
+    outcome: CampaignOutcome,
     rig: str,
-    limits: Limits,
+    limits: RunLimits,
     notes: tuple[str, ...] = (),
     provenance: Provenance | None = None,
 ) -> str:
@@ -43,19 +43,19 @@ def campaign_page(
     return page(_title(outcome), f"A session of experiments · {rig}", blocks, footer)
 
 
-def _title(outcome: Outcome) -> str:
+def _title(outcome: CampaignOutcome) -> str:
     text = end_sentence(outcome)
     return text[0].upper() + text[1:]
 
 
-def _keys(outcome: Outcome) -> list[tuple[str, str]]:
+def _keys(outcome: CampaignOutcome) -> list[tuple[str, str]]:
     p = outcome.weighing.probability[outcome.cause]
     count = sum(r.proposal is not None for r in outcome.rounds)
     keys = [(f"{p:.1%}", plain_name(outcome.cause)), (f"{outcome.seconds:.3g} s", "of excitation")]
     return [*keys, (str(count), "runs"), (f"{outcome.weighing.left:.2f}", "times the noise remains")]
 
 
-def probability_figure(outcome: Outcome) -> Figure:
+def probability_figure(outcome: CampaignOutcome) -> Figure:
     """Return the probability of each cause before the first run and after each."""
     rounds = outcome.rounds
     x = np.arange(len(rounds), dtype=float)
@@ -88,7 +88,7 @@ def probability_figure(outcome: Outcome) -> Figure:
     )
 
 
-def _table(outcome: Outcome) -> str:
+def _table(outcome: CampaignOutcome) -> str:
     rows = []
     for k, r in enumerate(outcome.rounds):
         order = sorted(r.weighing.probability.items(), key=lambda item: -item[1])

@@ -6,9 +6,9 @@ import math
 
 from rsea_ros.diagnosis.settings import DEFAULT
 from rsea_ros.effects.catalogue import effect_named
-from rsea_ros.experiment.campaign import Outcome
+from rsea_ros.experiment.campaign import CampaignOutcome
 from rsea_ros.experiment.hypothesis import NOTHING
-from rsea_ros.experiment.weighing import Weighing
+from rsea_ros.experiment.weighing import RunWeighing
 from rsea_ros.model.rig import CLOCK_DOUBT
 from rsea_ros.report.experiment.words import plain_name
 from rsea_ros.wording import listed
@@ -16,13 +16,13 @@ from rsea_ros.wording import listed
 _SHOWN = 0.01
 
 
-def known(weighing: Weighing) -> str:
+def known(weighing: RunWeighing) -> str:
     """Return the likeliest causes with their probabilities."""
     order = sorted(weighing.probability.items(), key=lambda item: -item[1])
     return "known: " + ", ".join(f"{plain_name(n)} {p:.2f}" for n, p in order if p >= _SHOWN)
 
 
-def size(weighing: Weighing, name: str) -> str:
+def size(weighing: RunWeighing, name: str) -> str:
     """Return a cause's main parameter with one sigma, the simulation's own doubt included; empty for none."""
     if name == NOTHING:
         return ""
@@ -39,7 +39,7 @@ def size(weighing: Weighing, name: str) -> str:
     return f"{main.name.replace('_', ' ')} {value:.4g} ± {spread:.2g}{unit}"
 
 
-def end_sentence(outcome: Outcome) -> str:
+def end_sentence(outcome: CampaignOutcome) -> str:
     """Return how a session ended."""
     cause, p = outcome.cause, outcome.weighing.probability[outcome.cause]
     spent = f"after {outcome.seconds:.3g} s of excitation in {_runs(outcome)}"
@@ -67,11 +67,11 @@ def end_sentence(outcome: Outcome) -> str:
             return f"The session could not continue ({outcome.why}): {_open(outcome)} remain possible"
 
 
-def _runs(outcome: Outcome) -> str:
+def _runs(outcome: CampaignOutcome) -> str:
     count = sum(r.proposal is not None for r in outcome.rounds)
     return "1 run" if count == 1 else f"{count} runs"
 
 
-def _open(outcome: Outcome) -> str:
+def _open(outcome: CampaignOutcome) -> str:
     order = sorted(outcome.weighing.probability.items(), key=lambda item: -item[1])
     return listed([f"{plain_name(n)} ({p:.2f})" for n, p in order if p >= 0.05])

@@ -16,7 +16,7 @@ from rsea_ros.model.rig import Rig
 from rsea_ros.report.control.tables import control_tables, gains_words
 from rsea_ros.report.figures.figure import Figure, Json, axis, band, frequency_axis, label, layout, line
 from rsea_ros.report.figures.palette import AFTER, BEFORE, MEASURED, QUIET, TRUTH, faint
-from rsea_ros.report.figures.response import Band, Mark, Response, response_figure
+from rsea_ros.report.figures.response import Band, Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, key_numbers, section
 
@@ -104,12 +104,12 @@ def _following(
     more: str = "",
 ) -> Figure:
     curves = [
-        Response(f"{at.design.rate:g} Hz", colour, curve.hz, curve.torque, 2.0, band=_band(curve, apart))
+        ResponseCurve(f"{at.design.rate:g} Hz", colour, curve.hz, curve.torque, 2.0, band=_band(curve, apart))
         for (at, curve, apart), colour in zip(seen, _COLOURS, strict=False)
     ]
     hz = np.geomspace(1.0, 0.45 * max(at.design.rate for at in study.rates), 300)
     opened = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
-    curves.append(Response("without control", MEASURED, hz, opened, 1.2, "dot"))
+    curves.append(ResponseCurve("without control", MEASURED, hz, opened, 1.2, "dot"))
     caption = f"Distal over desired torque, 1 N·m, sine by sine, in simulation. {BAND} {more}".strip()
     marks = [Mark(3.0 * study.resonance, "3 × resonance")]
     return response_figure(title, curves, marks, caption, (-50.0, 15.0))

@@ -25,7 +25,7 @@ from rsea_ros.report.design.tables import (
 )
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, QUIET, TRUTH
-from rsea_ros.report.figures.response import Mark, Response, response_figure
+from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import equation, key_numbers, section
 from rsea_ros.signals import FloatArray
@@ -164,8 +164,8 @@ def _open_loop(designs: Sequence[Design]) -> Figure:
         rig = rig_of(d.requirement, d.unit, d.stiffness)
         motor = frequency_response(rig, outputs.end_torque(rig, "spring_end"), hz)
         ends = end_to_end(rig)(2j * np.pi * hz)
-        curves.append(Response(f"{d.stiffness:.0f}: T_d/T_p", colour, hz, ends))
-        curves.append(Response(f"{d.stiffness:.0f}: T_d/T_m", colour, hz, motor, 1.2, "dot"))
+        curves.append(ResponseCurve(f"{d.stiffness:.0f}: T_d/T_p", colour, hz, ends))
+        curves.append(ResponseCurve(f"{d.stiffness:.0f}: T_d/T_m", colour, hz, motor, 1.2, "dot"))
     first = designs[0]
     between = (
         f"resonate at {first.resonance:.1f} Hz"

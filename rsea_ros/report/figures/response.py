@@ -22,7 +22,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Response:
+class ResponseCurve:
     """A curve: name in the legend at its end, hz and values of shape (n,)."""
 
     name: str
@@ -45,7 +45,7 @@ class Mark:
 
 def response_figure(
     title: str,
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark] = (),
     caption: str = "",
     decibel: tuple[float, float] | None = None,
@@ -69,7 +69,7 @@ def response_figure(
 
 
 def _layout(
-    responses: Sequence[Response],
+    responses: Sequence[ResponseCurve],
     marks: Sequence[Mark],
     decibel: tuple[float, float] | None,
     phase: bool,
@@ -90,14 +90,14 @@ def _layout(
     )
 
 
-def _phase_tick(responses: Sequence[Response]) -> float:
+def _phase_tick(responses: Sequence[ResponseCurve]) -> float:
     """Return 90 degrees, or 180 where that would be more than eight marks."""
     turned = [np.degrees(np.ptp(np.unwrap(np.angle(r.values)))) for r in responses]
     turned += [np.ptp(np.concatenate(r.band.phase)) for r in responses if r.band is not None]
     return 90.0 if max(turned) <= 720.0 else 180.0
 
 
-def _names(responses: Sequence[Response]) -> list[Json]:
+def _names(responses: Sequence[ResponseCurve]) -> list[Json]:
     return [
         label(r.name, 1.015, 1.0 - 0.075 * i, r.colour, xref="paper", yref="paper", yanchor="top")
         for i, r in enumerate(responses)

@@ -17,7 +17,7 @@ from rsea_ros.paper.claims import PROTOTYPE_TRAINS
 from rsea_ros.paper.figure_18 import readings
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import AFTER, BEFORE, TRUTH
-from rsea_ros.report.figures.response import Mark, Response
+from rsea_ros.report.figures.response import Mark, ResponseCurve
 from rsea_ros.report.paper.circuit_drawing import epicyclic_circuit, general_circuit
 from rsea_ros.report.paper.svg import gain_svg
 from rsea_ros.signals import FloatArray
@@ -49,14 +49,18 @@ def _clamped() -> str:
         "T_p/T_m, lumped": (BEFORE, apart, outputs.proximal(apart)),
         "T_p/T_m, unlumped": (TRUTH, rig, outputs.proximal(rig)),
     }
-    curves = [Response(n, c, _HZ, frequency_response(model, y, _HZ)) for n, (c, model, y) in read.items()]
+    curves = [
+        ResponseCurve(n, c, _HZ, frequency_response(model, y, _HZ)) for n, (c, model, y) in read.items()
+    ]
     return gain_svg(curves, (-60.0, 20.0), [Mark(6.37, "6.4 Hz")])
 
 
 def _moving_output() -> str:
     rig = load_rig("paper_moving_output")
     curves = [
-        Response(name, colour, _HZ, frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ))
+        ResponseCurve(
+            name, colour, _HZ, frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ)
+        )
         for (name, model), colour in zip(readings(rig).items(), (AFTER, TRUTH, BEFORE), strict=True)
     ]
     return gain_svg(
@@ -69,13 +73,13 @@ def _end_to_end() -> str:
     rig = load_rig("prototype_knee")
     k_s, j_sc = rig["spring.stiffness"], rig["chassis.inertia"]
     eq_6 = formulas.eq_6_distal_per_proximal(k_s, j_sc, rig["spring.damping"])
-    curves = [Response("Eq. (6)", AFTER, hz, eq_6(2j * np.pi * hz))]
+    curves = [ResponseCurve("Eq. (6)", AFTER, hz, eq_6(2j * np.pi * hz))]
     edge = pure_torque_bandwidth(k_s, j_sc)
     marks = [Mark(edge, f"{edge:.1f} Hz")]
     for train, colour, anchor in zip(PROTOTYPE_TRAINS, (BEFORE, TRUTH), ("start", "end"), strict=True):
         turned = replace(rig, train=train)
         name = f"spin, n = {words.signed(train_ratio(turned), 0)}"
-        curves.append(Response(name, colour, hz, end_to_end(turned)(2j * np.pi * hz)))
+        curves.append(ResponseCurve(name, colour, hz, end_to_end(turned)(2j * np.pi * hz)))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", anchor))
     return gain_svg(curves, (-40.0, 40.0), marks)

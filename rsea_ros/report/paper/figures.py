@@ -22,7 +22,7 @@ from rsea_ros.report import words
 from rsea_ros.report.design.surface import Point, bandwidth_surface, slices
 from rsea_ros.report.figures.figure import Figure
 from rsea_ros.report.figures.palette import AFTER, BEFORE, INK, MEASURED, TRUTH, faint
-from rsea_ros.report.figures.response import Mark, Response, response_figure
+from rsea_ros.report.figures.response import Mark, ResponseCurve, response_figure
 from rsea_ros.report.figures.thinned import thinned
 from rsea_ros.signals import FloatArray
 
@@ -70,9 +70,9 @@ def figure_15(measured: FrequencyResponse) -> Figure:
     element = formulas.eq_1_lumped_distal_per_motor(1530.456, 0.957, 26.088)(s)
     curves = [
         _measured(measured, "simulated test"),
-        Response("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
-        Response("Eq. (4), Table 2", INK, _HZ, element, 1.4, "dash"),
-        Response("the same, sensor<br>sees K_s + b_s s", AFTER, _HZ, table_2),
+        ResponseCurve("Eq. (10) as printed", BEFORE, _HZ, np.asarray(c_0 / (s**2 + c_1 * s + c_2))),
+        ResponseCurve("Eq. (4), Table 2", INK, _HZ, element, 1.4, "dash"),
+        ResponseCurve("the same, sensor<br>sees K_s + b_s s", AFTER, _HZ, table_2),
     ]
     apart = 20 * np.log10(c_0 / c_2)
     title = f"Fig. 15: printed fit and Table 2 part by {-apart:.2f} dB at rest; lumped and unlumped are one"
@@ -90,7 +90,7 @@ def figure_18(test: MovingOutput) -> Figure:
         values = frequency_response(rival.rig, outputs.end_torque(rival.rig, "spring_end"), _HZ)
         share = 100 * rival.judged[0].explained
         curves.append(
-            Response(f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained", colour, _HZ, values)
+            ResponseCurve(f"<b>{rival.name}</b>, fitted:<br>{share:.2f} % explained", colour, _HZ, values)
         )
     shares = [100 * rival.judged[0].explained for rival in test.rivals]
     title = (
@@ -116,7 +116,7 @@ def figure_18_as_printed() -> Figure:
         models.items(), (AFTER, BEFORE, BEFORE), ("solid", "solid", "dot"), strict=True
     ):
         values = frequency_response(model, outputs.end_torque(model, "spring_end"), _HZ)
-        curves.append(Response(name.replace(", ", ",<br>"), colour, _HZ, values, dash=dash))
+        curves.append(ResponseCurve(name.replace(", ", ",<br>"), colour, _HZ, values, dash=dash))
     unlumped, moving, grounded = models.values()
     own, other = resonance_hz(unlumped), resonance_hz(moving)
     hz, gap = largest_gap(unlumped, grounded)
@@ -140,7 +140,7 @@ def figure_20() -> Figure:
     s = 2j * np.pi * hz
     k_s, j_sc = rig["spring.stiffness"], rig["chassis.inertia"]
     curves = [
-        Response(
+        ResponseCurve(
             "Eq. (6), b_s = 0.02",
             AFTER,
             hz,
@@ -151,7 +151,7 @@ def figure_20() -> Figure:
     for train, dash in zip(PROTOTYPE_TRAINS, ("solid", "dash"), strict=True):
         turned = replace(rig, train=train)
         name = f"with the rotor's spin,<br>n = {words.signed(train_ratio(turned), 0)}"
-        curves.append(Response(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
+        curves.append(ResponseCurve(name, BEFORE, hz, end_to_end(turned)(s), dash=dash))
         edge = float(undamped_band(k_s, inner_inertia(turned)))
         marks.append(Mark(edge, f"{edge:.1f} Hz", "left" if not marks[1:] else "right"))
     ours = pure_torque_bandwidth(k_s, j_sc)
@@ -171,7 +171,7 @@ def figure_20() -> Figure:
     return response_figure(title, curves, marks, caption, decibel=(-20, 20))
 
 
-def _measured(response: FrequencyResponse, name: str) -> Response:
+def _measured(response: FrequencyResponse, name: str) -> ResponseCurve:
     shown, _ = thinned(response, None)
     keep = (shown.frequency >= _HZ[0]) & (shown.coherence > 0.02)
-    return Response(name, faint(MEASURED, 0.6), shown.frequency[keep], shown.response[keep], 5.0)
+    return ResponseCurve(name, faint(MEASURED, 0.6), shown.frequency[keep], shown.response[keep], 5.0)

@@ -10,13 +10,15 @@ import numpy as np
 
 from rsea_ros.report import words
 from rsea_ros.report.figures.palette import GRID, INK, QUIET
-from rsea_ros.report.figures.response import Mark, Response
+from rsea_ros.report.figures.response import Mark, ResponseCurve
 
 _WIDTH, _HEIGHT = 760.0, 300.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 190.0, 30.0, 44.0
 
 
-def gain_svg(responses: Sequence[Response], decibel: tuple[float, float], marks: Sequence[Mark] = ()) -> str:
+def gain_svg(
+    responses: Sequence[ResponseCurve], decibel: tuple[float, float], marks: Sequence[Mark] = ()
+) -> str:
     """Return gain in dB over frequency, each curve named in its colour on the right."""
     low, high = responses[0].hz[0], responses[0].hz[-1]
 

@@ -7,8 +7,8 @@ from html import escape
 
 from rsea_ros.paper.arrangements import Arrangement, Limit
 from rsea_ros.paper.bands import TOLERANCES, Bands
-from rsea_ros.paper.claims import TABLE_2, Claim
-from rsea_ros.paper.finding import Finding
+from rsea_ros.paper.claims import TABLE_2, PaperClaim
+from rsea_ros.paper.finding import PaperFinding
 from rsea_ros.paper.moving_output import MovingOutput
 from rsea_ros.paper.rivals import Judged
 from rsea_ros.report import words
@@ -36,7 +36,7 @@ TABLE_1 = (
 )
 
 
-def claims_table(claims: Sequence[Claim]) -> str:
+def claims_table(claims: Sequence[PaperClaim]) -> str:
     """Return printed beside our numbers; only results of the paper's own numbers are counted."""
     recomputed = [c for c in claims if c.status == "found"]
     agree = sum(c.agrees for c in recomputed)
@@ -57,7 +57,7 @@ def claims_table(claims: Sequence[Claim]) -> str:
     return section(title, table(head, rows, numbers=(2, 3, 5)), caption=caption)
 
 
-def findings_list(findings: Sequence[Finding]) -> str:
+def findings_list(findings: Sequence[PaperFinding]) -> str:
     """Return where the paper contradicts itself or is silent."""
     counts = {status: sum(f.status == status for f in findings) for status in ("found", "silent", "unclear")}
     rows = "".join(

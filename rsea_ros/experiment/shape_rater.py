@@ -21,7 +21,7 @@ INSIDE = 0.9
 
 
 @dataclass(frozen=True)
-class Judge:
+class ShapeRater:
     """Judges shapes for hypotheses. noise: by channel."""
 
     hypotheses: Sequence[Hypothesis]
