@@ -23,7 +23,7 @@ from rsea_ros.control.law import Law, law_of
 from rsea_ros.control.loop import linked, returns
 from rsea_ros.control.margins import encirclements
 from rsea_ros.control.sampled import LINK
-from rsea_ros.control.synthesis import HEAVY, SOFT, Demand, Design, grid
+from rsea_ros.control.synthesis import SOFT, Demand, Design, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners, family
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import ComplexArray, FloatArray
@@ -83,8 +83,8 @@ def link_share(rig: Rig, loads: Mapping[str, Rig], design: Design, demand: Deman
     """Return the parts that make the output softest with every bench of the set as robust as demanded."""
     demand, law, u = demand or Demand(), law_of(rig, design.rate, design.gains), Uncertainty()
     hz = grid(design.rate, 60)
-    few = [name for name in loads if not name.endswith(HEAVY)]
-    f, still = family(loads, corners(few, u), u, design.rate, hz), moved(rig, design.rate, hz)
+    f = family(loads, corners(tuple(loads), u), u, design.rate, hz)
+    still = moved(rig, design.rate, hz)
     own, alone = returns(law, f.plant, hz, f.path, f.current)
     before = _peaks(own, alone)
     allowed = np.maximum(MORE * np.where(f.nominal, demand.sensitivity, demand.robust), before)

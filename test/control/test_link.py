@@ -14,6 +14,7 @@ from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import load_range
 from rsea_ros.control.loop import linked
 from rsea_ros.control.synthesis import Design
+from rsea_ros.control.trials import disturbed, lagging_corners
 from rsea_ros.control.virtual import Virtual
 from rsea_ros.model.rig_file import load_rig
 
@@ -46,6 +47,17 @@ def test_a_free_load_is_followed_no_worse():
         for share in (None, SHARE)
     )
     assert with_link < min(0.02, without)
+
+
+@pytest.mark.parametrize("load", ["free x 0.5", "free x 1", "free x 10"])
+def test_a_free_load_with_little_drag_and_all_of_the_lag_comes_to_rest(load):
+    """In full, inertia and drag are gone for the load and the lag swings a pendulum up."""
+    loads = load_range(RIG, FREE)
+    true = disturbed(loads, lagging_corners(load, every=True)[2])
+    wanted = np.where(np.arange(1120) < 60, 2.0, 0.0)
+    controller = TorqueController(RIG, RATE, GAINS, link=SHARE, learn=False)
+    ft = closed_loop(true, RATE, controller, wanted, noise=False, late=1).ft
+    assert np.std(ft[-280:]) < 0.05 * np.std(ft[60:340])
 
 
 def test_an_encoder_that_fails_takes_the_torque_away_without_a_jump():

@@ -28,7 +28,7 @@ BAND = (
 )
 LEARNING = (
     "Here the loads are half, once and twice the inertia. Slow or small motion teaches nothing of "
-    "the load; below about 3 Hz only feedback is left."
+    "the load; then only feedback is left."
 )
 
 
