@@ -15,11 +15,10 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
-
 LEAST_SHARE = 1e-5
-"""Power of a contribution over that of the residual below which a cause changes nothing. Derived: a cause lowers
-the residual's power by no more than the power that it contributes, here 0.001 %; the least gain that is
-named is 100 times as much."""
+"""Power of a contribution over that of the residual below which a cause changes nothing. Derived: a cause
+lowers the residual's power by no more than the power that it contributes, here 0.001 %; the least gain that
+is named is 100 times as much."""
 
 
 @dataclass(frozen=True)
