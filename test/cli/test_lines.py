@@ -80,3 +80,9 @@ def test_the_first_compilation_is_said_once_on_a_terminal(tmp_path, monkeypatch,
     assert main(["rigs"]) == 0
     said = "rsea: compiling the simulation for this machine: up to a minute, once\n"
     assert errors.getvalue() == (said if tty else "")
+
+
+def test_a_description_is_broken_once(capsys):
+    assert main(["effects", "hard_stop"]) == 0
+    said = capsys.readouterr().out
+    assert "Literature survey of contact dynamics modelling" in said and "\n\n\n" not in said
