@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
         for action in args.action:
             print(caller.call(args.node, action), flush=True)
         if not args.action:
-            _list(caller, [caller.found(args.node)] if args.node else caller.callable_nodes(args.seconds))
+            every = caller.callable_nodes(args.seconds)
+            _list(caller, [caller.found(args.node)] if args.node else every)
     return 0
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -49,6 +49,7 @@ class Caller:
         Raises ParameterError for an unknown node or action, CallRefused when the node does not do it.
         """
         name = self.found(name)
+        _await(lambda: action in self.actions(name))
         if action in self._transitions(name):
             return self._change(name, action)
         if action in self._triggers(name):
@@ -74,13 +75,10 @@ class Caller:
     def found(self, name: str) -> str:
         """Return the full name of a node. Raises ParameterError when it does not run or offers nothing."""
         name = absolute(name)
-        deadline = time.monotonic() + DISCOVERY
-        while time.monotonic() < deadline:
-            if name in self._nodes() and self.actions(name):
-                return name
-            time.sleep(POLL)
-        near = did_you_mean(name, self._nodes())
-        raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
+        if not _await(lambda: name in self._nodes() and bool(self.actions(name))):
+            near = did_you_mean(name, self._nodes())
+            raise ParameterError(f"node {name}: it does not run{near} (rsea call lists what does)")
+        return name
 
     def _nodes(self) -> list[str]:
         pairs = self._node.get_node_names_and_namespaces()
@@ -117,3 +115,11 @@ class Caller:
             return future.result()
         finally:
             self._node.destroy_client(client)
+
+
+def _await(is_true: Callable[[], bool]) -> bool:
+    """Return whether something becomes true while the services of a graph are being discovered."""
+    deadline = time.monotonic() + DISCOVERY
+    while not (done := is_true()) and time.monotonic() < deadline:
+        time.sleep(POLL)
+    return done
