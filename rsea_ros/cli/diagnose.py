@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        runs = [*each_once(args.bags), *([args.holdout] if args.holdout else [])]
+        runs = each_once([*args.bags, *([args.holdout] if args.holdout else [])])
         records = [readable(bag, topics, args) for bag in runs]
         from rsea_ros.cli._checks import checked
 

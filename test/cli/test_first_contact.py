@@ -115,3 +115,11 @@ def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatc
 def test_an_axis_with_a_minus_sign_is_accepted_as_typed(capsys):
     assert cli.main(["check", "no_such_bag", "--axis", "-torque.z"]) == 2
     assert "no such bag" in capsys.readouterr().err
+
+
+def test_a_holdout_that_is_a_run_of_the_fit_is_refused(tmp_path, capsys):
+    """Its gain was printed as held out."""
+    run = str(tmp_path / "run.mcap")
+    Path(run).touch()
+    assert cli.main(["diagnose", run, "--holdout", f"{tmp_path}/../{tmp_path.name}/run.mcap"]) == 2
+    assert "run.mcap: given twice, expected each bag once" in capsys.readouterr().err
