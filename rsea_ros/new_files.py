@@ -97,8 +97,9 @@ class NewFiles:
     def _make_folder(self) -> Path:
         """Make the folder and its missing parents, and return it."""
         first, fresh = self._place.folder, self._place.fresh
-        if first.exists() and not first.is_dir() and not fresh:
-            raise OutputError(f"{first}: is a file, expected a directory or a new name")
+        if not fresh and (first.is_symlink() or (first.exists() and not first.is_dir())):
+            found = "symbolic link" if first.is_symlink() else "file"
+            raise OutputError(f"{first}: is a {found}, expected a directory or a new name")
         self._made = make_folder(first.parent if fresh else first)
         for folder in siblings(first) if fresh else ():
             with suppress(FileExistsError):

@@ -43,9 +43,9 @@ def lag_of(side: Side) -> float:
     """Return how much later than predicted a channel comes, s; 0 where no single lag stands out."""
     period = float(np.median(np.diff(side.t)))
     even = np.arange(side.t[0], side.t[-1], period)
-    if len(even) < 64:
-        return 0.0
     reach = min(REACH, period * len(even) / _SHORTEST)
+    if len(even) < 64 or reach < period:
+        return 0.0
     y, p = (np.interp(even, side.t, v) for v in (side.y, side.p))
     lag, alike = _correlation(y, p, period, reach)
     best = int(np.argmax(alike))

@@ -22,6 +22,8 @@ _SEGMENTS = 5
 """A record is cut into segments of a fifth: slow ramps still have their line, and nine of them overlap."""
 _LONGEST = 8.0
 """s. Of a segment, where the record has more than five such."""
+_FEWEST = 16
+"""Samples of a segment, at rates that put fewer into its longest."""
 _LINES = 48
 _ENOUGH = 0.3
 """Of the predicted power: lines that hold less say nothing of a channel."""
@@ -71,9 +73,10 @@ def quotient(channel: str, t: FloatArray, y: FloatArray, p: FloatArray) -> Quoti
     period = float(np.median(np.diff(t)))
     even = np.arange(t[0], t[-1], period)
     y, p = (np.interp(even, t, v) for v in (y, p))
-    if len(even) < 16 * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
+    if len(even) < _FEWEST * _SEGMENTS or not (np.std(p) > 0.0 and np.std(y) > 0.0):
         return None
-    length = min(len(even) // _SEGMENTS, next_fast_length(int(_LONGEST / period)))
+    longest = next_fast_length(max(_FEWEST, int(_LONGEST / period)))
+    length = min(len(even) // _SEGMENTS, longest)
     pp = _segments(p, length)
     if _captured(pp, p) < _ENOUGH:  # slow: its lines lie below those of short segments
         length = len(even) // _SEGMENTS

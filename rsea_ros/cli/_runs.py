@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from rsea_ros.cli._topics import topic_options, window_options
 from rsea_ros.identification.remark import Remark
 from rsea_ros.model.rig_choice import RigChoice
 
@@ -29,8 +30,8 @@ def add_rig(parser: argparse.ArgumentParser, about: str = _RIGS) -> None:
 
 
 def rig_choice(args: argparse.Namespace) -> RigChoice:
-    """Return how the rig of a verb with --rig was chosen."""
-    return RigChoice(args.rig, args.rig_is_default)
+    """Return how the rig and the data of a verb with --rig were chosen."""
+    return RigChoice(args.rig, args.rig_is_default, topic_options(args), window_options(args))
 
 
 def off_rig(remarks: Iterable[Remark]) -> list[str]:

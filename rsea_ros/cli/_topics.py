@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from msg_adapters.topics import AXES, ROLES, TopicMap
@@ -37,6 +37,28 @@ def add_topic_options(parser: argparse.ArgumentParser) -> None:
 def topic_map(args: argparse.Namespace) -> TopicMap:
     """Return the topic map of the options. Raises ParameterError for an impossible one."""
     return TopicMap(namespace=args.namespace, joint=args.joint, axis=args.axis).renamed(args.topic)
+
+
+def topic_options(args: argparse.Namespace) -> tuple[str, ...]:
+    """Return the options of `add_topic_options` as they were given, without the defaults."""
+    default = TopicMap()
+    given = {
+        "namespace": args.namespace if args.namespace != default.namespace else None,
+        "joint": args.joint,
+        "axis": args.axis if args.axis != default.axis else None,
+    }
+    return (*_options(given), *(f"--topic={topic}" for topic in args.topic))
+
+
+def window_options(args: argparse.Namespace) -> tuple[str, ...]:
+    """Return the options of `add_window_options` as they were given."""
+    given = {"from": args.begin, "to": args.end, "window": args.window}
+    return (*_options(given), *(f"--shift={shift}" for shift in args.shift))
+
+
+def _options(given: Mapping[str, str | float | None]) -> Iterator[str]:
+    """Yield `--name=value` for all that are not None: in one word, since a value may begin with a minus."""
+    return (f"--{name}={value}" for name, value in given.items() if value is not None)
 
 
 def each_once(bags: Sequence[str]) -> Sequence[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -60,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     rig, topics = load_rig(args.rig), topic_map(args)
     with progress("diagnose") as tell:
         tell("reading", 0.0)
-        runs = [*each_once(args.bags), *([args.holdout] if args.holdout else [])]
+        runs = each_once([*args.bags, *([args.holdout] if args.holdout else [])])
         records = [readable(bag, topics, args) for bag in runs]
         from rsea_ros.cli._checks import checked
 
@@ -117,11 +116,12 @@ def _print(result: Diagnosis, report: Path) -> None:
 
     from rsea_ros.report.diagnosis.terminal import terminal_lines
     from rsea_ros.report.lines import command_row
+    from rsea_ros.report.rig.words import command
 
     console, width = Console(), _lines.columns()
     for line in terminal_lines(result, width):
         console.print(line, highlight=False, soft_wrap=True)
     print(f"report      {report}")
     if left_unexplained(result) > _MUCH:
-        law = shlex.join(["rsea", "law", *result.sources, "--rig", str(report.parent / MODEL)])
+        law = command("law", result.sources, result.rig_name, result.rig_choice, str(report.parent / MODEL))
         print(command_row("law", "of the remaining residual:", law, width))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from rsea_ros.cli._lines import say
@@ -49,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
         where = provenance("law", args.bags, args.rig)
         bags = {Path(path).name: digest for path, digest in list(where.files.items())[: len(args.bags)]}
         result = learn(records, rig, LawProvenance(where.date, where.version, bags, ""), tell)
+        result = replace(result, rig_choice=rig_choice(args))
         report = write_law(result, place, where)
     if args.json:
         print_file(report.parent / LAW_JSON)
@@ -57,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         from rsea_ros.report.rig.words import rig_named
 
         say(headline(result))
-        print(f"rig         {rig_named(result.rig_name, rig_choice(args))}")
+        print(f"rig         {rig_named(result.rig_name, result.rig_choice)}")
         for line in law_lines(result):
             say(f"  {line}", indent=6)
         if result.laws:

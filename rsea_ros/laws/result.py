@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rsea_ros.effects.effect import Claims, Effect
 from rsea_ros.laws.dependence import Dependence
 from rsea_ros.laws.law import Law
 from rsea_ros.model.rig import Rig
+from rsea_ros.model.rig_choice import RigChoice
 from rsea_ros.signals import FloatArray
 
 
@@ -56,6 +57,7 @@ class LawResult:
     gain: 1 - RMS(with the laws) / RMS(without) on test blocks that were not used before, with its 95 %
     interval, each channel in units of the base's residual. share: of the power above the noise.
     left, noise: RMS of each channel before and after, and of its noise, on those blocks.
+    rig_choice: how the user chose the rig and the data.
     """
 
     rig_name: str
@@ -73,3 +75,4 @@ class LawResult:
     after: Mapping[str, float]
     noise: Mapping[str, float]
     at_floor: bool
+    rig_choice: RigChoice = field(default_factory=RigChoice)

@@ -21,6 +21,9 @@ from rsea_ros.signals import Channel, FloatArray, Record
 LONGEST_STEP = 4.5e-4
 """s. The step is a whole fraction of the command's period and not longer than this."""
 
+MOST_STEPS = 5e7
+"""Of a record, six hours: a longer one needs more memory than most computers have."""
+
 LONGEST_OF_JOINTS = 1e-3
 """s, where targets at tens of Hz command a position loop, whose firmware samples about as often."""
 
@@ -115,6 +118,11 @@ def drive_from(
     stop = max(record.stop, float(command.t[-1]) + period)
     check_extent(record, start, stop)
     count = math.ceil((stop - start) / step - 1e-6)
+    if count > MOST_STEPS:
+        raise IdentificationError(
+            f"{record.source}: lasts {stop - start:.4g} s, expected up to {MOST_STEPS * step:.4g} s: "
+            f"are the stamps in s, not in ms or µs ({1.0 / period:.3g} Hz)? If so, cut the record"
+        )
     knots, torque = _in_steps(command.t, start, step), command.y
     if closed_loop:
         made = "motor_torque" if "motor_torque" in record else "command"

@@ -1,4 +1,4 @@
-"""How a run came by its rig: a name or a file that the user gave, or the default."""
+"""How a run came by its rig and its data: what the user gave, or the default."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RigChoice:
-    """option: the rig as it was named, empty if a Rig was passed. is_default: the user named none."""
+    """option: the rig as it was named, empty if a Rig was passed. is_default: the user named none.
+
+    topics, part: options of the call, such as --joint elbow, that say which topics and which part of the
+    record were read; a command on the same bags needs them too.
+    """
 
     option: str = ""
     is_default: bool = False
+    topics: tuple[str, ...] = ()
+    part: tuple[str, ...] = ()

@@ -90,3 +90,12 @@ def test_a_log_faster_than_its_sensors_is_noticed():
     assert (light["ft"].light, light["position"].light) == ("amber", "green")
     assert light["ft"].value == pytest.approx(1000.0 / 15.0)
     assert "`held: true`" in light["ft"].remedy
+
+
+@pytest.mark.parametrize("unit", [100.0, 1e3, 1e6])
+def test_stamps_in_another_unit_than_seconds_are_a_red_rate(unit):
+    """Stamps in ms ended in a division by zero: a spectrum of segments of 8 s had no line at 0.28 Hz."""
+    t = unit * T
+    record = simulate(RIG, 15.0 * np.random.default_rng(0).standard_normal(len(T)), 280.0)
+    slow = Record({n: Channel(t[: len(c)], c.y) for n, c in record.channels.items()})
+    assert {f.light for f in check_record(slow, RIG).findings if f.kind == "rate"} == {"red"}

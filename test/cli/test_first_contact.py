@@ -9,9 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from rsea_ros.checks.finding import Finding, Findings
 from rsea_ros.cli import main as cli
 from rsea_ros.effects.catalogue import catalogue
+from rsea_ros.errors import OutputError
 from rsea_ros.model.rig_file import load_rig, rig_names
+from rsea_ros.new_files import NewFiles
+from rsea_ros.report.check.terminal import check_lines
 
 
 def test_a_table_given_for_a_bag_is_sent_to_import(tmp_path, capsys):
@@ -115,3 +119,28 @@ def test_a_new_rig_is_valid_as_written_and_replaces_nothing(tmp_path, monkeypatc
 def test_an_axis_with_a_minus_sign_is_accepted_as_typed(capsys):
     assert cli.main(["check", "no_such_bag", "--axis", "-torque.z"]) == 2
     assert "no such bag" in capsys.readouterr().err
+
+
+def test_a_holdout_that_is_a_run_of_the_fit_is_refused(tmp_path, capsys):
+    """Its gain was printed as held out."""
+    run = str(tmp_path / "run.mcap")
+    Path(run).touch()
+    assert cli.main(["diagnose", run, "--holdout", f"{tmp_path}/../{tmp_path.name}/run.mcap"]) == 2
+    assert "run.mcap: given twice, expected each bag once" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("target", ["folder", "nowhere"])
+def test_a_folder_of_results_that_is_a_symbolic_link_is_named_as_such(target, tmp_path):
+    """The user read "Too many levels of symbolic links", or of a dangling one "File exists"."""
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / target)
+    with pytest.raises(OutputError, match="out: is a symbolic link, expected a directory or a new name"):
+        NewFiles(tmp_path / "out").__enter__()
+    assert not list((tmp_path / "folder").iterdir()) and not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("kind", ["dropped_samples", "checksum_mismatch"])
+def test_a_long_kind_of_finding_is_apart_from_its_channel(kind):
+    """`dropped samplesposition`."""
+    found = Findings("run", "bench", (Finding("amber", kind, "position", 1.0, "1"),))
+    assert f"{kind.replace('_', ' ')} position" in check_lines(found)[0].plain

@@ -191,3 +191,12 @@ def test_a_command_that_changes_with_every_step_is_left_as_it_is():
     stamps = np.arange(300) / 4000.0
     drive = drive_from(record_of(stamps, white(300), stamps))
     assert coarser(drive) is drive
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e6])
+def test_stamps_in_another_unit_than_seconds_are_refused(unit):
+    """Stamps in µs asked for 10^11 steps: a MemoryError, told as a bug of rsea."""
+    t = unit * np.arange(16800) / RATE
+    record = record_of(t, white(16800), t)
+    with pytest.raises(IdentificationError, match="are the stamps in s, not in ms or µs"):
+        simulate(load_rig("paper_high_impedance"), record)

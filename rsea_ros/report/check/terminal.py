@@ -37,7 +37,7 @@ def check_lines(findings: Findings, width: int = WIDTH) -> list[Text]:
     """
     lines = []
     for f in _each_remedy_once(findings.findings):
-        head = f"{f.light:<{_LIGHT}}{kind(f):<{_KIND}}{_channel(f):<{_CHANNEL}}"
+        head = f"{f.light:<{_LIGHT}}{f'{kind(f)} ':<{_KIND}}{f'{_channel(f)} ':<{_CHANNEL}}"
         text = wrapped(f"{head}{_said(f)}", width, len(head))
         lines.append(Text.assemble((text[:_LIGHT], _STYLES[f.light]), text[_LIGHT:]))
     return lines

@@ -26,7 +26,7 @@ from rsea_ros.report.page.html import bullets, folded, key_numbers, paragraph, s
 from rsea_ros.report.provenance import Provenance
 from rsea_ros.report.remark_words import remark_sentences
 from rsea_ros.report.rig.page import right_rig_block
-from rsea_ros.report.rig.words import refit_command, rig_named, split_off_rig
+from rsea_ros.report.rig.words import command, rig_named, split_off_rig
 
 
 def diagnosis_report(diagnosis: Diagnosis, provenance: Provenance | None = None) -> str:
@@ -41,7 +41,7 @@ def _blocks(d: Diagnosis) -> Iterator[Block]:
     """Yield the page from top to bottom: the verdict first, then the evidence."""
     main = d.channel
     yield key_numbers(_keys(d, main))
-    yield right_rig_block(d.remarks, refit_command(d.sources, d.rig_name, d.rig_choice))
+    yield right_rig_block(d.remarks, command("identify", d.sources, d.rig_name, d.rig_choice))
     if d.faults:
         yield f'<p class="next">{escape(faults(d.faults))}</p>'
     yield sketch([c.name for c in d.causes])

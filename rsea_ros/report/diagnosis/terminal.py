@@ -16,7 +16,7 @@ from rsea_ros.report.diagnosis.standing import standing
 from rsea_ros.report.fault_words import fault_lines
 from rsea_ros.report.lines import LABEL, WIDTH, command_row, row, wrapped
 from rsea_ros.report.remark_words import remark_sentences
-from rsea_ros.report.rig.words import refit_command, rig_named, right_rig, split_off_rig
+from rsea_ros.report.rig.words import command, rig_named, right_rig, split_off_rig
 
 _STYLES = {"partly_explained": "bold yellow", "unexplained": "bold red"}
 _MOST = 3
@@ -38,7 +38,7 @@ def _rig(d: Diagnosis, width: int) -> Iterator[str]:
     for sentence in remark_sentences(off):
         yield row("", sentence, width)
     if off:
-        yield command_row("", right_rig(), refit_command(d.sources, d.rig_name, d.rig_choice), width)
+        yield command_row("", right_rig(), command("identify", d.sources, d.rig_name, d.rig_choice), width)
 
 
 def _rows(d: Diagnosis) -> Iterator[tuple[str, str]]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
-
 from rsea_ros.identification.result import Identification
 from rsea_ros.report import words
 from rsea_ros.report.remark_words import coloured_noise
-from rsea_ros.report.rig.words import rig_in_brackets, values_off
+from rsea_ros.report.rig.words import command, rig_in_brackets, values_off
 from rsea_ros.wording import listed
 
 
@@ -42,9 +40,8 @@ def next_command(identification: Identification) -> str:
     """Return the command that diagnoses a model that does not fit; empty if it fits."""
     if identification.at_noise:
         return ""
-    rig = identification.rig_choice.option or identification.rig.name
-    bags = " ".join(shlex.quote(s) for s in identification.sources)
-    return f"rsea diagnose {bags} --rig {shlex.quote(rig)}"
+    i = identification
+    return command("diagnose", i.sources, i.rig.name, i.rig_choice)
 
 
 def doubt_sentences(identification: Identification) -> tuple[str, ...]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rsea_ros.laws.equation import about_of, equation_of
 from rsea_ros.laws.result import LawResult, WrittenLaw
 from rsea_ros.report import words
+from rsea_ros.report.file_names import BASE
 from rsea_ros.report.law.figures import over_figure, time_figure
 from rsea_ros.report.law.tables import dependence_section, gain_section, tried_section
 from rsea_ros.report.law.words import headline, parameter_lines
 from rsea_ros.report.page.frame import Block, page
 from rsea_ros.report.page.html import bullets, code, equation, key_numbers, section
 from rsea_ros.report.provenance import Provenance
+from rsea_ros.report.rig.words import command
 
 
 def law_report(result: LawResult, provenance: Provenance | None = None) -> str:
@@ -57,7 +61,8 @@ def _files(result: LawResult) -> str:
     if not result.laws:
         return ""
     names = [f"{w.law.name}.py" for w in result.laws]
-    use = "RSEA_EFFECTS=. rsea diagnose RUN.mcap --rig base.yaml --out again"
+    again = command("diagnose", ["RUN.mcap"], "", replace(result.rig_choice, part=()), BASE)
+    use = f"RSEA_EFFECTS=. {again} --out again"
     text = (
         f"<p>{', '.join(code(n) for n in names)}: the law as an effect, to read and to change. "
         f"{code('model.yaml')}: the rig with it, {code('base.yaml')}: the rig without.</p>"

@@ -40,7 +40,10 @@ def right_rig(fitted: str = "") -> str:
     return f"Is this the right rig? If not, name yours with --rig; if only its values are old, {values}"
 
 
-def refit_command(sources: Sequence[str], name: str, choice: RigChoice) -> str:
-    """Return the command that makes a rig of the fitted values."""
-    bags = " ".join(shlex.quote(s) for s in sources)
-    return f"rsea identify {bags} --rig {shlex.quote(choice.option or name)}"
+def command(verb: str, sources: Sequence[str], name: str, choice: RigChoice, rig: str = "") -> str:
+    """Return the command that calls a verb on the same part of the same data.
+
+    name: of the rig, used if it was passed as a Rig. rig: another rig than that of the choice.
+    """
+    options = ["--rig", rig or choice.option or name, *choice.topics, *choice.part]
+    return shlex.join(["rsea", verb, *sources, *options])
