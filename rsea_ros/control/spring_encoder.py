@@ -2,9 +2,9 @@
 
     link = position - deflection,      g = deflection - T / (K_s + b_s s)
 
-The spring measures its torque twice, by `ft` and by its encoder. An encoder that is frozen, of the wrong sign or
-scale, or that jumps, is off by as much as the spring moves: then no angle is returned. It counts only after it
-has agreed for a while in which the spring moved, so none makes a torque before it has been seen to be right.
+`ft` and the encoder measure the spring twice. An encoder that is frozen, that jumps, or of the wrong sign or
+scale is off by as much as the spring moves: then no angle is returned. It counts only after it has agreed for
+a while in which the spring moved, so none makes a torque before it has been seen to be right.
 """
 
 from __future__ import annotations
@@ -57,13 +57,14 @@ class SpringEncoder:
         self.missing = self.losses = 0
         self.trouble = ""
         self.used = False
-        self._forget()
+        self._agreed = self._silent = self._peak = self._step = 0.0
+        self._phi = self._mean_phi = self._off = self._mean_off = self._last = self._where = math.nan
+        self._same = 0
 
     def link(self, r: SpringReading) -> float:
         """Return the link's angle against the housing, rad; nan while it does not count."""
         if not 0.0 < r.periods * self._period < PAUSE:
-            self._lose("a pause")
-        before = self._phi
+            self._lose("")
         rate = self._follow(r.ft)
         deflection = r.deflection + (r.age * self._period - self._clock) * rate
         if not math.isfinite(deflection):
@@ -71,7 +72,7 @@ class SpringEncoder:
             return math.nan
         self._silent = 0.0
         off = deflection - r.ft_age * self._period * rate - self._phi
-        if trouble := self._trouble(r, off, self._phi - before):
+        if trouble := self._trouble(r, off, rate * self._period):
             self._lose(trouble)
             return math.nan
         if self._peak > MOVES * self._floor:
@@ -101,7 +102,8 @@ class SpringEncoder:
         jump, self._off = abs(off - self._off), off
         if self._repeats(r):
             return "deflection does not change"
-        if jump > self._floor + PART * self._step or abs(off - self._mean_off) > self._floor + PART * self._peak:
+        drift = abs(off - self._mean_off)
+        if jump > self._floor + PART * self._step or drift > self._floor + PART * self._peak:
             return "deflection does not agree with ft"
         return ""
 
@@ -124,9 +126,7 @@ class SpringEncoder:
 
     def _forget(self) -> None:
         self._agreed = self._silent = self._peak = self._step = 0.0
-        self._phi = self._mean_phi = self._off = self._mean_off = math.nan
-        self._last = self._where = math.nan
-        self._same = 0
+        self._phi = self._off = self._last = math.nan
 
 
 def spread(rig: Rig, channel: str) -> float:

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from rsea_ros.control.compensation import compensation
 from rsea_ros.control.law import law_of
 from rsea_ros.control.link import LinkMotion, LinkShare, link_share
 from rsea_ros.control.loads import lightest, load_range
@@ -13,7 +16,6 @@ from rsea_ros.control.spring_encoder import SpringEncoder, spread
 from rsea_ros.control.synthesis import Demand, Design
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.signals import generator
 
 LOUD = 0.02
 """Of torque_limit: RMS of the torque that the noise of both encoders may make."""
@@ -40,7 +42,8 @@ def link_of(values: Mapping[str, Any], found: Design) -> Link:
         return Link(share, None, "no part of it keeps the demands")
     loud, most = _noise(rig, found, share), LOUD * values["torque_limit"]
     if loud > most:
-        return Link(LinkShare(), None, f"noise of {loud:.2g} N m of motor torque, expected at most {most:.2g}")
+        reason = f"noise of {loud:.2g} N m of motor torque, expected at most {most:.2g}"
+        return Link(LinkShare(), None, reason)
     return Link(share, SpringEncoder(rig, found.rate), "")
 
 
@@ -73,7 +76,7 @@ def _unusable(values: Mapping[str, Any], rig: Rig) -> str:
         return "link is false"
     if "deflection" not in rig.sensors:
         return "the rig has no sensor deflection"
-    if any(effect.name == "backlash" for effect in rig.effects):
+    if compensation(rig).gap:
         return "the rig has backlash, which looks like motion of the link"
     return ""
 
@@ -82,5 +85,5 @@ def _noise(rig: Rig, found: Design, share: LinkShare) -> float:
     """Return the RMS of the torque of a link that stands still, N m."""
     angle = math.hypot(spread(rig, "deflection"), spread(rig, "position"))
     motion = LinkMotion(law_of(rig, found.rate, found.gains), share)
-    torques = [motion.torque(angle * x, 0.0) for x in generator(0).normal(size=HEARD)]
+    torques = [motion.torque(angle * x, 0.0) for x in np.random.default_rng(0).normal(size=HEARD)]
     return math.sqrt(sum(torque**2 for torque in torques) / HEARD)

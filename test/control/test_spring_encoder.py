@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -115,10 +116,10 @@ def test_an_angle_of_the_sample_before_is_brought_to_its_instant():
     encoder = SpringEncoder(RIG, RATE)
     found = [
         encoder.link(SpringReading(old.deflection, new.ft, new.position, age=1.0))
-        for old, new in zip(run, run[1:], strict=False)
+        for old, new in pairwise(run)
     ]
     true = np.array([s.position - s.deflection for s in run[1:]])
-    plain = np.array([new.position - old.deflection for old, new in zip(run, run[1:], strict=False)])
+    plain = np.array([new.position - old.deflection for old, new in pairwise(run)])
     ready = np.isfinite(found)
     off, before = (np.sqrt(np.mean((a - true)[ready] ** 2)) for a in (np.array(found), plain))
     assert encoder.losses == 0 and off < 0.5 * before
