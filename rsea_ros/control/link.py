@@ -52,9 +52,10 @@ class LinkShare:
 class LinkMotion:
     """Follows the link's speed beyond what the load does for the desired torque, one sample at a time."""
 
-    def __init__(self, law: Law, share: LinkShare) -> None:
+    def __init__(self, law: Law, share: LinkShare, most: float = math.inf) -> None:
+        """most: N m, the largest torque; an encoder that jumps must not make more."""
         self._inertia, self._damping = share.inertia * law.inertia, share.damping * law.damping
-        self._period = law.period
+        self._period, self._most = law.period, most
         self._pole = math.exp(-2.0 * math.pi * share.corner * law.period)
         self.start(math.nan)
 
@@ -81,6 +82,7 @@ class LinkMotion:
             else:
                 self._speed = math.nan
             self._angle, self._since = placed, 0
+        wanted = min(max(wanted, -self._most), self._most)
         self._torque += (1.0 - self._pole) * (wanted - self._torque)
         return self._torque
 

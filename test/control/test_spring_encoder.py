@@ -140,6 +140,13 @@ def test_the_links_torque_comes_back_without_a_jump_wherever_the_link_is(phase, 
     assert max(map(abs, again)) < 1.2 * most
 
 
+def test_an_angle_that_jumps_takes_a_bounded_torque():
+    """Where ft is the stiffness times the deflection the two agree also in a jump."""
+    motion = LinkMotion(law_of(RIG, RATE, GAINS), SHARE, most=5.0)
+    torques = [motion.torque(0.5 * (k == 20) + 1e-3 * k, 0.0) for k in range(60)]
+    assert 1.0 < max(map(abs, torques)) <= 5.0 and abs(torques[-1]) < 0.1 + abs(torques[19])
+
+
 class Checked(TorqueController):
     """The controller behind the check, as the node has it; spoil: what the encoder makes of the angle."""
 
