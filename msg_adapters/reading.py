@@ -105,14 +105,14 @@ def _require(source: str, contents: Contents, topics: TopicMap, strict: bool) ->
             raise BagError(
                 f"{source}: {topics.topic(role)} is {brief(messages.msgtype)}, expected {TYPES[role]}"
             )
-        if role in topics.required and topics.topic(role) not in contents.topics:
-            near = did_you_mean(topics.topic(role), contents.topics)
-            raise BagError(
-                f"{source}: no topic {brief(topics.topic(role))} for {role}{near}; the bag holds "
-                f"{_held(contents)}"
-            )
         if messages.raw:
             filled.add(role)
+    for role in sorted(topics.required):
+        if (topic := topics.topic(role)) not in contents.topics:
+            near = did_you_mean(topic, contents.topics)
+            raise BagError(
+                f"{source}: no topic {brief(topic)} for {role}{near}; the bag holds {_held(contents)}"
+            )
     for roles, others in _NEEDED if strict else [(ROLES, ())]:
         if not filled.intersection((*roles, *others)):
             wanted = " or ".join(topics.topic(role) for role in roles)

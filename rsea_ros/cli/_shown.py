@@ -38,7 +38,7 @@ class Shown:
 def shown() -> Iterator[None]:
     """In this block stdout shows control characters, and stdout and stderr accept every character."""
     codecs.register_error("rsea", _instead)
-    open_closed_streams()
+    replaced = open_closed_streams()
     before = sys.stdout
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -48,16 +48,21 @@ def shown() -> Iterator[None]:
         yield
     finally:
         sys.stdout = before
+        for name in replaced:
+            getattr(sys, name).close()
+            setattr(sys, name, None)
 
 
-def open_closed_streams() -> None:
-    """Put the null device in the place of a standard stream that the parent process closed.
+def open_closed_streams() -> list[str]:
+    """Put the null device in the place of the standard streams that the parent process closed.
 
-    Otherwise the next file that is opened takes its number, and what is printed ends in that file.
+    Otherwise the next file that is opened takes their number, and what is printed ends in that file.
+    Returns the names of those streams.
     """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115  open until the process ends
+    closed = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name) is None]
+    for name in closed:
+        setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115  closed by shown
+    return closed
 
 
 def _instead(error: UnicodeError) -> tuple[str, int]:

@@ -155,7 +155,7 @@ def test_a_run_that_was_disturbed_is_repeated_once(tmp_path, capsys, monkeypatch
     monkeypatch.setattr(demo, "measure", lambda nodes, path, *rest: played.append(path))
     monkeypatch.setattr(demo, "read_record", read)
     assert demo.recorded(None, tmp_path, 20.0, SimpleNamespace(seed=1)) == tmp_path / bag == played[-1]
-    told = capsys.readouterr().out.splitlines()
-    assert len(told) == lines and all(line.startswith("this machine was too busy (") for line in told)
-    assert not told or told[0].endswith("once more")
-    assert lines < 2 or told[1].endswith("the results come from a disturbed run")
+    told = " ".join(capsys.readouterr().out.split())
+    assert told.count("this machine was too busy (") == lines
+    assert told.count("once more") == min(lines, 1)
+    assert told.endswith("the results come from a disturbed run") == (lines == 2)

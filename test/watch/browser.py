@@ -29,7 +29,7 @@ class Browser:
         self._number = 0
         words = [CHROMIUM, *FLAGS, f"--user-data-dir={folder}", "about:blank"]
         self._process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        port = _awaited(lambda: (folder / "DevToolsActivePort").read_text().splitlines()[0])
+        port = _awaited(lambda: (folder / "DevToolsActivePort").read_text().partition("\n")[0])
         pages = json.load(urllib.request.urlopen(f"http://127.0.0.1:{port}/json"))
         (page,) = [p for p in pages if p["type"] == "page"]
         self._socket = self._done(lambda: websocket_connect(page["webSocketDebuggerUrl"]))

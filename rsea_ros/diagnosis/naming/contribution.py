@@ -15,6 +15,11 @@ from rsea_ros.identification.problem import Case, Problem
 from rsea_ros.identification.solver import Map, jacobian_columns, power, serial
 from rsea_ros.signals import BoolArray, FloatArray, IntArray
 
+LEAST_SHARE = 1e-5
+"""Power of a contribution over that of the residual below which a cause changes nothing. Derived: a cause
+lowers the residual's power by no more than the power that it contributes, here 0.001 %; the least gain that
+is named is 100 times as much."""
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -41,16 +46,23 @@ def weighted_by(problem: Problem, cases: Sequence[Case], weights: Score) -> Prob
 def rows_of(
     problem: Problem, theta: FloatArray, name: str, rule: BlockSettings, run: Map = serial
 ) -> Rows | None:
-    """Return a model's residuals and the contribution of one cause; None where a simulation diverges."""
+    """Return a model's residuals and the contribution of one cause.
+
+    None where a simulation diverges, and for a cause that changes nothing: what its model gains, a better fit
+    of the other unknowns gains too.
+    """
     error = problem.residual(theta)
     less, rest = without_effect(problem, theta, name)
     without = less.residual(rest)
     if not np.isfinite(power(error)) or not np.isfinite(power(without)):
         return None
+    contribution = error - without
+    if power(contribution) < LEAST_SHARE * power(error):
+        return None
     which = [i for i, u in enumerate(problem.unknowns) if not u.name.startswith(name + ".")]
     block, tests, runs = _blocks_of_rows(problem, rule)
     return Rows(
-        contribution=error - without,
+        contribution=contribution,
         residual=-error,
         others=jacobian_columns(problem, theta, error, which, run),
         prior=np.array([1.0 / problem.unknowns[i].reach for i in which]),
