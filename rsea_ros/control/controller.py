@@ -36,6 +36,9 @@ from rsea_ros.control.synthesis import design
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
 
+FOLLOWED = 0.25
+"""Of the largest torque: the most that the link's motion may take."""
+
 CORNER = 80.0
 """Hz: what a desired torque does faster is not predicted. At 280 Hz 5 Hz are predicted within 0.9 %."""
 
@@ -102,8 +105,8 @@ class TorqueController:
         self._reference = Reference(sampled(locked(rig), rate), self._law, self.learned)
         self._compensation: Compensation = compensation(rig, compensate)
         self._prediction, self._acted = Prediction(corner, 1.0 / rate), Acted(1.0 / rate)
-        self._link = LinkMotion(self._law, link or LinkShare())
         self._preview, self._learn, self._limits = preview, learn, limits or Limits()
+        self._link = LinkMotion(self._law, link or LinkShare(), FOLLOWED * self._limits.torque)
         self.start(Reading(0.0, 0.0, 0.0))
 
     def start(self, reading: Reading, desired: float = 0.0) -> None:

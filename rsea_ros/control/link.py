@@ -34,6 +34,8 @@ CORNERS = (5.0, 8.0, 12.0, 20.0, 30.0, 50.0)
 """Hz, of Q."""
 SOFTEST = (*SOFT, 5.0, 10.0)
 """Hz, at which the output should be soft."""
+BRIDGED = 2
+"""Samples between two angles that give a speed; after a longer gap it is unknown, not the mean."""
 MORE = 1.02
 """Of a demand: as far as the search of the gains comes as well."""
 
@@ -50,15 +52,16 @@ class LinkShare:
 class LinkMotion:
     """Follows the link's speed beyond what the load does for the desired torque, one sample at a time."""
 
-    def __init__(self, law: Law, share: LinkShare) -> None:
+    def __init__(self, law: Law, share: LinkShare, most: float = math.inf) -> None:
+        """most: N m, the largest torque; an encoder that jumps must not make more."""
         self._inertia, self._damping = share.inertia * law.inertia, share.damping * law.damping
-        self._period = law.period
+        self._period, self._most = law.period, most
         self._pole = math.exp(-2.0 * math.pi * share.corner * law.period)
         self.start(math.nan)
 
     def start(self, angle: float) -> None:
-        """Begin at rest at an angle of the link against the housing, rad; nan: not known."""
-        self._angle, self._speed, self._torque, self._since = angle, 0.0, 0.0, 0
+        """Begin at an angle of the link against the housing, rad, of unknown speed; nan: not known."""
+        self._angle, self._speed, self._torque, self._since = angle, math.nan, 0.0, 0
 
     def torque(self, angle: float, expected: float, missed: int = 0, offset: float = 0.0) -> float:
         """Return the torque, N m, for the motion of the sample that ends.
@@ -67,14 +70,19 @@ class LinkMotion:
         missed: samples that were lost before. offset: samples by which the angle was read after its place.
         """
         self._since, wanted = self._since + 1 + missed, 0.0
-        placed = angle - offset * self._period * (self._speed + expected)
+        moving = self._speed if math.isfinite(self._speed) else 0.0
+        placed = angle - offset * self._period * (moving + expected)
         if math.isfinite(placed):
-            if math.isfinite(self._angle):
+            if math.isfinite(self._angle) and self._since <= BRIDGED:
                 time = self._since * self._period
                 speed = (placed - self._angle) / time - expected
-                rise, mean = (speed - self._speed) / time, 0.5 * (speed + self._speed)
+                before = self._speed if math.isfinite(self._speed) else speed
+                rise, mean = (speed - before) / time, 0.5 * (speed + before)
                 wanted, self._speed = self._inertia * rise + self._damping * mean, speed
+            else:
+                self._speed = math.nan
             self._angle, self._since = placed, 0
+        wanted = min(max(wanted, -self._most), self._most)
         self._torque += (1.0 - self._pole) * (wanted - self._torque)
         return self._torque
 

@@ -109,15 +109,15 @@ class Bench:
         """Publish one reading under its stamps, shifted by a number of ns."""
         numbers = (state.position, state.velocity, state.motor_torque)
         self._states.publish(self._state_writer.write(state.stamp + shift, numbers))
+        if self._deflections is not None and math.isfinite(state.deflection):
+            raw = self._deflection_writer.write(state.stamp + shift, (state.deflection,))
+            self._deflections.publish(raw)  # before ft: with that a listener's reading is complete
         writer = self._ft_writers[state.inferred]
         if self._every_record:
             for stamp, wrench in state.wrenches:
                 self._ft.publish(writer.write(stamp + shift, wrench))
         elif state.wrench is not None:
             self._ft.publish(writer.write(state.ft_stamp + shift, state.wrench))
-        if self._deflections is not None and math.isfinite(state.deflection):
-            raw = self._deflection_writer.write(state.stamp + shift, (state.deflection,))
-            self._deflections.publish(raw)
 
     def report(self, cycle: Cycle, more: Mapping[str, int] | None = None) -> Report:
         """Return the health of a bench that runs in a cycle; warnings are of events since the last report.

@@ -7,6 +7,7 @@ from typing import Any
 
 from rsea_ros.control.controller import CORNER, Limits, TorqueController
 from rsea_ros.control.law import Gains
+from rsea_ros.control.link import LinkShare
 from rsea_ros.control.loads import LIGHTEST, lightest, load_range
 from rsea_ros.control.synthesis import Demand, Design, check, design
 from rsea_ros.errors import ParameterError
@@ -32,6 +33,7 @@ TABLE = (
     Parameter("impedance", 1.2, "largest output impedance over that of the bare spring", "", 1.0, 20.0),
     Parameter("compensate", True, "whether friction, ripple and backlash of the rig are compensated"),
     Parameter("learn", True, "whether load and drive are learned; not inside an outer impedance loop"),
+    Parameter("link", True, "whether the link's motion is fed forward where the rig has a sensor deflection"),
     Parameter("preview", False, "desired torques are stamped two samples ahead or more: no prediction"),
     Parameter("prediction", CORNER, "what a desired torque does faster is not predicted", "Hz", 1.0, 500.0),
     Parameter("torque_limit", 68.0, "largest torque that is commanded, as the driver's", "N m", 0.0, 1000.0),
@@ -63,8 +65,8 @@ def design_of(values: Values) -> Design:
     return design(rig, loads, values["rate"], Demand(*(values[name] for name in names)))
 
 
-def controller_of(values: Values, found: Design) -> TorqueController:
-    """Return the controller for the parameters."""
+def controller_of(values: Values, found: Design, link: LinkShare) -> TorqueController:
+    """Return the controller for the parameters. link: what of the link's motion it feeds forward."""
     limits = Limits(values["torque_limit"], values["slew_limit"], values["ramp"])
     options: dict[str, Any] = {} if values["compensate"] else {"compensate": ()}
     return TorqueController(
@@ -75,6 +77,7 @@ def controller_of(values: Values, found: Design) -> TorqueController:
         preview=values["preview"],
         learn=values["learn"],
         corner=values["prediction"],
+        link=link,
         **options,
     )
 

@@ -10,6 +10,7 @@ from rclpy.node import Node
 
 from msg_adapters.topics import JOINT_STATE, WRENCH, sign_and_index
 from rsea_ros.control.controller import Reading
+from rsea_ros.control.spring_encoder import SpringEncoder, SpringReading
 from rsea_ros.nodes._anchor import Anchor
 from rsea_ros.nodes._commands import CommandQueue
 from rsea_ros.nodes._mailbox import Mailbox
@@ -18,17 +19,23 @@ from rsea_ros.nodes._qos import COMMAND, MEASUREMENT
 WAITING = 500
 """Measurements that wait for their other half."""
 
+OLD = 1.5
+"""Samples: what is older than the sample before is no deflection of a reading."""
+
 MOST = 100
 """Desired torques that are taken at once."""
 
 
 class Measurements:
-    """Pairs of joint_states and ft. period: ns. desired: messages of desired_torque.
+    """Pairs of joint_states and ft, with the link's angle. period: ns. desired: messages of desired_torque.
 
+    encoder: checks `deflection`; None: that topic is not heard.
     unusable: readings that were not finite, and messages of several joints.
     """
 
-    def __init__(self, node: Node, axis: str, period: float, joint: str = "") -> None:
+    def __init__(
+        self, node: Node, axis: str, period: float, joint: str = "", *, encoder: SpringEncoder | None = None
+    ) -> None:
         self._period = period
         self._sign, along = sign_and_index(axis)
         self._waiting_states: deque[tuple[int, Sequence[float]]] = deque(maxlen=WAITING)
@@ -40,6 +47,12 @@ class Measurements:
             node, JOINT_STATE, "joint_states", MEASUREMENT, self._refuse, *state, joint=joint
         )
         self._fts = Mailbox(node, WRENCH, "ft", MEASUREMENT, self._refuse, ("wrench", along))
+        self._encoder, self._before = encoder, 0
+        self._waiting_deflections: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self._deflection = (0, math.nan)
+        self._deflections = encoder and Mailbox(
+            node, JOINT_STATE, "deflection", MEASUREMENT, lambda: None, ("position", 0), joint=joint
+        )
         self._desired = Mailbox(
             node, JOINT_STATE, "desired_torque", COMMAND, self.desired.refuse, ("effort", 0), joint=joint
         )
@@ -53,6 +66,8 @@ class Measurements:
         """
         self._waiting_fts += ((stamp, self._sign * torque) for stamp, (torque,), _ in self._fts.take())
         self._waiting_states += ((stamp, numbers) for stamp, numbers, _ in self._states.take())
+        if self._deflections:
+            self._waiting_deflections += ((t, angle) for t, (angle,), _ in self._deflections.take())
         while self._waiting_states and self._waiting_fts:
             stamp, (position, velocity, effort) = self._waiting_states[0]
             at, torque = self._waiting_fts[0]
@@ -61,9 +76,24 @@ class Measurements:
                 continue
             self._waiting_states.popleft()
             if math.isfinite(torque + velocity + position):
-                yield stamp, Reading(torque, velocity, position, effort, (stamp - at) / self._period)
+                ft_age = (stamp - at) / self._period
+                link = self._link(stamp, torque, position, ft_age) if self._encoder else math.nan
+                yield stamp, Reading(torque, velocity, position, effort, ft_age, link)
             else:
                 self._refuse()
+
+    def _link(self, stamp: int, torque: float, position: float, ft_age: float) -> float:
+        """Return the link's angle, rad, from the deflection of a state's instant or of the sample before."""
+        assert self._encoder is not None
+        waiting = self._waiting_deflections
+        while waiting and waiting[0][0] <= stamp + 0.5 * self._period:
+            self._deflection = waiting.popleft()
+        at, deflection = self._deflection
+        age, periods = (stamp - at) / self._period, (stamp - self._before) / self._period
+        self._before = stamp
+        if not -0.5 <= age <= OLD:
+            deflection = math.nan
+        return self._encoder.link(SpringReading(deflection, torque, position, age, ft_age, periods))
 
     def hear_desired(self, anchor: Anchor) -> None:
         """Queue all desired torques that have arrived."""

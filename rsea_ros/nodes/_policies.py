@@ -13,6 +13,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 from xml.etree import ElementTree as XML
@@ -21,6 +22,8 @@ import rclpy
 from rclpy.node import Node
 
 from msg_adapters import BagWriter
+from rsea_ros.model.rig import Sensor
+from rsea_ros.model.rig_file import load_rig, save_rig
 from rsea_ros.nodes._parameters import declare
 from rsea_ros.nodes._run import NAMESPACE
 from rsea_ros.nodes.record import TOPICS
@@ -29,7 +32,10 @@ NODES = (
     "controller", "driver", "excite", "experiment", "health", "identify", "model", "plant", "record",
     "replay", "watch",
 )  # fmt: skip
+ENCODERS = "two_encoders.yaml"
+"""A rig with an encoder on the spring whose torque can be controlled."""
 PARAMETERS: Mapping[str, Mapping[str, object]] = {
+    "controller": {"rig": ENCODERS},
     "driver": {"autostart": True, "rig": "sea_two_encoders"},
     "record": {"out": "bag"},
     "replay": {"bag": "every topic"},
@@ -60,6 +66,7 @@ def policies(joints: Sequence[str] = ()) -> str:
             with BagWriter("every topic") as bag:
                 for name, kind in TOPICS.items():
                     bag.write(name if name.startswith("/") else f"/{NAMESPACE}/{name}", kind, 1, bytes(8))
+            _with_encoder("paper_high_impedance", ENCODERS)
             nodes = _joints(joints) if joints else {(NAMESPACE, name): interfaces(name) for name in NODES}
         finally:
             os.chdir(before)
@@ -67,6 +74,11 @@ def policies(joints: Sequence[str] = ()) -> str:
     served = {name for each in nodes.values() for name in each["services", "reply"]}
     person: Interfaces = {("topics", "subscribe"): heard, ("services", "request"): served}
     return document({**nodes, (NAMESPACE, OPERATOR): person})
+
+
+def _with_encoder(name: str, path: str) -> None:
+    rig = load_rig(name)
+    save_rig(replace(rig, sensors={**rig.sensors, "deflection": Sensor(noise=1e-6)}), path)
 
 
 def _joints(joints: Sequence[str]) -> Profiles:

@@ -21,6 +21,7 @@ from rsea_ros.nodes._control import TABLE, controller_of, design_of, summary
 from rsea_ros.nodes._cycle import SECOND
 from rsea_ros.nodes._health import ERROR, OK, WARN, Health, Report
 from rsea_ros.nodes._judge import Judge
+from rsea_ros.nodes._link import link_of, link_values, link_words
 from rsea_ros.nodes._measurements import Measurements
 from rsea_ros.nodes._qos import COMMAND, await_arrival
 from rsea_ros.nodes._realtime import keep_time
@@ -42,15 +43,19 @@ class Controller:
     def __init__(self, node: Node, values: dict[str, Any]) -> None:
         self._node, self._values = node, values
         self._design = design_of(values)
-        self._controller = controller_of(values, self._design)
+        self._link = link_of(values, self._design)
+        self._controller = controller_of(values, self._design, self._link.share)
         self._period = SECOND / values["rate"]
-        self._inputs = Measurements(node, values["axis"], self._period, values["joint"])
+        self._inputs = Measurements(
+            node, values["axis"], self._period, values["joint"], encoder=self._link.encoder
+        )
         self._desired = self._inputs.desired
         self._anchor, self._grid = Anchor(), Grid(self._period)
         self._judge = Judge(values)
         self._last, self._heard, self._watched, self._until, self._torque = 0, 0, 0, 0, 0.0
         self._fault, self._told_fault, self._release = "", "", (0, 0.0)
         self._steps = self._missed = self._limited = self._late = self._told = self._restarts = 0
+        self._told_losses = 0
         self._squares: list[float] = []
         self._commands = node.create_publisher(JointState, "torque_command", COMMAND)
         template = serialize_message(torque_command_message(0, 0.0, values["joint"]))
@@ -58,7 +63,7 @@ class Controller:
         self._lock = threading.Lock()
         node.create_service(Trigger, "~/clear_fault", self._clear)
         self._health = Health(node, self._report, values["rig"])
-        for line in summary(self._design):
+        for line in (*summary(self._design), link_words(self._link)):
             node.get_logger().info(line)
         self._waiter = Waiter(node, self._inputs.subscriptions, self._work, WATCH)
         keep_time(node, self._waiter, values["realtime_priority"])
@@ -198,6 +203,7 @@ class Controller:
             "late_commands": self._late,
             "feedback_share": f"{self._judge.lateness.trust:.2f}",
             "restarts": self._restarts,
+            **link_values(self._link),
             **self._anchor.values(),
             "crossover_hz": f"{self._design.margins['locked'].crossover:.2f}",
             "phase_margin_deg": f"{worst.phase:.1f}",
@@ -213,7 +219,17 @@ class Controller:
         new, self._told = self._late - self._told, self._late
         if new:
             return Report(WARN, f"{new} commands more than a sample late, with less feedback", values)
+        if words := self._new_loss():
+            return Report(WARN, words, values)
         return Report(OK, "running", values)
+
+    def _new_loss(self) -> str:
+        """Return in words that the encoder on the link has ceased to count; empty where it has not."""
+        encoder, before = self._link.encoder, self._told_losses
+        if encoder is None or encoder.losses == before:
+            return ""
+        self._told_losses = encoder.losses
+        return f"without the link's motion: {encoder.trouble or 'deflection was lost for a moment'}"
 
 
 def main() -> int:

@@ -21,7 +21,7 @@ def program(listener, monkeypatch):
     )
     monkeypatch.setattr(controller, "design_of", lambda values: None)
     monkeypatch.setattr(controller, "summary", lambda design: [])
-    monkeypatch.setattr(controller, "controller_of", lambda values, design: stub)
+    monkeypatch.setattr(controller, "controller_of", lambda values, design, link: stub)
     monkeypatch.setattr(controller, "keep_time", lambda *worker: None)
     values = {parameter.name: parameter.default for parameter in controller.TABLE} | {"rate": 1000.0}
     made = controller.Controller(listener.node, values | {"ft_limit": 1e3, "error_limit": 1e3})

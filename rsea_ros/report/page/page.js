@@ -90,12 +90,15 @@ function button(text, about, act) {
   return made;
 }
 
+/* A name without its marks; a break between two lines is a space. */
+function plain(name) { return String(name).replace(/<br>/g, " ").replace(/<[^>]*>/g, ""); }
+
 /* All samples of an overlay, the drawn points of any other figure: a column pair for each curve. */
 function csv(node, figure) {
   const curves = figure.kind === "overlay"
     ? figure.traces.all.map((s) => ({ name: s.name, x: figure.traces.t, y: s.y }))
     : node.data.filter((d) => d.x && d.y && d.name);
-  const quoted = (s) => '"' + String(s).replace(/<[^>]*>/g, "").replace(/"/g, '""') + '"';
+  const quoted = (s) => '"' + plain(s).replace(/"/g, '""') + '"';
   const head = curves.flatMap((c) => [quoted(c.name + ", x"), quoted(c.name)]).join(",");
   const rows = Array.from({ length: Math.max(0, ...curves.map((c) => c.x.length)) }, (_, i) =>
     curves.flatMap((c) => (i < c.x.length ? [+(+c.x[i]).toPrecision(7), +(+c.y[i]).toPrecision(7)] : ["", ""])).join(","));
@@ -116,7 +119,7 @@ function tools(node, figure) {
   const names = [...new Set(node.data.map((d) => d.name).filter(Boolean))];
   if (names.length > 1) for (const name of names) {
     const curves = node.data.map((d, i) => (d.name === name ? i : -1)).filter((i) => i >= 0);
-    const toggle = button(name.replace(/<[^>]*>/g, ""), "show or hide this curve", (self) => {
+    const toggle = button(plain(name), "show or hide this curve", (self) => {
       const hide = self.getAttribute("aria-pressed") === "true";
       self.setAttribute("aria-pressed", String(!hide));
       Plotly.restyle(node, { visible: !hide }, curves);
