@@ -104,6 +104,7 @@ REPORT = {
     "diagnosis": {"figures", "page", "identification", "rig"},
     "identification": {"figures", "page", "rig"},
     "check": {"figures", "page", "rig"},
+    "law": {"figures", "page", "rig"},
     "rig": {"page"},
     "campaign": {"figures", "page", "experiment"},
     "fleet": {"figures", "page", "diagnosis"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 from rclpy.node import Node
@@ -16,10 +17,18 @@ from rsea_ros.wording import did_you_mean
 _TRIGGER, _CHANGE_STATE = "std_srvs/srv/Trigger", "lifecycle_msgs/srv/ChangeState"
 _PATIENCE = 60.0
 """s that an answer may take: a driver that configures talks to its devices."""
+_QUESTIONS = 3
+"""Repetitions of a question whose answer was lost: a service may be seen before it sees who asks."""
+_MATCHING = 0.1
+"""s that a service has to see who asks, before it is asked."""
 
 
 class CallRefused(RseaError):
     """A node that answered, and did not do what was asked."""
+
+
+class _NoAnswer(CallRefused):
+    """A service that was asked and did not answer."""
 
 
 class Caller:
@@ -41,7 +50,7 @@ class Caller:
         """Return the state of a node with a lifecycle; empty for others."""
         if not self._has_lifecycle(name):
             return ""
-        return str(self._ask(GetState, f"{name}/get_state", GetState.Request()).current_state.label)
+        return str(self._question(GetState, f"{name}/get_state").current_state.label)
 
     def call(self, name: str, action: str) -> str:
         """Do one action of a node and return its answer.
@@ -98,20 +107,27 @@ class Caller:
         """Return the transitions that a node's state allows: number by name."""
         if not self._has_lifecycle(name):
             return {}
-        request = GetAvailableTransitions.Request()
-        answer = self._ask(GetAvailableTransitions, f"{name}/get_available_transitions", request)
+        answer = self._question(GetAvailableTransitions, f"{name}/get_available_transitions")
         return {each.transition.label: each.transition.id for each in answer.available_transitions}
 
-    def _ask(self, kind: type, name: str, request: Any) -> Any:
-        """Return the answer of a service. Raises CallRefused when none comes."""
+    def _question(self, kind: Any, name: str) -> Any:
+        """Return the answer of a service that changes nothing; one that gets lost is asked for again."""
+        for _ in range(_QUESTIONS):
+            with suppress(_NoAnswer):
+                return self._ask(kind, name, kind.Request(), DISCOVERY)
+        return self._ask(kind, name, kind.Request(), DISCOVERY)
+
+    def _ask(self, kind: type, name: str, request: Any, patience: float = _PATIENCE) -> Any:
+        """Return the answer of a service. Raises CallRefused when none comes within some seconds."""
         client: Any = self._node.create_client(kind, name)
         try:
             if not client.wait_for_service(DISCOVERY):
                 raise CallRefused(f"{name}: nobody serves it")
+            spin(self._node, _MATCHING, lambda: False)
             future = client.call_async(request)
-            spin(self._node, _PATIENCE, future.done)
+            spin(self._node, patience, future.done)
             if not future.done():
-                raise CallRefused(f"{name}: no answer within {_PATIENCE:g} s")
+                raise _NoAnswer(f"{name}: no answer within {patience:g} s")
             return future.result()
         finally:
             self._node.destroy_client(client)

@@ -127,13 +127,14 @@ def test_the_status_is_1_for_a_verdict_that_fail_on_names(quick, bag, tmp_path, 
 
 def test_bags_rig_and_holdout_reach_the_engine(quick, bag, record, tmp_path):
     run = bag()
-    write_record(record, tmp_path / "other.mcap")
-    other = str(tmp_path / "other.mcap")
-    options = ["--holdout", other, "--rig", "pendulum", "--without", "backlash", "ft_bias"]
+    other, held_out = (str(tmp_path / name) for name in ("other.mcap", "held_out.mcap"))
+    for path in (other, held_out):
+        write_record(record, path)
+    options = ["--holdout", held_out, "--rig", "pendulum", "--without", "backlash", "ft_bias"]
     main(["diagnose", run, other, *options, "--out", str(tmp_path / "out")])
     ((records, rig, holdout, settings),) = quick
     assert settings.without == ("backlash", "ft_bias")
-    assert [r.source for r in records] == [run, other] and holdout.source == other
+    assert [r.source for r in records] == [run, other] and holdout.source == held_out
     assert rig.name == "pendulum"
 
 

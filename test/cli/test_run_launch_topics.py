@@ -116,9 +116,9 @@ def test_a_driver_is_activated_stopped_and_cleared_by_calls(tmp_path):
         assert "'activate' while unconfigured, expected one of: configure" in early.stderr
         up = call("driver", "configure", "activate", "stop")
         assert up.stdout.splitlines()[:2] == ["/rsea/driver: inactive", "/rsea/driver: active"]
-        assert "did you mean clear_fault?" in call("driver", "clear_faults").stderr
-        down = call("driver", "deactivate", "cleanup")
+        down = call("driver", "deactivate", "cleanup", "clear_faults")
         assert down.stdout.splitlines() == ["/rsea/driver: inactive", "/rsea/driver: unconfigured"]
+        assert "did you mean clear_fault?" in down.stderr
     finally:
         driver.send_signal(signal.SIGTERM)
         status = driver.wait(20)
