@@ -22,16 +22,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run pytest on the tree with three workers and return its exit status.
+    """Run pytest on the tree with two workers and return its exit status.
 
-    The first worker waits for nodes most of its time; the other two compute at a lower priority.
+    The first worker waits for nodes most of its time; the other one computes at a lower priority.
 
     Raises Stopped, once pytest has ended, when a signal asks this process to stop.
     """
     root = Path(__file__).resolve().parents[2]
     if not (root / "test" / "conftest.py").is_file():
         raise RseaError(f"{root}: no tests here, expected the repository: run ./rsea test in a clone")
-    workers = ["-n", "3", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
+    workers = ["-n", "2", "--dist", "loadfile"] if (os.cpu_count() or 1) > 1 else []
     pytest = subprocess.Popen([sys.executable, "-m", "pytest", "-q", *workers, *args.pass_on], cwd=root)
     stopped: KeyboardInterrupt | None = None
     while True:
