@@ -59,8 +59,8 @@ class Caller:
         """
         name = self.found(name)
         _await(lambda: action in self.actions(name))
-        if action in self._transitions(name):
-            return self._change(name, action)
+        if action in (transitions := self._transitions(name)):
+            return self._change(name, action, transitions[action])
         if action in self._triggers(name):
             return self._trigger(name, action)
         offered = self.actions(name)
@@ -68,9 +68,9 @@ class Caller:
         near = did_you_mean(action, offered)
         raise ParameterError(f"{name}: {action!r}{state}, expected one of: {', '.join(offered)}{near}")
 
-    def _change(self, name: str, transition: str) -> str:
+    def _change(self, name: str, transition: str, number: int) -> str:
         request = ChangeState.Request()
-        request.transition.id = self._transitions(name)[transition]
+        request.transition.id = number
         if not self._ask(ChangeState, f"{name}/change_state", request).success:
             raise CallRefused(f"{name}: {transition} failed, it is {self.state(name)}: its log says why")
         return f"{name}: {self.state(name)}"
