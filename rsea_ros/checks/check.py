@@ -36,6 +36,8 @@ Wrench = Callable[[], Mapping[str, Channel]]
 """Reads the other axes of the wrench, by their names for --axis."""
 _WHOLE = 0.1
 """Share of masked samples above which a channel's response is not compared."""
+_BRIDGED = 0.01
+"""Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
 FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
@@ -134,7 +136,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     readings, matched = _matched(record, compared, rig, axis)
-    findings += [*noises(record, rig), *matched]
+    bridged = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
+    findings += [*noises(record, rig, but=bridged), *matched]
     if readings is None or late or _is_elsewhere(findings):
         return findings
     return [*findings, *_linearised(checked, rig, readings, values)]

@@ -88,6 +88,7 @@ def add_window_options(parser: argparse.ArgumentParser) -> None:
 def cut(record: Record, args: argparse.Namespace) -> Record:
     """Return the part of a record selected by the options; stamps keep their origin except for --shift.
 
+    Which channels cover the whole of it is for the checks to say again.
     Raises ParameterError for an invalid or empty window, and for a shift of an unknown channel.
     """
     record = _shifted(record, args.shift)
@@ -102,7 +103,8 @@ def cut(record: Record, args: argparse.Namespace) -> Record:
             f"window {begin:g} to {end:g} s: no sample of {record.source} (0 to {length:.3f} s), "
             "expected some commands"
         )
-    return replace(part, channels=channels)
+    faults = tuple(f for f in part.faults if f.kind != "partly_recorded")
+    return replace(part, channels=channels, faults=faults)
 
 
 def _shifted(record: Record, shifts: Sequence[str]) -> Record:
