@@ -44,6 +44,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "dead_channel": "a sensor that does not respond to the machine; no result uses it",
         "sign": "a channel has the opposite sign to the rig",
         "scale": "a channel has another unit than the rig",
+        "offset": "the F/T torque has an offset larger than any torque of the run",
         "smoothing": "a channel was averaged before it was logged",
         "wrong_rig": "the record does not fit the rig",
         "coarse_steps": "values in much larger steps than those of the rig's sensor",

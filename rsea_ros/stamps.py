@@ -8,6 +8,7 @@ density: late samples are never denser in time than the ticks of the clock.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -99,11 +100,16 @@ def _absent(record: Record) -> list[Fault]:
         spans = [(late, start, channel.t[0])] if late > longest else []
         spans += [(early, channel.t[-1], stop)] if early > longest else []
         if spans:
-            lost = sum(length for length, _, _ in spans)
-            detail = " and ".join(f"nothing from {a:.4g} s to {b:.4g} s" for _, a, b in spans)
             held = ", the last command is held" if channel is driving else ""
-            faults.append(Fault("partly_recorded", name, lost / float(stop - start), detail + held, lost, "s"))
+            faults.append(_absence(name, spans, float(stop - start), held))
     return faults
+
+
+def _absence(name: str, spans: Sequence[tuple[float, float, float]], whole: float, then: str) -> Fault:
+    """Return the fault of the spans without a channel: length, begin and end each, s. whole: the run, s."""
+    lost = sum(length for length, _, _ in spans)
+    detail = " and ".join(f"nothing from {a:.4g} s to {b:.4g} s" for _, a, b in spans)
+    return Fault("partly_recorded", name, lost / whole, detail + then, lost, "s")
 
 
 def _repeat(t: FloatArray) -> float:

@@ -49,6 +49,7 @@ class _Part:
 
     t: FloatArray
     values: Mapping[str, FloatArray]
+    notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
 
@@ -104,7 +105,7 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
     """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
-    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header)
+    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header, maps[0].decimal)
 
 
 def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> list[float | None]:
@@ -123,7 +124,7 @@ def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _P
         keep, undated = _rows_kept(table, mapping, run)
         stamps, repeats = _stamps(path, table, mapping, keep)
         values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
-    return _Part(stamps, values, (*_rows_left_out(path, table, undated), *repeats))
+    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats))
 
 
 def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
@@ -140,6 +141,7 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
+        *(note for part in parts for note in part.notes),
         *lines,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))

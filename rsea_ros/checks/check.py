@@ -17,6 +17,7 @@ from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.offset_findings import offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
@@ -40,7 +41,7 @@ _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = ("sign", "scale", "offset", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -136,6 +137,8 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
     readings, matched = _matched(record, compared, rig, axis)
+    scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
+    matched += [] if scaled else offset_findings(record, compared)
     bridged = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
     findings += [*noises(record, rig, but=bridged), *matched]
     if readings is None or late or _is_elsewhere(findings):

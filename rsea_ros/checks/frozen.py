@@ -25,7 +25,7 @@ _LONG_RUN = 20.0
 _LONGEST_RUN = 0.5
 """s. No coarse quantum holds a value so long while the machine moves."""
 _HELD = 0.95
-"""Share of the samples: a channel that repeats so many of them is held; a coarse one in motion repeats fewer."""
+"""Share of the samples: a channel that repeats so many is held; a coarse one in motion repeats fewer."""
 _DITHER = 0.5
 """Of the step between values: noise above it changes the value at standstill too; a step alone has 0.3."""
 _QUIETEST = 0.1
@@ -102,10 +102,9 @@ def _motion(record: Record, name: str, suspect: BoolArray, kind: str) -> MotionB
     held = {n for n in record.channels if n != "command" and _is_held(record[n], at)}
     witness = witness_of(record, name, but=held - {name})
     others = witness_of(record, name)
-    if others != witness and witness in (None, "command", "motor_torque"):
-        if not any(_dithers(record[n]) for n in held):
-            return motion_beside(record, name, others)
-    return motion_beside(record, name, witness)
+    alone = others != witness and witness in (None, "command", "motor_torque")
+    shown = not alone or any(_dithers(record[n]) for n in held)
+    return motion_beside(record, name, witness if shown else others)
 
 
 def _is_held(channel: Channel, at: FloatArray) -> bool:

@@ -1,4 +1,4 @@
-"""Bags of which a part is missing, held or left aside: every verb says which, and nothing is written in them."""
+"""Bags of which a part is missing, held or left aside: every verb says so, and writes nothing into them."""
 
 from __future__ import annotations
 
@@ -71,7 +71,8 @@ def test_every_verb_says_what_is_missing(make, run, tmp_path, capsys):
     (checked,) = json.loads(capsys.readouterr().out)["records"]
     lights = {(f["kind"], f["channel"]) for f in checked["findings"] if f["light"] != "green"}
     assert lights >= PARTS[make]
-    for words in (["identify", str(bag), "--out", str(tmp_path / "out"), "--json"], ["predict", RIG, str(bag)]):
+    identify = ["identify", str(bag), "--out", str(tmp_path / "out"), "--json"]
+    for words in (identify, ["predict", RIG, str(bag)]):
         assert main(words) == 0
         faults = json.loads(capsys.readouterr().out)["data"]["faults"]
         assert {(f["kind"], f["channel"]) for f in faults} >= PARTS[make], words[0]
@@ -94,3 +95,9 @@ def test_results_without_a_name_do_not_land_in_the_bag_either(run, monkeypatch, 
     monkeypatch.chdir(bag)
     assert main(["identify", "."]) == 2
     assert "is the input . or lies in it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("shift", ["ft=100", "command=-100"])
+def test_a_shift_out_of_the_run_is_refused(run, shift, capsys):
+    assert main(["check", str(run[0]), f"--shift={shift}"]) == 2
+    assert f"--shift {shift}: moves" in capsys.readouterr().err
