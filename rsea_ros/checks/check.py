@@ -24,6 +24,7 @@ from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
 from rsea_ros.model.extent import bounded
@@ -92,8 +93,7 @@ def _of_targets(f: Finding) -> Finding:
 
 def _topics(record: Record, rig: Rig) -> list[Finding]:
     have = ", ".join(record.channels)
-    unused = ", ".join(n for n in record.channels if not _takes(rig, n))
-    have += f"; a rig without a spring makes no use of {unused}" if unused else ""
+    have = "; ".join(filter(None, (have, unused_sentence(record, rig))))
     if "command" in record:
         return [Finding("green", "topics", "", float(len(record.channels)), "1", detail=have)]
     return [
@@ -106,11 +106,6 @@ def _topics(record: Record, rig: Rig) -> list[Finding]:
             remedy="record the commands, or name their topic with --topic",
         )
     ]
-
-
-def _takes(rig: Rig, channel: str) -> bool:
-    """Return whether a fit of the rig uses a channel; a drive without a spring is judged by its torque."""
-    return rig.measures(channel) and not (is_inverse(rig) and channel == "velocity")
 
 
 def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Finding]:

@@ -14,6 +14,7 @@ from rsea_ros.checks.dead import dead_channels
 from rsea_ros.checks.expected import Side, sides
 from rsea_ros.checks.frozen import SMALLEST_SHARE, frozen, longest, while_others_moved
 from rsea_ros.checks.motion import is_commanded
+from rsea_ros.checks.stamp_findings import repeats_of
 from rsea_ros.identification.quantum import FEW, step_of
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
@@ -24,6 +25,8 @@ _SPIKE = 12.0
 """A sample further than this many spreads of the ten around it from their median is an outlier."""
 _CLIPPED = 8
 """As many samples at exactly the largest value, some of them in a row, are clipping."""
+_SLOWLY = 0.1
+"""Of the usual step from sample to sample: a motion that ends, not one that a limit cuts off."""
 _COARSE = 5.0
 """Steps larger than this multiple of those of the rig's sensor are reported."""
 
@@ -139,20 +142,33 @@ def outliers(channel: Channel, name: str) -> BoolArray:
 
 
 def clipping(channel: Channel, name: str) -> BoolArray:
-    """Return which samples lie at exactly the largest or smallest value, where many do in a row."""
+    """Return which samples lie at exactly the largest or smallest value, where many do in a row.
+
+    Of a log that repeats each value, the values count. A motion that slows down to the extreme value rests.
+    """
     bad = np.zeros(len(channel), bool)
     if name in ("command", "reference", "motor_torque") or not np.isfinite(channel.y).any():
         return bad
+    arrived = channel.y[:: repeats_of(channel.y)]
     for extreme in (np.nanmax(channel.y), np.nanmin(channel.y)):
-        at = channel.y == extreme
+        at = arrived == extreme
         in_a_row = at[1:] & at[:-1]
-        if (
-            at.sum() >= _CLIPPED
-            and in_a_row.sum() >= _CLIPPED // 2
-            and not _common(channel.y, float(extreme))
-        ):
-            bad |= at
+        many = at.sum() >= _CLIPPED and in_a_row.sum() >= _CLIPPED // 2
+        if many and not _common(arrived, float(extreme)) and not _rests(arrived, at):
+            bad |= channel.y == extreme
     return bad
+
+
+def _rests(y: FloatArray, at: BoolArray) -> bool:
+    """Return whether a channel comes to some values, or leaves them, far slower than it moves elsewhere."""
+    step = np.nan_to_num(np.abs(np.diff(y)))
+    edges = [step[at[1:] & ~at[:-1]], step[at[:-1] & ~at[1:]]]
+    moving = step[step > 0.0]
+    if not len(moving) or not all(map(len, edges)):
+        return False
+    usual = float(np.median(moving[moving > 1.5 * moving.min()])) if np.ptp(moving) > 0.0 else 0.0
+    slow = max(1.5 * float(moving.min()), _SLOWLY * usual)
+    return bool(min(map(np.median, edges)) <= slow < usual)
 
 
 def _common(y: FloatArray, extreme: float) -> bool:
