@@ -25,7 +25,7 @@ from pathlib import Path
 from msg_adapters.tables.elements import is_open
 from msg_adapters.tables.keys import CHANNEL, MAP, RATES, RUNS, TIME, WHERE
 from msg_adapters.tables.layout import DELIMITERS
-from msg_adapters.tables.terms import Term, checked_keys, column_name, number, term_of, terms_of
+from msg_adapters.tables.terms import ChannelTerm, checked_keys, column_name, number, term_of, terms_of
 from msg_adapters.tables.units import CHANNELS, LINEAR, unit
 from rsea_ros import strict_yaml
 from rsea_ros.errors import FieldError, ImportMapError
@@ -33,7 +33,7 @@ from rsea_ros.wording import shown
 
 
 @dataclass(frozen=True)
-class Rows:
+class RowFilter:
     """Rows that count: start <= value of the column < stop, or value = equals."""
 
     column: str
@@ -47,10 +47,10 @@ class ImportMap:
     """A checked import map. time: the column of stamps and its gain to s; or rate, Hz."""
 
     path: Path
-    channels: Mapping[str, tuple[Term, ...]]
-    time: Term | None
+    channels: Mapping[str, tuple[ChannelTerm, ...]]
+    time: ChannelTerm | None
     rate: float | None
-    where: Rows | None = None
+    where: RowFilter | None = None
     delimiter: str | None = None
     about: str = ""
     runs: str | None = None
@@ -148,7 +148,7 @@ def _decimal(value: object) -> str:
     raise FieldError(f"decimal is {shown(value)}, expected '.' or ','", "decimal")
 
 
-def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ...]]:
+def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[ChannelTerm, ...]]:
     """Refuse a map without channels, and one that mixes a linear with a rotary machine."""
     if not channels:
         raise FieldError(f"channels is empty, expected some of {', '.join(CHANNELS)}", "channels")
@@ -163,13 +163,13 @@ def _one_kind(channels: dict[str, tuple[Term, ...]]) -> dict[str, tuple[Term, ..
     return channels
 
 
-def _rows(value: object) -> Rows:
+def _rows(value: object) -> RowFilter:
     body = checked_keys(value, "where", WHERE)
     limits = {key: number(body[key], f"where.{key}") for key in ("from", "below", "equals") if key in body}
     if not limits:
         raise FieldError("where: expected one of from, below, equals", "where")
     column = column_name(body["column"], "where.column")
-    return Rows(column, limits.get("from"), limits.get("below"), limits.get("equals"))
+    return RowFilter(column, limits.get("from"), limits.get("below"), limits.get("equals"))
 
 
 def _delimiter(value: object) -> str | None:

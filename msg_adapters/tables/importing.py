@@ -11,9 +11,9 @@ import numpy as np
 
 from msg_adapters.tables.clock import repaired
 from msg_adapters.tables.files import read_columns
-from msg_adapters.tables.import_map import ImportMap, Rows
+from msg_adapters.tables.import_map import ImportMap, RowFilter
 from msg_adapters.tables.table import Table
-from msg_adapters.tables.terms import Term
+from msg_adapters.tables.terms import ChannelTerm
 from rsea_ros.errors import ImportMapError
 from rsea_ros.signals import BoolArray, Channel, Fault, FloatArray, Record
 
@@ -176,7 +176,7 @@ def _rows_kept(table: Table, mapping: ImportMap, run: float | None) -> tuple[Boo
     return keep, undated
 
 
-def _spread(table: Table, where: Rows | None) -> str:
+def _spread(table: Table, where: RowFilter | None) -> str:
     if where is None:
         return ""
     values = table[where.column]
@@ -197,7 +197,9 @@ def _rows_left_out(path: str | Path, table: Table, undated: int) -> Iterator[Fau
         yield Fault("rows_left_out", name, undated / table.rows, detail)
 
 
-def _channel(name: str, t: FloatArray, y: FloatArray, terms: Sequence[Term]) -> tuple[Channel, list[Fault]]:
+def _channel(
+    name: str, t: FloatArray, y: FloatArray, terms: Sequence[ChannelTerm]
+) -> tuple[Channel, list[Fault]]:
     """Return a channel without its missing values, and their fault."""
     columns = " + ".join(term.column for term in terms)
     if np.isinf(y).any():
@@ -264,7 +266,7 @@ def _check_range(start: float, stop: float, epoch_ns: int) -> None:
         )
 
 
-def _values(table: Table, terms: Sequence[Term], keep: BoolArray, t: FloatArray) -> FloatArray:
+def _values(table: Table, terms: Sequence[ChannelTerm], keep: BoolArray, t: FloatArray) -> FloatArray:
     """Return a channel in the rows that count. t: their stamps, s. Raises ValueError for an expression."""
     total = np.zeros(len(t))
     with np.errstate(over="ignore", invalid="ignore"):

@@ -19,7 +19,7 @@ DELIMITERS = {",": ",", ";": ";", "\t": "\t", "|": "|", " ": BLANKS, "tab": "\t"
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """names: of the columns. headed: whether they are in the first valid line."""
 
     delimiter: str
@@ -62,7 +62,7 @@ def index_in(column: str, names: Sequence[str]) -> int:
 def layout_of(
     lines: Sequence[str], columns: Sequence[str], path: Path, delimiter: str | None,
     header: bool | None = None, decimal: str = ".",
-) -> tuple[int, Layout]:  # fmt: skip
+) -> tuple[int, TextLayout]:  # fmt: skip
     """Return which of the first lines that count begins the table, and the layout by it.
 
     header: whether that line names the columns; None: if no delimiter makes numbers of all of it. It is the
@@ -83,15 +83,15 @@ def layout_of(
     return 0, max(layouts, key=lambda layout: len(layout.names))
 
 
-def _has(layout: Layout, column: str) -> bool:
+def _has(layout: TextLayout, column: str) -> bool:
     base, _ = base_and_index(column, layout.names)
     return base in layout.names or (base.isdecimal() and 1 <= int(base[:6]) <= len(layout.names))
 
 
-def _layout(first: str, delimiter: str, header: bool | None) -> Layout:
+def _layout(first: str, delimiter: str, header: bool | None) -> TextLayout:
     cells = split(first, delimiter)
     while cells[1:] and not cells[-1]:
         cells.pop()
     if all(map(is_numeral, cells)) if header is None else not header:
-        return Layout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
-    return Layout(delimiter, tuple(cells), headed=True)
+        return TextLayout(delimiter, tuple(str(number + 1) for number in range(len(cells))), headed=False)
+    return TextLayout(delimiter, tuple(cells), headed=True)

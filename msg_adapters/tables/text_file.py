@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from msg_adapters.tables.elements import base_and_index, number_in
-from msg_adapters.tables.layout import BLANKS, Layout, counts, index_in, layout_of
+from msg_adapters.tables.layout import BLANKS, TextLayout, counts, index_in, layout_of
 from msg_adapters.tables.lines import blocks_of_lines
 from msg_adapters.tables.numerals import has_decimal_comma, numeral
 from msg_adapters.tables.table import Table, check_size
@@ -82,7 +82,7 @@ class _Reader:
     """Collects columns block by block."""
 
     def __init__(
-        self, layout: Layout, indices: dict[str, int], elements: dict[str, int | None], decimal: str
+        self, layout: TextLayout, indices: dict[str, int], elements: dict[str, int | None], decimal: str
     ) -> None:
         """elements: by column, which number of a list in its cells, None for cells of one number."""
         self._layout = layout

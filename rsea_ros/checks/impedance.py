@@ -41,7 +41,7 @@ _SHAPED = 0.35
 
 
 @dataclass(frozen=True)
-class Impedance:
+class ImpedanceFit:
     """K (N m/rad) and J (kg m^2) with one sigma each, and the median residual of the fit over Z."""
 
     stiffness: float
@@ -91,7 +91,7 @@ def _another(key: str, value: float, unit: str, expected: float, detail: str) ->
     )
 
 
-def impedance_of(side: Side, rig: Rig) -> Impedance | None:
+def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:
     """Return the impedance that a record shows; None where too few lines are coherent."""
     q = quotient("motor_torque", side.t, side.p, side.y)
     m = mechanics(rig, linear_gravity=True)
@@ -106,7 +106,7 @@ def impedance_of(side: Side, rig: Rig) -> Impedance | None:
     return _fitted(nominal / q.value[keep], w, q, q.sd[keep])
 
 
-def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impedance:
+def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> ImpedanceFit:
     """Return K and J from the real part of Z, each line by its doubt."""
     doubt = np.abs(z) * np.hypot(sd, _MODEL_ERROR)
     rows = np.column_stack([np.ones(len(w)), -(w**2)])
@@ -115,7 +115,7 @@ def _fitted(z: FloatArray, w: FloatArray, q: Quotient, sd: FloatArray) -> Impeda
     stiffness, inertia = (inverse @ (z.real / doubt)) / size
     stiffness_sd, inertia_sd = np.linalg.norm(inverse, axis=1) / size
     left = np.abs(z.real - rows @ [stiffness, inertia]) / np.abs(z)
-    return Impedance(
+    return ImpedanceFit(
         stiffness=float(stiffness),
         stiffness_sd=float(stiffness_sd),
         inertia=float(inertia),

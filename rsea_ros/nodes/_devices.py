@@ -13,11 +13,11 @@ from rsea_ros.hardware.dynamixel.line import Line
 from rsea_ros.hardware.dynamixel.line_motor import LineMotor
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.port import BAUD_RATES
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.settings import SensorConnection as MotorSettings
 from rsea_ros.hardware.dynamixel.settings import usual_latency
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection as SensorSettings
 from rsea_ros.hardware.outside import outside_device
 from rsea_ros.hardware.spring import Spring
 from rsea_ros.model.rig import Rig

@@ -8,11 +8,11 @@ from functools import partial
 import pytest
 
 from rsea_ros.hardware.dynamixel.motor import Motor
-from rsea_ros.hardware.dynamixel.settings import Settings as MotorSettings
+from rsea_ros.hardware.dynamixel.settings import SensorConnection as MotorSettings
 from rsea_ros.hardware.dynamixel_netft import DynamixelNetft
-from rsea_ros.hardware.guarded import Guarded
+from rsea_ros.hardware.guarded import GuardedDevice
 from rsea_ros.hardware.limits import Limits
-from rsea_ros.hardware.netft.sensor import Settings as SensorSettings
+from rsea_ros.hardware.netft.sensor import SensorConnection as SensorSettings
 from rsea_ros.hardware.peer.remote import RemoteBench
 
 PERIOD = 1.0 / 280.0
@@ -34,7 +34,7 @@ class Loop:
     def __init__(self, bench, limits=None, **motor):
         self.bench = bench
         self.device = device_on(bench, limits, **motor)
-        self.guarded = Guarded(self.device, limits or Limits(68.0), 1.0 / PERIOD)
+        self.guarded = GuardedDevice(self.device, limits or Limits(68.0), 1.0 / PERIOD)
         self.guarded.open()
         self.states = []
 
