@@ -9,7 +9,7 @@ import pytest
 
 from rsea_ros.checks.check import check_record
 from rsea_ros.checks.faults import check
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig import EffectSetting
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
@@ -21,7 +21,7 @@ RATE, LENGTH = 280.0, 12.0
 
 @functools.cache
 def run():
-    u = excitation("white_noise", Settings(rate=RATE, duration=LENGTH, seed=1))
+    u = excitation("white_noise", ExcitationSettings(rate=RATE, duration=LENGTH, seed=1))
     return synthesize(RIG, Channel(np.arange(len(u)) / RATE, u))
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rsea_ros.checks.check import check_record
-from rsea_ros.identification.excitation import Settings, excitation
+from rsea_ros.identification.excitation import ExcitationSettings, excitation
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.model.simulation import synthesize
 from rsea_ros.signals import Channel
 
 RIG = load_rig("paper_high_impedance")
-U = excitation("white_noise", Settings(rate=280.0, duration=6.0, seed=1))
+U = excitation("white_noise", ExcitationSettings(rate=280.0, duration=6.0, seed=1))
 RUN = synthesize(RIG, Channel(np.arange(len(U)) / 280.0, U))
 
 
