@@ -45,6 +45,8 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "sign": "a channel has the opposite sign to the rig",
         "scale": "a channel has another unit than the rig",
         "offset": "the F/T torque has an offset larger than any torque of the run",
+        "angle_jumps": "an angle jumps: it is wrapped at a turn, or the encoder began to count anew",
+        "standstill": "the machine stands still for a while although the command goes on",
         "smoothing": "a channel was averaged before it was logged",
         "wrong_rig": "the record does not fit the rig",
         "coarse_steps": "values in much larger steps than those of the rig's sensor",

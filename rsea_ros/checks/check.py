@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_ros.checks.angle_jumps import jump_findings
 from rsea_ros.checks.expected import Side, is_full_of_gaps, quotients, sides
 from rsea_ros.checks.faults import Checked, check
 from rsea_ros.checks.finding import Finding, Findings
@@ -24,6 +25,7 @@ from rsea_ros.checks.signal_findings import excitation, noises
 from rsea_ros.checks.smoothing import smoothing_findings
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.checks.stamp_findings import fault_finding, order, rates
+from rsea_ros.checks.standstill import standstill_findings
 from rsea_ros.checks.unused import unused_sentence
 from rsea_ros.errors import RseaError
 from rsea_ros.identification.threads import one_blas_thread
@@ -42,7 +44,10 @@ _BRIDGED = 0.01
 """Share of masked samples above which the lines that bridge them are no measure of a sensor's noise."""
 _IN_COMMON = 0.3
 """Coherence with the rig's simulation, by power, below which a channel is not that of the rig."""
-FAULTY = ("sign", "scale", "offset", "smoothing", "clock_offset", "clock_drift", "wrong_rig")
+FAULTY = (
+    "sign", "scale", "offset", "angle_jumps", "standstill", "smoothing", "clock_offset", "clock_drift",
+    "wrong_rig",
+)  # fmt: skip
 """Kinds of findings that every result made from the record repeats, where they are not green."""
 
 
@@ -65,6 +70,7 @@ def check_record(
         every += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             every += excitation(checked.record, rig)
+            every += [*jump_findings(checked.record), *standstill_findings(checked.record)]
             every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         every += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))

@@ -25,8 +25,17 @@ def shares_told(information: FloatArray, doubt: FloatArray) -> FloatArray:
     free: 0 where only a ratio with others is determined. information: J'J, shape (n, n).
     """
     scaled = information * np.outer(doubt, doubt) + _NULL * np.eye(len(doubt))
-    told: FloatArray = 1.0 / (1.0 + np.diag(np.linalg.inv(scaled)))
-    return told
+    return np.asarray(1.0 / (1.0 + _variances(scaled)))
+
+
+def _variances(information: FloatArray) -> FloatArray:
+    """Return the variance that an information leaves of each unknown; where rounding leaves it singular,
+    directions below the rounding count as unknown."""
+    try:
+        return np.diag(np.linalg.inv(information))
+    except np.linalg.LinAlgError:
+        size, vectors = np.linalg.eigh(information)
+        return np.asarray(vectors**2 @ (1.0 / np.maximum(size, _NULL)))
 
 
 def how_determined(name: str, value: float, ci95: tuple[float, float], told: float) -> Determined:
