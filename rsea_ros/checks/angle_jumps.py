@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rsea_ros.checks.finding import Finding
-from rsea_ros.signals import Channel, FloatArray, IntArray, Record
+from rsea_ros.signals import BoolArray, Channel, FloatArray, IntArray, Record
 
 _LARGE = 10.0
 """Times the largest usual step: a motion has no step so much larger than those beside it."""
@@ -65,10 +65,11 @@ def _jumps(channel: Channel) -> IntArray:
     return np.flatnonzero(alone)
 
 
-def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> FloatArray:
+def _is_contradicted(record: Record, at: IntArray, sizes: FloatArray) -> BoolArray:
     """Return for which jumps the measured velocity says that the machine made none."""
     if "velocity" not in record or not len(at):
         return np.zeros(len(at), bool)
     t, velocity = record["position"].t, record["velocity"]
     around = [np.abs(np.interp(t[k], velocity.t, velocity.y)) for k in (at, at + 1)]
-    return np.asarray(np.maximum(*around) * (t[at + 1] - t[at]) < _CONTRADICTED * np.abs(sizes))
+    brought = np.maximum(*around) * (t[at + 1] - t[at])
+    return np.asarray(brought < _CONTRADICTED * np.abs(sizes))
