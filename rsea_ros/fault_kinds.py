@@ -44,7 +44,7 @@ FAULT_KINDS: Mapping[str, str] = MappingProxyType(
         "dead_channel": "a sensor that does not respond to the machine; no result uses it",
         "sign": "a channel has the opposite sign to the rig",
         "scale": "a channel has another unit than the rig",
-        "offset": "the F/T torque has an offset larger than any torque of the run",
+        "offset": "a zero is off: of the F/T torque beyond any of the run, of the position beyond its motion",
         "angle_jumps": "an angle jumps: it is wrapped at a turn, or the encoder began to count anew",
         "standstill": "the machine stands still for a while although the command goes on",
         "smoothing": "a channel was averaged before it was logged",

@@ -18,7 +18,7 @@ from rsea_ros.checks.lag import in_step, lag_findings, lags
 from rsea_ros.checks.linear import linear_of
 from rsea_ros.checks.linear_findings import clock_findings
 from rsea_ros.checks.motion import is_commanded
-from rsea_ros.checks.offset_findings import offset_findings
+from rsea_ros.checks.offset_findings import angle_offset_findings, offset_findings
 from rsea_ros.checks.restoring import restoring_findings
 from rsea_ros.checks.rig_values import value_findings
 from rsea_ros.checks.signal_findings import excitation, noises
@@ -70,7 +70,8 @@ def check_record(
         every += [*order(record), *rates(record, rig)]
         if "command" in checked.record and len(checked.record["command"]) > 2:
             every += excitation(checked.record, rig)
-            every += [*jump_findings(checked.record), *standstill_findings(checked.record)]
+            every += jump_findings(checked.record)
+            every += [] if _bridged(checked) else standstill_findings(checked.record)
             every += _against_rig(checked, rig, axis, values) if is_commanded(checked.record) else []
         every += _other_axes(checked, rig, axis, wrench)
     faults = (*checked.faults, *(_fault(f) for f in every if f.kind in FAULTY and f.light != "green"))
@@ -137,14 +138,20 @@ def _against_rig(checked: Checked, rig: Rig, axis: str, values: bool) -> list[Fi
         record = in_step(record, late)
         findings = lag_findings(late, len(compared))
         compared = {n: s for n, s in sides(record, rig).items() if n in whole}
+    if elsewhere := angle_offset_findings(rig, compared):
+        return [*findings, *elsewhere]
     readings, matched = _matched(record, compared, rig, axis)
     scaled = any(f.kind == "scale" and f.channel == "ft" and f.light == "red" for f in matched)
     matched += [] if scaled else offset_findings(record, compared)
-    bridged = {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
-    findings += [*noises(record, rig, but=bridged), *matched]
+    findings += [*noises(record, rig, but=_bridged(checked)), *matched]
     if readings is None or late or _is_elsewhere(findings):
         return findings
     return [*findings, *_linearised(checked, rig, readings, values)]
+
+
+def _bridged(checked: Checked) -> set[str]:
+    """Return the channels of which so much was masked and bridged that what is between says nothing."""
+    return {n for n, bad in checked.masked.items() if np.count_nonzero(bad) > _BRIDGED * len(bad)}
 
 
 def _matched(
