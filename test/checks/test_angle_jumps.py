@@ -69,3 +69,10 @@ def test_a_motor_that_is_off_for_a_while_is_said(start):
 def test_a_rest_of_the_command_is_no_standstill_of_the_motor():
     resting = synthesize(RIG, Channel(T, np.where(T < 4.0, U, 0.0)))
     assert standstill_findings(resting) == []
+
+
+def test_a_sensor_that_is_not_recorded_then_does_not_stand_still():
+    short = Record({"command": RUN["command"], "ft": RUN["ft"].between(0.0, 2.0)})
+    assert standstill_findings(short) == []
+    slow = {n: Channel(c.t[9::10], c.y[9::10]) for n, c in RUN.channels.items() if n != "command"}
+    assert standstill_findings(Record({"command": RUN["command"], **slow})) == []
