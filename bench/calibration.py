@@ -166,9 +166,9 @@ def _values(problem: Any, theta: Any, name: str) -> dict[str, float]:
 def _line(entry: dict[str, Any]) -> str:
     """Return one record in a line: truth, what was accepted with the spread of its lambda, time."""
     first = [place[0] for place in entry.get("places", [])]
-    right = {e["name"]: "+" if e["name"] in entry["truth"] else "WRONG" for e in first}
     said = ", ".join(
-        f"{n} {right[n]} {e['signature']['spread']:.3f}" for n, e in zip(right, first, strict=True)
+        f"{e['name']} {'+' if e['name'] in entry['truth'] else 'WRONG'} {e['signature']['spread']:.3f}"
+        for e in first
     )
     truth = "+".join([*entry["truth"], *([f"({entry['off']})"] if entry["off"] else [])])
     floor = "at floor" if entry.get("at_floor") else ""
