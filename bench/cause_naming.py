@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.append(str(ROOT))
-sys.path.append(str(ROOT / "test"))  # the second bench is a part of the tests
-sys.path.append(str(ROOT / "bench"))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "test"))  # the second bench is a part of the tests
+sys.path.append(str(Path(__file__).resolve().parent))
 
 from effect_coverage_records import COMMANDS
 from independent.bench import Bench, drawn_bench, record_command
