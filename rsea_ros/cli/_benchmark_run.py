@@ -38,9 +38,11 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or Path(f"{args.entry}.jsonl")
     check_free([out], force=args.force)
     dataset = read_dataset(args.dataset)
+    partial = out.with_name(f"{out.name}.partial")
     with progress("benchmark") as tell:
-        lines = list(_lines(dataset, args.entry, tell))
+        lines = list(_lines(dataset, args.entry, partial, tell))
     write_text(out, "".join(f"{json.dumps(line)}\n" for line in lines), force=args.force)
+    partial.unlink()
     print(f"answers     {out}: {len(lines)} records")
     refused = [line["error"] for line in lines if "error" in line]
     if refused:
@@ -49,19 +51,47 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _lines(dataset: Dataset, entry: str, tell: Progress) -> Iterator[dict[str, Any]]:
-    """Yield the answer to each record for JSON; a record that cannot be diagnosed names no effect."""
+def _lines(dataset: Dataset, entry: str, partial: Path, tell: Progress) -> Iterator[dict[str, Any]]:
+    """Yield the answer to each record for JSON.
+
+    partial: keeps the answers as they come; a run that was stopped goes on from there.
+    """
+    known = _kept(dataset, entry, partial)
+    with partial.open("a", encoding="utf-8") as file:
+        for number, name in enumerate(dataset.hashes):
+            tell(name, number / len(dataset.hashes))
+            if name not in known:
+                known[name] = _answered(dataset, entry, name)
+                kept = {**known[name], "entry": entry, "truth": dataset.hashes[name]}
+                file.write(f"\n{json.dumps(kept)}")
+                file.flush()
+            yield known[name]
+
+
+def _kept(dataset: Dataset, entry: str, partial: Path) -> dict[str, dict[str, Any]]:
+    """Return the answers of a stopped run of this entry to these very records, by record."""
+    kept = {}
+    for text in partial.read_text(encoding="utf-8").splitlines() if partial.exists() else ():
+        try:
+            line = json.loads(text)
+        except ValueError:  # empty, or cut off when the run was stopped
+            continue
+        if line.pop("entry") == entry and dataset.hashes.get(line["record"]) == line.pop("truth"):
+            kept[line["record"]] = line
+    return kept
+
+
+def _answered(dataset: Dataset, entry: str, name: str) -> dict[str, Any]:
+    """Return the answer to a record; one that cannot be diagnosed names no effect."""
     from rsea_ros.benchmark.answers import Answer
     from rsea_ros.benchmark.entry import ENTRIES as FUNCTIONS
     from rsea_ros.model.rig_file import load_rig
 
-    for number, name in enumerate(dataset.hashes):
-        tell(name, number / len(dataset.hashes))
-        record, rig = dataset.record(name), load_rig(dataset.rig_path(name))
-        start, failure = time.monotonic(), {}
-        try:
-            answer = FUNCTIONS[entry](record, rig)
-        except RseaError as error:
-            answer, failure = Answer(), {"error": str(error)}
-        seconds = round(time.monotonic() - start, 2)
-        yield {**Answer(answer.causes, seconds).line(name), **failure}
+    record, rig = dataset.record(name), load_rig(dataset.rig_path(name))
+    start, failure = time.monotonic(), {}
+    try:
+        answer = FUNCTIONS[entry](record, rig)
+    except RseaError as error:
+        answer, failure = Answer(), {"error": str(error)}
+    seconds = round(time.monotonic() - start, 2)
+    return {**Answer(answer.causes, seconds).line(name), **failure}

@@ -213,3 +213,24 @@ def test_an_answer_is_written_as_it_is_read(made):
     line = Answer({"backlash": 0.25}, 3.0).line("r0001")
     expected = {"record": "r0001", "causes": [{"name": "backlash", "probability": 0.25}], "seconds": 3.0}
     assert line == expected
+
+
+def test_a_stopped_run_goes_on_where_it_stopped(made, tmp_path, monkeypatch):
+    asked = []
+
+    def stopping(record, rig):
+        asked.append(record.source)
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+        return Answer({"backlash": 0.5})
+
+    monkeypatch.setitem(entry.ENTRIES, "diagnose", stopping)
+    words = ["benchmark", "run", str(made / "set"), "--out", str(tmp_path / "a.jsonl")]
+    assert main(words) == 130 and not (tmp_path / "a.jsonl").exists()
+    with (tmp_path / "a.jsonl.partial").open("a") as partial:
+        partial.write('\n{"record": "r0003", "cau')
+    assert main(words) == 0
+    assert len(asked) == RECORDS + 1 and not (tmp_path / "a.jsonl.partial").exists()
+    lines = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
+    assert [line["record"] for line in lines] == list(read_dataset(made / "set").hashes)
+    assert all(set(line) == {"record", "causes", "seconds"} for line in lines)
