@@ -9,8 +9,7 @@ from rsea_ros.hardware.device import State, Wrench
 from rsea_ros.hardware.dynamixel.motor import Motor
 from rsea_ros.hardware.dynamixel.own_limits import check_own_limits
 from rsea_ros.hardware.limits import Limits, check_limits
-from rsea_ros.hardware.netft.sensor import ForceTorqueSensor
-from rsea_ros.hardware.netft.sensor import SensorConnection as SensorSettings
+from rsea_ros.hardware.netft.sensor import ForceTorqueSensor, SensorConnection
 from rsea_ros.hardware.protection import Protection
 
 
@@ -26,7 +25,7 @@ class DynamixelNetft:
     def __init__(
         self,
         motor: Motor,
-        sensor: SensorSettings | None,
+        sensor: SensorConnection | None,
         limits: Limits,
         stiffness: float,
         *,
