@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parent))
 
-from peers_cases import REAL, SIMULATED, TestCase
+from peers_cases import REAL, SIMULATED, PeerRecord
 
 HERE = Path(__file__).resolve().parent / "peers"
 PEERS = ("rsea", "mujoco_sysid", "bam", "cma_pace", "sysidentpy", "jax_sysid", "pysindy", "lstm", "gp")
@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _result(peer: str, case: TestCase, args: argparse.Namespace) -> dict[str, Any]:
+def _result(peer: str, case: PeerRecord, args: argparse.Namespace) -> dict[str, Any]:
     """Return the result of a peer, from its file if there is one."""
     stem = f"{case.name.replace(' ', '_').replace(',', '').replace(chr(39), '')}"
     target = args.out / f"{stem}.{peer}.json"
@@ -129,7 +129,7 @@ def _python(peer: str, envs: Path) -> tuple[Path, str]:
     return python, ""
 
 
-def _row(peer: str, case: TestCase, result: dict[str, Any]) -> str:
+def _row(peer: str, case: PeerRecord, result: dict[str, Any]) -> str:
     if "not_run" in result:
         return f"| {case.name} | {peer} | not run: {_cell(result['not_run'])} | | | | | |"
     error = np.array(result["prediction"]) - case.y[case.split :]
@@ -141,7 +141,7 @@ def _row(peer: str, case: TestCase, result: dict[str, Any]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _values_off(case: TestCase, result: dict[str, Any]) -> float:
+def _values_off(case: PeerRecord, result: dict[str, Any]) -> float:
     """Return the RMS relative error of the true values that a peer states, %; not a number for none."""
     pairs = [(result["parameters"][n], v) for n, v in case.truth.items() if n in result["parameters"]]
     errors = [float(value) / true - 1.0 for value, true in pairs]

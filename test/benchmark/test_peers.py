@@ -27,7 +27,7 @@ def peers():
 def case(peers):
     y = np.sin(np.arange(40.0))
     truth = {"inertia": 2.0, "damping": 4.0}
-    return peers.TestCase(
+    return peers.PeerRecord(
         "a case", np.ones(40), y, 10.0, 30, "joint", {"inertia": 1.0}, 0.5, y, np.zeros(0), truth
     )
 
