@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from rsea_ros.cli._columns import columns
 from rsea_ros.cli._output import path
+from rsea_ros.errors import ParameterError
 
 if TYPE_CHECKING:
     from rsea_ros.benchmark.scoring import ScoreInterval, Scores
@@ -38,7 +39,11 @@ def run(args: argparse.Namespace) -> int:
     dataset = read_dataset(args.dataset)
     truths = read_truth(args.truth or dataset.truth, dataset)
     entries = {name: make(dataset) for name, make in BASELINES.items()}
-    entries |= {file.name.removesuffix(".jsonl"): read_answers(file, dataset) for file in args.answers}
+    for file in args.answers:
+        name = file.name.removesuffix(".jsonl")
+        if name in entries:
+            raise ParameterError(f"{file}: a second row {name!r}, expected another file name")
+        entries[name] = read_answers(file, dataset)
     scores = {name: score(answers, truths, dataset.effects) for name, answers in entries.items()}
     if args.json:
         print(json.dumps({"records": len(truths), "entries": {n: _document(s) for n, s in scores.items()}}))
