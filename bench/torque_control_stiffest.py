@@ -15,7 +15,7 @@ from rsea_ros.control import synthesis
 from rsea_ros.control.impedance import Moved, moved, moved_bench
 from rsea_ros.control.law import Gains, law_of
 from rsea_ros.control.loads import LOCKED, load_range
-from rsea_ros.control.synthesis import Demand, check, design, grid
+from rsea_ros.control.synthesis import DesignLimits, check, design, grid
 from rsea_ros.control.uncertainty import Uncertainty, corners
 from rsea_ros.model.rig import Rig
 
@@ -57,7 +57,7 @@ def _limited(
     def cost(x: np.ndarray) -> float:
         gains = synthesis._gains(x, rate)
         score, worst = synthesis._score(problem, gains), _worst(rig, rate, set_of, gains)
-        beyond = 20.0 * synthesis._lacking(problem, score, Demand())
+        beyond = 20.0 * synthesis._lacking(problem, score, DesignLimits())
         if limit is None:
             return float(np.log(worst)) + beyond
         soft = np.interp(synthesis.SOFT, problem.moved.hz, score.softness)

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from rsea_ros.control.law import Law
+from rsea_ros.control.law import FeedbackLaw
 from rsea_ros.control.motion import LOCKED, Stretch, Yielding
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import FloatArray
@@ -60,7 +60,7 @@ inertia there, and its theta_1 is negative: -12 at 2 Hz for one of 1.3 Hz. By no
 class Learning:
     """load: theta. drive: J (kg m^2), b (N m s/rad), c (N m)."""
 
-    def __init__(self, rig: Rig, law: Law) -> None:
+    def __init__(self, rig: Rig, law: FeedbackLaw) -> None:
         h = law.period
         self._stretch = Stretch(rig["spring.stiffness"], rig["spring.damping"], h)
         self._yielding = Yielding(h)
