@@ -3,8 +3,9 @@
 Run: python bench/torque_control.py [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
 Sections: trials (all that is asked, the worst of the set beside the nominal; the whole set swept), followed
 (5 Hz on every simulated bench of the set), free (a free load, unknown, by frequency and amplitude, without
-and with an encoder on the link), impedance (the outer loop), link (what that encoder is worth), late (samples
-that come when they come), baselines (docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
+and with an encoder on the link), impedance (the outer loop), link (what that encoder is worth), stiffest
+(what a limit of |Z| for the whole set costs), late (samples that come when they come), baselines
+(docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bench.torque_control_baselines import baselines
+from bench.torque_control_stiffest import stiffest as limited
 from rsea_ros.cli.control import motors
 from rsea_ros.control.controller import Measurement, TorqueController, TorqueLimits
 from rsea_ros.control.harness import Arrivals, irregular
@@ -34,11 +36,14 @@ from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
 from rsea_ros.control.trials import LEARNED, LONG, hardest, sine, tracked
+from rsea_ros.control.uncertainty import Uncertainty
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
 from rsea_ros.report.control import tables
 
+DAMPED = (33.0, 0.3, 1.0)
+"""Hz, damping ratio, participation: the other reading of a mode of 0.3."""
 SWEEP = np.array([0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0])
 
 
@@ -54,13 +59,14 @@ def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
     shown = [f"{at.design.rate:g} Hz" for at in found.rates]
     yield "\n".join(tables.gains_words(found))
     for at in found.rates:
-        swept = robustness(found.rig, load_range(rig, free), at.design)
-        m = swept.margins
-        yield (
-            f"{at.design.rate:g} Hz, {swept.cases} benches, {swept.unstable} unstable: least phase margin "
-            f"{m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
-            f"|S| {swept.sensitivity:.2f} ({swept.where})"
-        )
+        for u in (Uncertainty(), Uncertainty(mode=DAMPED)):
+            swept = robustness(found.rig, load_range(rig, free), at.design, u=u)
+            m = swept.margins
+            yield (
+                f"{at.design.rate:g} Hz, mode {u.mode}, {swept.cases} benches, {swept.unstable} unstable: "
+                f"least phase margin {m.phase:.1f} deg, gain {m.gain:.1f} dB, delay {m.delay:.2f} samples, "
+                f"|S| {swept.sensitivity:.2f} ({swept.where})"
+            )
     yield markdown(tables.trial_head(found), tables.trial_rows(found))
     yield markdown(["compensated", "sine of 10 N·m", *shown], tables.compensation_rows(found))
     yield markdown(["motor", "amplitude", "clamped: up to", "free: up to"], tables.reach_rows(found))
@@ -168,7 +174,7 @@ def designs(rig: Rig, loads: Mapping[str, Rig], rates: Sequence[float]) -> list[
 
 SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
     "trials": trials, "followed": followed, "free": unknown, "impedance": outer, "link": linked,
-    "late": late, "baselines": baselines, "cost": cost,
+    "stiffest": limited, "late": late, "baselines": baselines, "cost": cost,
 }  # fmt: skip
 
 

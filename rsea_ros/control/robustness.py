@@ -31,9 +31,11 @@ class Robustness:
     margins: Margins
 
 
-def robustness(rig: Rig, loads: Mapping[str, Rig], found: ControllerDesign, steps: int = 5) -> Robustness:
-    """Sweep the set. steps: values of K_s and of b_m, each."""
-    u, hz, law = Uncertainty(), grid(found.rate), law_of(rig, found.rate, found.gains)
+def robustness(
+    rig: Rig, loads: Mapping[str, Rig], found: ControllerDesign, steps: int = 5, u: Uncertainty | None = None
+) -> Robustness:
+    """Sweep the set, by default that of the design. steps: values of K_s and of b_m, each."""
+    u, hz, law = u or Uncertainty(), grid(found.rate), law_of(rig, found.rate, found.gains)
     total = unstable = 0
     worst, where, every = 0.0, BenchVariant(""), []
     for name in loads:

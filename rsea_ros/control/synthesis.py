@@ -51,6 +51,8 @@ SOFT = (0.1, 0.3, 1.0, 3.0)
 _START = (0.3, 0.0025, 2.0, 12.0, 42.0)
 """k_p; k_d, s; k_i; q_frequency, Hz; k_w, N m s/rad."""
 _SHORT = 0.02
+_AIM = 0.9995
+"""Of the impedance allowed: the search may end that much beside its aim."""
 HEAVY = ("x 4", "x 30", "x 100")
 """Loads between others, or nearly locked: they are left to the check of what was found."""
 
@@ -81,7 +83,10 @@ class ControllerDesign:
 
 @dataclass(frozen=True)
 class SynthesisProblem:
-    """What a design is looked for on: the corners of the set, and the locked rig moved from outside."""
+    """What a design is looked for on: the corners of the set, and the locked rig moved from outside.
+
+    The latter on the grid of `check`: between 60 frequencies the impedance was 0.5 % above its limit.
+    """
 
     rig: Rig
     rate: float
@@ -109,7 +114,7 @@ def design(
 
     def cost(x: FloatArray) -> float:
         score = _score(problem, _gains(x, rate))
-        soft = np.interp(SOFT, problem.family.hz, score.softness)
+        soft = np.interp(SOFT, problem.moved.hz, score.softness)
         wanted = np.log(score.friction.max()) + np.mean(np.log(soft))
         return float(wanted) + 20.0 * _lacking(problem, score, demand) + 20.0 * _stiff(score, demand)
 
@@ -166,9 +171,8 @@ def grid(rate: float, points: int = 150) -> FloatArray:
 
 def _problem(rig: Rig, loads: Mapping[str, Rig], rate: float, hz: FloatArray) -> SynthesisProblem:
     u = Uncertainty()
-    return SynthesisProblem(
-        rig, rate, family(loads, corners(tuple(loads), u), u, rate, hz), moved(rig, rate, hz)
-    )
+    benches = family(loads, corners(tuple(loads), u), u, rate, hz)
+    return SynthesisProblem(rig, rate, benches, moved(rig, rate, grid(rate)))
 
 
 def _score(problem: SynthesisProblem, gains: Gains) -> RobustnessScore:
@@ -218,7 +222,7 @@ def _lacking(problem: SynthesisProblem, score: RobustnessScore, demand: DesignLi
 
 
 def _stiff(score: RobustnessScore, demand: DesignLimits) -> float:
-    return max(0.0, float(score.softness.max()) / demand.impedance - 1.0)
+    return max(0.0, float(score.softness.max()) / (_AIM * demand.impedance) - 1.0)
 
 
 def _odd(highest: float) -> FloatArray:
