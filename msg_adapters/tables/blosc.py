@@ -1,4 +1,4 @@
-"""Chunks of the Blosc 1 container, which zarr uses unless told otherwise: blocks, each shuffled and compressed.
+"""Chunks of the Blosc 1 container, zarr's default: blocks, each shuffled and compressed.
 
 A chunk has a header of 16 bytes, the offset of each block, and the blocks: for each of its streams a length
 and the stream, as it is where the length is that of the unpacked stream. Source: README_CHUNK_FORMAT of
@@ -55,7 +55,10 @@ class _Chunk:
 
 
 def unpack_blosc(packed: bytes, size: int, count: int) -> bytes:
-    """Return the first `count` bytes of a chunk that unpacks to `size`. Raises ValueError for a damaged one."""
+    """Return the first `count` bytes of a chunk that unpacks to `size`.
+
+    Raises ValueError for a damaged one.
+    """
     try:
         chunk = _chunk(packed, size)
         if chunk.flags & _COPIED:
@@ -70,8 +73,8 @@ def _chunk(packed: bytes, size: int) -> _Chunk:
     version, _, flags, width, unpacked, block, held = _HEADER.unpack_from(packed)
     if version != _VERSION or held != len(packed) or unpacked != size or not (block and width):
         raise ValueError(
-            f"a Blosc chunk of version {version} holds {held} bytes for {unpacked}, expected version {_VERSION}"
-            f" and {len(packed)} bytes for {size}; a damaged file?"
+            f"a Blosc chunk of version {version} holds {held} bytes for {unpacked}, expected version"
+            f" {_VERSION} and {len(packed)} bytes for {size}; a damaged file?"
         )
     if flags & _BITS_SHUFFLED:
         raise ValueError("a Blosc chunk has its bits shuffled, expected bytes shuffled or none")

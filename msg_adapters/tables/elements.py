@@ -64,7 +64,7 @@ def number_in(cell: str, index: int) -> str:
 
 
 def chosen(column: str, index: int | None) -> str:
-    """Return a column, or an expression, with the number that is chosen in the place of each `[#]` and `##`."""
+    """Return a column, or an expression, with the chosen number in the place of each `[#]` and `##`."""
     if index is None:
         return column
     column = column.replace(2 * CHOSEN, f"{index:02d}")

@@ -60,7 +60,7 @@ class _Array:
 
 
 def read_zarr(path: Path, columns: Sequence[str]) -> Table:
-    """Return the requested arrays, or columns of them. Raises OSError and ValueError with array and reason."""
+    """Return the requested arrays, or columns of them. Raises OSError and ValueError with the array."""
     with opened(path) as store:
         if not store.arrays:
             raise ValueError("a zarr group without arrays, expected one of its subgroups")
@@ -92,7 +92,7 @@ def _part(store: Store, array: _Array, row: int, index: int | None) -> FloatArra
     size = array.dtype.itemsize * wide
     content = array.unpack(packed, length * size, held * size)
     if len(content) != held * size:
-        raise ValueError(f"a chunk of array {array.name!r} holds {len(content)} bytes, expected {held * size}")
+        raise ValueError(f"array {array.name!r}: a chunk of {len(content)} bytes, expected {held * size}")
     values = np.frombuffer(content, array.dtype).reshape(held, wide)
     return values[:, 0 if index is None else index % wide].astype(np.float64)
 
@@ -103,7 +103,8 @@ def _array(name: str, content: bytes) -> _Array:
     shape, chunks = (_whole(name, key, header[key]) for key in ("shape", "chunks"))
     dtype, order = header["dtype"], header["order"]
     if not 1 <= len(shape) <= 2 or len(chunks) != len(shape) or 0 in chunks:
-        raise ValueError(f"array {name!r} has shape {shape} in chunks of {chunks}, expected a vector or a matrix")
+        held = f"shape {shape} in chunks of {chunks}"
+        raise ValueError(f"array {name!r} has {held}, expected a vector or a matrix")
     if not (isinstance(dtype, str) and _DTYPE.fullmatch(dtype)):
         raise ValueError(f"array {name!r} is of type {shown(dtype)}, expected numbers")
     if header["filters"] or (order != "C" and len(shape) > 1):

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 TIME_LIMIT = 3600.0
-"""s of a task. A diagnosis of a minute at 280 Hz takes about one minute, of a walk of ten minutes about ten."""
+"""s of a task. A diagnosis of a minute at 280 Hz takes about one minute, one of ten minutes about ten."""
 GRACE = 60.0
 """s after the exception, until a worker ends itself: reading 1 GB from a slow disk takes about ten."""
 _STATUS = 70

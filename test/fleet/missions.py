@@ -30,7 +30,8 @@ def torque() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return command, torque (N m) and deflection (rad) of joint 0, at the same instants."""
     t = np.arange(LENGTH) / RATE
     rng = np.random.default_rng(5)
-    parts = [8.0 * rng.normal() / np.sqrt(1 + k / 4) * np.sin(2 * np.pi * 0.7 * (k + 1) * t) for k in range(30)]
+    sizes = [8.0 * rng.normal() / np.sqrt(1 + k / 4) for k in range(30)]
+    parts = [size * np.sin(2 * np.pi * 0.7 * (k + 1) * t) for k, size in enumerate(sizes)]
     rig = load_rig("anymal_joint").with_values({"spring.stiffness": STIFFNESS})
     command = np.sum(parts, axis=0)
     record = synthesize(rig, Channel(t, command), seed=1)
@@ -42,7 +43,8 @@ def write_mission(folder: Path, mission: str, packed: bool = True) -> Path:
     command, measured, deflection = torque()
     t = np.arange(len(command)) / RATE
     angle, speed = 0.3 * np.sin(4.0 * t), 1.2 * np.cos(4.0 * t)
-    arrays: dict[str, np.ndarray] = {"timestamp": begin(mission) + t, "sequence_id": np.arange(len(t), dtype="<u8")}
+    arrays: dict[str, np.ndarray] = {"timestamp": begin(mission) + t}
+    arrays["sequence_id"] = np.arange(len(t), dtype="<u8")
     for joint in range(JOINTS):
         share, name = 1.0 - joint / 100.0, f"{joint:02d}_"
         forward = share * command - GAINS["p"] * 0.05 - GAINS["d"] * (0.1 - speed)

@@ -1,4 +1,4 @@
-"""Walking logs of a series elastic robot: dated missions, twelve joints side by side in one group of arrays."""
+"""Walking logs of a series elastic robot: dated missions, twelve joints side by side in one group."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def missions(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_joints_of_a_mission_become_bags(missions, tmp_path, capsys):
     file = missions / OCTOBER / "data" / "anymal_state_actuator.tar"
-    assert main(["import", str(file), "--map", "grand_tour", "--index", "0,11", "--out", str(tmp_path / "legs")]) == 0
+    run = ["import", str(file), "--map", "grand_tour", "--index", "0,11", "--out", str(tmp_path / "legs")]
+    assert main(run) == 0
     command, measured, deflection = (values[:-NOT_WALKING] for values in torque())
     for joint in (0, 11):
         record = read_record(tmp_path / "legs" / f"anymal_state_actuator-joint{joint}")
@@ -46,9 +47,10 @@ def test_the_joints_of_a_mission_become_bags(missions, tmp_path, capsys):
 
 def test_a_map_with_the_number_of_a_joint_in_its_names_asks_for_it(missions, tmp_path, capsys):
     file = missions / OCTOBER / "data" / "anymal_state_actuator.tar"
-    assert main(["import", str(file), "--map", "grand_tour", "--out", str(tmp_path / "leg")]) == 2
+    run = ["import", str(file), "--map", "grand_tour", "--out", str(tmp_path / "leg")]
+    assert main(run) == 2
     assert "holds several joints, expected the number of one, from 0 (--index)" in capsys.readouterr().err
-    assert main(["import", str(file), "--map", "grand_tour", "--index", "12", "--out", str(tmp_path / "leg")]) == 2
+    assert main([*run, "--index", "12"]) == 2
     assert "no column '12_command_mode', expected one of 00_command_joint_torque" in capsys.readouterr().err
 
 
@@ -62,8 +64,10 @@ def test_every_mission_holds_the_twelve_joints(missions):
         ratio = [np.ptp(run.lenient["ft"].y) / np.ptp(runs[0].lenient["ft"].y) for run in runs]
         assert np.allclose(ratio, 1.0 - np.arange(JOINTS) / 100.0)
         stamps[bag.url.split("/")[-3]] = {run.time for run in runs}
-    expected = [datetime(2024, 10, 1, 11, 29, 55), datetime(2024, 11, 2, 17, 18, 32)]
-    assert stamps == {n: {e.replace(tzinfo=timezone.utc)} for n, e in zip((OCTOBER, NOVEMBER), expected, strict=True)}
+    assert stamps == {
+        OCTOBER: {datetime(2024, 10, 1, 11, 29, 55, tzinfo=timezone.utc)},
+        NOVEMBER: {datetime(2024, 11, 2, 17, 18, 32, tzinfo=timezone.utc)},
+    }
 
 
 def test_a_group_in_a_folder_is_one_recording_with_all_its_arrays(missions, tmp_path):
@@ -81,11 +85,11 @@ def test_the_fleet_has_the_stiffness_of_each_joint_at_its_date(missions, tmp_pat
     shipped = (ROOT / "config" / "fleet" / "grand_tour.yaml").read_text(encoding="utf-8")
     head = shipped[: shipped.index("joints:")]
     (tmp_path / "joints.yaml").write_text(f"{head}joints:\n  LF_HAA: {{index: 0}}\n  RH_KFE: {{index: 11}}\n")
-    source = str(missions / OCTOBER)
-    run = ["fleet", "run", source, "--map", str(tmp_path / "joints.yaml"), "--out", str(tmp_path / "s"), "--serial"]
-    assert main(run) == 0
-    sql = "SELECT joint, time::DATE::VARCHAR, value, low, high FROM parameters WHERE parameter = 'spring.stiffness'"
-    rows = answer(open_store(tmp_path / "s"), f"{sql} ORDER BY joint")[1]
+    run = ["fleet", "run", str(missions / OCTOBER), "--map", str(tmp_path / "joints.yaml"), "--serial"]
+    assert main([*run, "--out", str(tmp_path / "s")]) == 0
+    sql = "SELECT joint, time::DATE::VARCHAR, value, low, high FROM parameters"
+    where = "WHERE parameter = 'spring.stiffness' ORDER BY joint"
+    rows = answer(open_store(tmp_path / "s"), f"{sql} {where}")[1]
     assert [row[:2] for row in rows] == [("LF_HAA", "2024-10-01"), ("RH_KFE", "2024-10-01")]
     for (_, _, value, low, high), share in zip(rows, (1.0, 0.89), strict=True):
         assert low < share * STIFFNESS < high and abs(value / (share * STIFFNESS) - 1.0) < 0.01

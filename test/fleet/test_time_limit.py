@@ -16,7 +16,8 @@ from rsea_ros.fleet.engine import Engine, EngineLimits
 from rsea_ros.fleet.executor import Serial
 from rsea_ros.fleet.query import answer
 from rsea_ros.fleet.sources import bags_of
-from rsea_ros.fleet.task import work
+from rsea_ros.fleet.store import TaskOutcome
+from rsea_ros.fleet.task import Task, work
 from rsea_ros.fleet.time_limit import TIME_LIMIT, OutOfTime, limited
 
 MAP = "joints:\n  knee: {rig: paper_high_impedance}\n"
@@ -68,13 +69,14 @@ def test_a_worker_whose_call_never_returns_ends_itself(monkeypatch):
     assert ends == [70]
 
 
-def test_the_recording_of_an_endless_task_is_quarantined_and_tried_again(folder, tmp_path, monkeypatch, capsys):
+def test_an_endless_recording_is_quarantined_and_tried_again(folder, tmp_path, monkeypatch, capsys):
     (tmp_path / "joints.yaml").write_text(MAP)
     run = ["fleet", "run", str(folder / "run0.mcap"), "--map", str(tmp_path / "joints.yaml"), "--serial"]
     run += ["--out", str(tmp_path / "store"), "--time-limit", "0.001"]
     monkeypatch.setattr(analysis, "analyse", endless)
     assert main([*run, "--fail-on", "quarantined"]) == 1
-    assert "run0.mcap: took more than 0.001 min: a larger --time-limit, then --again" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "run0.mcap: took more than 0.001 min: a larger --time-limit, then --again" in said
     assert main(run) == 0 and "nothing new, 1 in the store before" in capsys.readouterr().out
     monkeypatch.setattr(analysis, "analyse", lambda *_: {})
     assert main([*run, "--again"]) == 0 and "1 done" in capsys.readouterr().out
@@ -95,13 +97,18 @@ def test_the_others_of_a_run_go_on(store, folder, monkeypatch):
 def test_an_hour_is_the_limit_unless_another_is_stated(store, folder):
     limits = []
     held = bags_of([str(folder)], [KNEE])
-    Engine(store, Serial(), lambda task: limits.append(task.time_limit) or stub_work(task), lambda s, x: None).run(held)
+
+    def stub(task: Task) -> TaskOutcome:
+        limits.append(task.time_limit)
+        return stub_work(task)
+
+    Engine(store, Serial(), stub, lambda step, share: None).run(held)
     assert set(limits) == {TIME_LIMIT} == {3600.0}
 
 
 def test_a_limit_of_nothing_is_refused(folder, tmp_path, capsys):
     (tmp_path / "joints.yaml").write_text(MAP)
-    run = ["fleet", "run", str(folder), "--map", str(tmp_path / "joints.yaml"), "--out", str(tmp_path / "store")]
-    assert main([*run, "--time-limit", "0"]) == 2
+    run = ["fleet", "run", str(folder), "--map", str(tmp_path / "joints.yaml"), "--time-limit", "0"]
+    assert main([*run, "--out", str(tmp_path / "store")]) == 2
     assert "--time-limit 0 min, expected more than 0" in capsys.readouterr().err
     assert not (tmp_path / "store").exists()

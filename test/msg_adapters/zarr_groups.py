@@ -1,4 +1,4 @@
-"""Zarr groups of version 2 as zarr 2.18 writes them by default, made by code that the reader does not share."""
+"""Zarr groups of version 2 as zarr 2.18 writes them, made by code that the reader does not share."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def header(values: Any, chunks: tuple[int, ...], **changed: object) -> str:
 
 
 def write_group(folder: Path, arrays: Mapping[str, Any], chunk: int = 4096, block: int = 2048) -> Path:
-    """Write a group of vectors and matrices with `chunk` samples a chunk, which the last one pads with zeros."""
+    """Write a group of vectors and matrices with `chunk` samples a chunk; zeros fill up the last one."""
     folder.mkdir(parents=True)
     (folder / ".zgroup").write_text('{"zarr_format": 2}')
     for name, values in arrays.items():

@@ -52,7 +52,7 @@ def test_other_codecs_are_read(tmp_path, compressor):
     ("column", "text"),
     [
         ("w", "no column 'w', expected one of gain, mode, q, t"),
-        ("q", r"array 'q' has the shape \(10000, 3\), expected a vector of samples or one of its columns, q\[0\]"),
+        ("q", r"array 'q' has the shape \(10000, 3\), .* or one of its columns, q\[0\]"),
         ("q[3]", r"array 'q\[3\]' has the shape \(10000, 3\)"),
         ("t[0]", r"array 't\[0\]' has the shape \(10000,\), expected a vector of samples$"),
     ],
