@@ -107,5 +107,5 @@ def _stream(chunk: _Chunk, packed: bytes, size: int) -> bytes:
 def _unshuffled(block: bytes, width: int) -> bytes:
     """Return the numbers of a block that holds all their first bytes, then all their second ones, …"""
     whole = len(block) - len(block) % width
-    numbers = np.frombuffer(block[:whole], np.uint8).reshape(width, -1).T.tobytes()
-    return numbers + block[whole:]
+    numbers = np.frombuffer(block[:whole], np.uint8).reshape(width, -1).T
+    return bytes(numbers.tobytes()) + block[whole:]

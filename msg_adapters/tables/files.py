@@ -30,8 +30,8 @@ READERS: Mapping[str, Callable[[Path, Sequence[str]], Table]] = {
     ".json": read_json,
     **dict.fromkeys(json_file.LINES, read_json),
 }
-"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not. A directory with
-a .zgroup is a zarr group whatever its name."""
+"""By suffix; a file with any other is text: CSV, TSV, blanks between numbers, gzipped or not. A directory
+with a .zgroup is a zarr group whatever its name."""
 
 
 def read_columns(

@@ -15,9 +15,11 @@ LARGEST_FILE = 1 << 30
 
 
 class Store(Protocol):
-    """The files of a group. arrays: their names."""
+    """The files of a group."""
 
-    arrays: tuple[str, ...]
+    @property
+    def arrays(self) -> tuple[str, ...]:
+        """The names of its arrays, in their order."""
 
     def read(self, array: str, name: str) -> bytes:
         """Return a file of an array. Raises ValueError where it is missing."""
