@@ -19,7 +19,7 @@ from msg_adapters.tables.blosc import unpack_blosc
 from msg_adapters.tables.child import finite_table
 from msg_adapters.tables.elements import place_of
 from msg_adapters.tables.table import Table, check_size, index_of
-from msg_adapters.tables.zarr_store import ARRAY, Store, opened
+from msg_adapters.tables.zarr_store import ARRAY, ArrayStore, opened
 from rsea_ros.signals import FloatArray
 from rsea_ros.wording import shown
 
@@ -67,7 +67,7 @@ def read_zarr(path: Path, columns: Sequence[str]) -> Table:
         return finite_table({column: _column(store, column, len(columns)) for column in columns})
 
 
-def _column(store: Store, column: str, columns: int) -> FloatArray:
+def _column(store: ArrayStore, column: str, columns: int) -> FloatArray:
     place = place_of(column)
     name = column if column in store.arrays else place.base
     index_of(name if name in store.arrays else column, store.arrays)
@@ -82,7 +82,7 @@ def _column(store: Store, column: str, columns: int) -> FloatArray:
     return np.concatenate([_part(store, array, row, index) for row in rows])
 
 
-def _part(store: Store, array: _Array, row: int, index: int | None) -> FloatArray:
+def _part(store: ArrayStore, array: _Array, row: int, index: int | None) -> FloatArray:
     """Return the samples of a column that lie in one chunk, from `row` on."""
     length, *across = array.chunks
     wide = across[0] if across else 1
@@ -133,7 +133,7 @@ def _whole(name: str, key: str, value: object) -> tuple[int, ...]:
 
 
 def _codec(name: str, compressor: object) -> Callable[[bytes, int, int], bytes]:
-    kind = "none" if compressor is None else compressor.get("id") if isinstance(compressor, dict) else ""
+    kind = "none" if compressor is None else str(compressor.get("id")) if isinstance(compressor, dict) else ""
     if kind not in _CODECS:
         raise ValueError(f"array {name!r} is packed by {shown(kind)}, expected one of {', '.join(_CODECS)}")
     return _CODECS[kind]

@@ -14,7 +14,7 @@ LARGEST_FILE = 1 << 30
 """Bytes of one file of a group: a chunk."""
 
 
-class Store(Protocol):
+class ArrayStore(Protocol):
     """The files of a group."""
 
     @property
@@ -62,7 +62,7 @@ def is_group(path: Path) -> bool:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Store]:
+def opened(path: Path) -> Iterator[ArrayStore]:
     """Give the files of a group. Raises OSError and ValueError for a path that holds none."""
     if path.is_dir():
         if not is_group(path):
