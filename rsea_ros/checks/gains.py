@@ -182,12 +182,12 @@ def _named(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrectio
     return ChannelCorrection(channel, sign, known[0], left, also=also)
 
 
-def _prior(channel: str, found: Mapping[str, ChannelCorrection]) -> Prior:
+def _prior(channel: str, corrections: Mapping[str, ChannelCorrection]) -> Prior:
     """Return the prior of a channel's quotient by the readings: its factor over the command's."""
     sign, mean, doubt = 1.0, 0.0, Prior().doubt
     for name, side in ((channel, 1.0), ("command", -1.0)):
-        if name in found:
-            reading = found[name]
+        if name in corrections:
+            reading = corrections[name]
             sign *= reading.sign
             mean += side * (math.log(reading.factor.value) if reading.factor else 0.0)
             mean += side * reading.gain if reading.odd else 0.0

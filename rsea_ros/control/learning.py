@@ -135,12 +135,12 @@ class Learning:
         left = m[3, 3] - 2.0 * before @ m[:3, 3] + before @ m[:3, :3] @ before
         weight = max(FLOORS[which] ** 2, left) / INDEPENDENT * precision
         matrix, right = m[:3, :3] + np.diag(weight), m[:3, 3] + weight * known
-        found = np.linalg.solve(matrix, right)
+        solution = np.linalg.solve(matrix, right)
         low, high = self._bounds[which]
-        inside = np.clip(found, low, high)
-        if (inside == found).all():
-            return found
-        free = inside == found
+        inside = np.clip(solution, low, high)
+        if (inside == solution).all():
+            return solution
+        free = inside == solution
         rest = np.linalg.solve(
             matrix[np.ix_(free, free)], right[free] - matrix[np.ix_(free, ~free)] @ inside[~free]
         )

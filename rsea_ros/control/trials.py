@@ -25,7 +25,7 @@ from rsea_ros.control.uncertainty import BenchVariant, Uncertainty, bench
 from rsea_ros.model.rig import EffectSetting, Rig
 
 HZ, AMPLITUDE = 5.0, 10.0
-SECONDS, SETTLE = 3.0, 1.0
+SECONDS, COUNTED_FROM = 3.0, 1.0
 LONG, LEARNED = 4.0, 3.0
 """s: duration of a trial with another load than the stated one, and the time from which it counts."""
 ARCMIN = math.pi / 180.0 / 60.0
@@ -219,7 +219,7 @@ def sine(
     limits: TorqueLimits | None = None,
     *,
     seconds: float = SECONDS,
-    settle: float = SETTLE,
+    settle: float = COUNTED_FROM,
     late: int = 0,
     link: LinkShare | None = None,
 ) -> float:
@@ -249,7 +249,7 @@ def restlessness(rig: Rig, design: ControllerDesign, gap: float = 5.0 * ARCMIN) 
 
 def _held(true: Rig, model: Rig, design: ControllerDesign, torque: float) -> float:
     t = np.arange(round(LONG * design.rate)) / design.rate
-    wanted = np.where(t < SETTLE, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
+    wanted = np.where(t < COUNTED_FROM, AMPLITUDE * np.sin(2.0 * np.pi * HZ * t), torque)
     controller = TorqueController(model, design.rate, design.gains, compensate=())
     ft = closed_loop(true, design.rate, controller, wanted).ft[t >= LEARNED]
     return float(np.std(ft))
