@@ -1,10 +1,11 @@
 """The torque controller on the simulated bench, faster than real time: its tables, as Markdown.
 
 Run: python bench/torque_control.py [SECTION …] [RIG] [--free RIG] [--rate 280 1000].
-Sections: trials (all that is asked, the worst of the set beside the nominal; the whole set swept), followed
+Sections: trials (all requirements, the worst of the set beside the nominal; the whole set swept), followed
 (5 Hz on every simulated bench of the set), free (a free load, unknown, by frequency and amplitude, without
-and with an encoder on the link), impedance (the outer loop), link (what that encoder is worth), late (samples
-that come when they come), baselines (docs/baselines.md), cost. Through real nodes: torque_control_nodes.py.
+and with an encoder on the link), impedance (the outer loop), link (the benefit of that encoder), late
+(samples with irregular arrival), baselines (docs/baselines.md), cost.
+Through real nodes: torque_control_nodes.py.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def trials(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Design, try everything, sweep the set densely."""
+    """Design, run all trials, sweep the set densely."""
     found = study(rig, free, rates, motors(rig))
     shown = [f"{at.design.rate:g} Hz" for at in found.rates]
     yield "\n".join(tables.gains_words(found))
@@ -121,7 +122,7 @@ def outer(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
 
 
 def late(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Let measurements and commands come when they come: largest |ft| and command for 10 N m at 5 Hz."""
+    """Let measurements and commands arrive irregularly: largest |ft| and command for 10 N m at 5 Hz."""
     for found in designs(rig, load_range(rig, free), rates):
         for name, (taken, acting) in _kinds(round(3.0 * found.rate)).items():
             wanted = 10.0 * np.sin(2.0 * np.pi * 5.0 * np.arange(len(taken)) / found.rate)
@@ -148,7 +149,7 @@ def _kinds(n: int) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
 
 
 def cost(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
-    """Tell what a step costs, as a part of its period; medians of 1000."""
+    """Print the time of a step as a share of its period; medians of 1000."""
     for found in designs(rig, load_range(rig, free), rates):
         controller, times = TorqueController(rig, found.rate, found.gains), []
         for k in range(1000):
@@ -173,7 +174,7 @@ SECTIONS: dict[str, Callable[[Rig, Rig, Sequence[float]], Iterator[str]]] = {
 
 
 def main() -> None:
-    """Design, try, print."""
+    """Run the requested sections."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sections", nargs="*", metavar="SECTION", help=", ".join(SECTIONS))
     parser.add_argument("--rig", default="paper_high_impedance")
