@@ -164,9 +164,9 @@ def check_free(
 
 
 def _touches(path: Path, one: Path) -> bool:
-    """Return whether a path is an input, by any name, or lies directly in it."""
-    whole = one.resolve()
-    return whole in (path.resolve(), path.resolve().parent) or (path.exists() and path.samefile(one))
+    """Return whether a path is an input, by any name, or lies in it."""
+    whole, place = one.resolve(), path.resolve()
+    return whole in (place, *place.parents) or (path.exists() and path.samefile(one))
 
 
 def _name_finally(error: BaseException | None, stage: Path, folder: Path) -> None:

@@ -6,6 +6,7 @@ where: {column: test_nr, below: 100}          # optional: only these rows; also 
 runs: {column: episode_index}                 # optional: a file of several runs, one for each value
 delimiter: ";"                                # optional: text files only, else seen from the first line
 header: false                                 # optional: text files only, else seen from the first line
+decimal: ","                                  # optional: text files only, else a point
 channels:
   position: {column: phi, unit: deg, sign: -1}
   velocity: {file: states.csv, column: "rates[2]", unit: rad/s}   # of a file in the directory that is read
@@ -54,6 +55,7 @@ class ImportMap:
     about: str = ""
     runs: str | None = None
     header: bool | None = None
+    decimal: str = "."
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -116,6 +118,7 @@ def _map(path: Path, document: object) -> ImportMap:
         delimiter=_delimiter(body.get("delimiter")),
         runs=_runs(body["runs"]) if "runs" in body else None,
         header=_header(body.get("header")),
+        decimal=_decimal(body.get("decimal", ".")),
         about=" ".join(str(body.get("about", "")).split()),
     )
 
@@ -137,6 +140,12 @@ def _header(value: object) -> bool | None:
     if value is None or isinstance(value, bool):
         return value
     raise FieldError(f"header is {shown(value)}, expected true or false", "header")
+
+
+def _decimal(value: object) -> str:
+    if value in (".", ","):
+        return str(value)
+    raise FieldError(f"decimal is {shown(value)}, expected '.' or ','", "decimal")
 
 
 def _one_kind(channels: dict[str, tuple[ChannelTerm, ...]]) -> dict[str, tuple[ChannelTerm, ...]]:

@@ -49,7 +49,7 @@ class _Part:
 
     t: FloatArray
     values: Mapping[str, FloatArray]
-    note: str
+    notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
 
@@ -105,7 +105,7 @@ def _file(path: Path, name: str, mapping: ImportMap) -> Path:
 def _table(path: Path, name: str, maps: Sequence[ImportMap]) -> Table:
     """Read the columns that all joints need from a file."""
     columns = dict.fromkeys(column for mapping in maps for column in mapping.of_file(name).columns())
-    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header)
+    return read_columns(path, list(columns), maps[0].delimiter, maps[0].header, maps[0].decimal)
 
 
 def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> list[float | None]:
@@ -122,9 +122,9 @@ def _runs(path: str | Path, tables: Mapping[str, Table], mapping: ImportMap) -> 
 def _part(path: Path, table: Table, mapping: ImportMap, run: float | None) -> _Part:
     with _naming(path, mapping, run):
         keep, undated = _rows_kept(table, mapping, run)
-        stamps, note = _stamps(table, mapping, keep)
+        stamps, repeats = _stamps(path, table, mapping, keep)
         values = {name: _values(table, terms, keep, stamps) for name, terms in mapping.channels.items()}
-    return _Part(stamps, values, note, tuple(_rows_left_out(path, table, undated)))
+    return _Part(stamps, values, table.notes, (*_rows_left_out(path, table, undated), *repeats))
 
 
 def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Record:
@@ -141,7 +141,7 @@ def _record(path: str | Path, parts: Sequence[_Part], mapping: ImportMap) -> Rec
     lines = [f"{fault.channel}: {fault.detail}" for fault in faults]
     notes = (
         f"imported from {Path(path).name}, {mapping.path.name}: {mapping.about}".rstrip(": "),
-        *(part.note for part in parts),
+        *(note for part in parts for note in part.notes),
         *lines,
     )
     return Record(channels, str(path), epoch, tuple(filter(None, notes)), tuple(faults))
@@ -223,14 +223,16 @@ def _arrivals(name: str, channel: Channel) -> Channel:
     return Channel(channel.t[new], channel.y[new])
 
 
-def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArray, str]:
-    """Return the stamp of each valid row, s, increasing, and the repairs.
+def _stamps(
+    path: Path, table: Table, mapping: ImportMap, keep: BoolArray
+) -> tuple[FloatArray, list[Fault]]:
+    """Return the stamp of each valid row, s, increasing, and the fault of stamps that repeat.
 
     Stamps that repeat are spread over all dated rows of a run, those that `where` leaves out included.
     """
     if mapping.time is None:
         start = int(np.argmax(keep)) if mapping.runs is not None else 0
-        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), ""
+        return (np.flatnonzero(keep) - start) / float(mapping.rate or 1.0), []
     whole = ~np.isnan(_column_of(table, mapping.time.columns))
     if mapping.runs is not None:
         whole &= table[mapping.runs] == table[mapping.runs][np.argmax(keep)]
@@ -243,8 +245,10 @@ def _stamps(table: Table, mapping: ImportMap, keep: BoolArray) -> tuple[FloatArr
         raise ImportMapError(f"{mapping.time.column} of row {dated[at] + 1} goes back ({steps})")
     if t[-1] == t[0]:
         raise ImportMapError(f"{mapping.time.column} is {t[0]:g} s in every row, expected a clock that runs")
-    t, note = repaired(t)
-    return t[keep[dated]], note
+    spread, detail = repaired(t)
+    share = float(np.mean(np.diff(t, prepend=-np.inf) == 0.0))
+    faults = [Fault("coarse_stamps", path.name, share, detail)] if detail else []
+    return spread[keep[dated]], faults
 
 
 def _column_of(table: Table, columns: Sequence[str]) -> FloatArray:

@@ -32,6 +32,8 @@ _CLEAR = 60.0
 """Difference of phase costs from which the better sign needs no trial."""
 _EXACT = 0.4
 """Logarithm: what is left of every gain where two units at once are to be believed."""
+_WITHIN = 2.0
+"""Spreads of a rig's inertia that a drive without a spring may be off: its torque is that of the inertia."""
 _NEAR = 0.7
 """Logarithm: so close to a factor's value a gain must be for the factor to be tried."""
 
@@ -177,9 +179,16 @@ def _named(channel: str, sign: float, gain: float, rig: Rig) -> ChannelCorrectio
     known = sorted(factors(channel, rig), key=lambda f: abs(math.log(f.value) - gain))
     left = gain - math.log(known[0].value)
     if abs(left) > _NEAR:
-        return ChannelCorrection(channel, sign, None, gain, odd=True)
+        of_inertia = rig.rigid_spring and channel == "motor_torque"
+        odd = not of_inertia or abs(gain) > _WITHIN * inertia_spread(rig)
+        return ChannelCorrection(channel, sign, None, gain, odd=odd)
     also = tuple(f for f in known[1:] if abs(math.log(f.value / known[0].value)) < _ALIKE)
     return ChannelCorrection(channel, sign, known[0], left, also=also)
+
+
+def inertia_spread(rig: Rig) -> float:
+    """Return the largest spread of the inertias that a fit may move."""
+    return max((rig.spread(n) for n in rig.free() if n.endswith("inertia")), default=0.0)
 
 
 def _prior(channel: str, corrections: Mapping[str, ChannelCorrection]) -> Prior:

@@ -16,6 +16,7 @@ import numpy as np
 from rsea_ros.checks.expected import Side
 from rsea_ros.checks.finding import Finding
 from rsea_ros.checks.gain_findings import RIGHT_RIG
+from rsea_ros.checks.gains import inertia_spread
 from rsea_ros.checks.spectra import Quotient, quotient
 from rsea_ros.model.equations import mechanics
 from rsea_ros.model.inverse import CUT_OFF
@@ -72,7 +73,7 @@ def impedance_findings(side: Side | None, rig: Rig) -> list[Finding]:
         return [_another("stiffness", measured.stiffness, "N m/rad", stiffness, swing)]
     factor = measured.inertia / inertia
     sure = measured.inertia > 2.0 * _SURE * measured.inertia_sd
-    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * _spread(rig)):
+    if sure and abs(math.log(factor)) > max(math.log(_FAR), _ELSEWHERE * inertia_spread(rig)):
         return [_another("inertia", measured.inertia, "kg m^2", inertia, f"{factor:.2g} times the rig's")]
     return []
 
@@ -88,11 +89,6 @@ def _another(key: str, value: float, unit: str, expected: float, detail: str) ->
         detail=detail,
         remedy=RIGHT_RIG,
     )
-
-
-def _spread(rig: Rig) -> float:
-    """Return the largest spread of the inertias that a fit may move."""
-    return max((rig.spread(n) for n in rig.free() if n.endswith("inertia")), default=0.0)
 
 
 def impedance_of(side: Side, rig: Rig) -> ImpedanceFit | None:

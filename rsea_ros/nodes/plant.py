@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from rsea_ros.hardware.simulated import SimulatedDevice
 from rsea_ros.model.rig_file import load_rig
-from rsea_ros.nodes._bench import NAMES, Bench
+from rsea_ros.nodes._bench import NAMES, SPRING_FRAME, Bench
 from rsea_ros.nodes._cycle import SECOND, Cycle
 from rsea_ros.nodes._health import Health
 from rsea_ros.nodes._parameters import NodeParameter
@@ -23,6 +23,7 @@ TABLE = (
     NodeParameter("noise", True, "whether the sensors have their noise and quantum"),
     NodeParameter("duration", 60.0, "time over which drifts come to their full size", "s", 1.0, 1e6),
     *NAMES,
+    SPRING_FRAME,
 )
 STALL, PAUSE = SECOND // 50, 0.005
 """After a stall of so many ns, the pause (s) in which commands arrive that were held up with this process."""
@@ -47,7 +48,7 @@ class PlantNode:
             duration=values["duration"],
             clock=lambda: self._now,
         )
-        self._bench = Bench(node, values)
+        self._bench = Bench(node, values, deflects="deflection" in rig.sensors)
         self._cycle = Cycle(values["rate"], self._step, catch_up=True)
         self._health = Health(node, lambda: self._bench.report(self._cycle), f"simulated {values['rig']}")
         self._log.info(f"rig {rig.name} at {values['rate']:g} Hz")
