@@ -29,7 +29,7 @@ from rsea_ros.benchmark.dataset import MANIFEST, VERSION, manifest_text, table_t
 from rsea_ros.benchmark.truth import Truth, truth_hash, truth_text
 from rsea_ros.effects.catalogue import catalogue
 from rsea_ros.model.rig_file import load_rig, rig_text
-from rsea_ros.new_files import NewFiles, Destination, check_free, write_text
+from rsea_ros.new_files import Destination, NewFiles, check_free, write_text
 from rsea_ros.progress import Progress
 from rsea_ros.signals import FloatArray, Record
 

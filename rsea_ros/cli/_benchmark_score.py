@@ -12,7 +12,7 @@ from rsea_ros.cli._columns import columns
 from rsea_ros.cli._output import path
 
 if TYPE_CHECKING:
-    from rsea_ros.benchmark.scoring import Interval, Scores
+    from rsea_ros.benchmark.scoring import ScoreInterval, Scores
 
 HEAD = (
     "entry", "named right, %", "false names, %", "silent if none, %", "Brier", "median rank", "answered, %",
@@ -54,7 +54,7 @@ def _cells(scores: Scores) -> tuple[str, ...]:
     return (*(_cell(s, 100.0, 0) for s in percent), *plain, f"{100.0 * scores.answered:.0f}")
 
 
-def _cell(interval: Interval, factor: float, digits: int) -> str:
+def _cell(interval: ScoreInterval, factor: float, digits: int) -> str:
     if math.isnan(interval.value):
         return "–"
     value, low, high = (f"{factor * v:.{digits}f}" for v in interval)
