@@ -34,7 +34,7 @@ from rsea_ros.control.loads import LOCKED, load_range, locked
 from rsea_ros.control.robustness import robustness
 from rsea_ros.control.study import study
 from rsea_ros.control.synthesis import ControllerDesign, design
-from rsea_ros.control.trials import LEARNED, LONG, hardest, sine, tracked
+from rsea_ros.control.trials import LEARNED, hardest, sine, tracked
 from rsea_ros.control.virtual import Virtual, passive_to, stiffest
 from rsea_ros.model.rig import Rig
 from rsea_ros.model.rig_file import load_rig
@@ -83,7 +83,7 @@ def unknown(rig: Rig, free: Rig, rates: Sequence[float]) -> Iterator[str]:
         for hz in (1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0):
             most = min(10.0, 0.8 * largest(free, hz, TorqueLimits().torque, math.inf))
             errors = [
-                sine(free, locked(rig), found, part * most, hz, seconds=LONG, settle=LEARNED, link=link)
+                sine(free, locked(rig), found, part * most, hz, span=LEARNED, link=link)
                 for link in (None, share)
                 for part in (1.0, 0.3)
             ]
