@@ -10,7 +10,11 @@ GUARD = ("hardware/test_limit_tables.py", "hardware/test_guard_tables.py", "hard
 
 TARGETS: dict[str, tuple[str, ...]] = {
     "hardware/limits": GUARD,
-    "hardware/guarded": ("hardware/test_guarded.py", "hardware/test_limits.py"),
+    "hardware/guarded": (
+        "hardware/test_guarded.py",
+        "hardware/test_guarded_services.py",
+        "hardware/test_limits.py",
+    ),
     "identification/noise": ("identification/test_noise_tables.py",),
     "identification/quantum": ("identification/test_noise_tables.py",),
     "identification/noise_level": ("identification/test_noise_level_tables.py",),
