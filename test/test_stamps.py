@@ -7,7 +7,8 @@ import pytest
 
 from rsea_ros.errors import ChannelError
 from rsea_ros.signals import Channel, Record
-from rsea_ros.stamps import far_apart, jumps_back, repair_stamps
+from rsea_ros.stamp_order import far_apart, jumps_back
+from rsea_ros.stamps import repair_stamps
 
 PERIOD = 1 / 280
 COUNT = 2000

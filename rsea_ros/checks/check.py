@@ -175,9 +175,9 @@ def _another(record: Record, compared: Mapping[str, Side], rig: Rig) -> list[Fin
     return impedance_findings(compared.get("motor_torque"), rig) or restoring_findings(record, rig)
 
 
-def _is_elsewhere(found: list[Finding]) -> bool:
+def _is_elsewhere(findings: list[Finding]) -> bool:
     """Return whether clocks and sensitivities mean nothing: another rig, signs or scales."""
-    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in found)
+    return any(f.light == "red" and f.kind in ("sign", "scale", "wrong_rig") for f in findings)
 
 
 def _linearised(checked: Checked, rig: Rig, readings: Readings, values: bool) -> list[Finding]:

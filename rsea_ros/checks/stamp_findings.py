@@ -11,7 +11,7 @@ from rsea_ros.model.drive import SLOW
 from rsea_ros.model.propagator import state_space
 from rsea_ros.model.rig import Rig
 from rsea_ros.signals import Channel, Fault, FloatArray, Record
-from rsea_ros.stamps import polls_unevenly
+from rsea_ros.stamp_gaps import polls_unevenly
 
 _AS_SECONDS = "are the stamps in s, not in ms or µs? If so, "
 _RED_SHARE = 0.2

@@ -99,14 +99,14 @@ def worked(args: argparse.Namespace, out: str, held: Sequence[Held]) -> RunSumma
 def executor(args: argparse.Namespace, memory: int | None) -> Iterator[Executor]:
     """Return the executor of the tasks. memory: bytes of each worker on this machine."""
     if args.serial:
-        with serial() as here:
-            yield here
+        with serial() as process:
+            yield process
         return
     from rsea_ros.fleet.cluster import on_scheduler, on_this_machine
 
     if args.scheduler:
-        with on_scheduler(args.scheduler) as there:
-            yield there
+        with on_scheduler(args.scheduler) as scheduler:
+            yield scheduler
         return
     assert memory is not None
     with on_this_machine(_workers(args), memory, args.dashboard) as (workers, link):

@@ -54,8 +54,8 @@ def run(args: argparse.Namespace) -> int:
         n: numbers({"rms_error": c.rms_error, "fit_percent": c.fit_percent}) for n, c in comparisons.items()
     }
     with np.errstate(all="ignore"):
-        told = [fault_json(fault) for fault in check(record, rig).faults]
-    print(json.dumps({"channels": errors, "data": {"faults": told}}, indent=2))
+        faults_json = [fault_json(fault) for fault in check(record, rig).faults]
+    print(json.dumps({"channels": errors, "data": {"faults": faults_json}}, indent=2))
     return 0
 
 
